@@ -1,0 +1,206 @@
+"""The result files of a run: the only thing that a report may know of a benchmark.
+
+Standard library alone, so that `--list` and the tests of the report start at once.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import math
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+STATUSES = ("ok", "diverged", "stalled", "timeout", "failed", "skipped")
+
+COLUMNS = (
+    "suite", "scene", "method", "seed", "metric", "unit", "value", "status", "reason", "expected",
+    "tolerance", "preset", "commit", "hardware", "dtype", "threads", "terms",
+)  # fmt: skip
+
+
+class ResultsError(ValueError):
+    """A run folder or one of its files is absent or not what it should be; the message names it."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured number: a (suite, scene, method, seed, metric) and what came out.
+
+    `value`, `expected` and `tolerance` are None where absent (an empty cell in the file); a skipped
+    row has a reason and no value. `terms` names the energies of the scene, joined by "+". Raises
+    ResultsError for an unknown status, a non-finite value called ok, or a skip without a reason.
+    """
+
+    suite: str
+    scene: str
+    method: str
+    seed: int
+    metric: str
+    unit: str
+    value: float | None = None
+    status: str = "ok"
+    reason: str = ""
+    expected: float | None = None
+    tolerance: float | None = None
+    preset: str = ""
+    commit: str = ""
+    hardware: str = ""
+    dtype: str = "float64"
+    threads: int = 1
+    terms: str = ""
+
+    def __post_init__(self) -> None:
+        label = f"{self.scene} x {self.method} / {self.metric}"
+        if self.status not in STATUSES:
+            raise ResultsError(f"row {label}: status '{self.status}' is none of {', '.join(STATUSES)}")
+        if self.status == "skipped" and (self.value is not None or not self.reason):
+            raise ResultsError(f"row {label}: a skipped row has a reason and no value")
+        if self.status == "ok" and (self.value is None or not math.isfinite(self.value)):
+            raise ResultsError(f"row {label}: status ok needs a finite value, got {self.value}")
+
+    @property
+    def passed(self) -> bool:
+        """Whether the row counts as fine: ok, or skipped with its reason."""
+        return self.status in ("ok", "skipped")
+
+
+_OPTIONAL_NUMBERS = ("value", "expected", "tolerance")
+_WHOLE_NUMBERS = ("seed", "threads")
+
+
+def row_to_cells(row: Row) -> dict[str, str]:
+    """The text of each cell. Numbers keep all their digits, so that reading gives back the same row."""
+    cells = {}
+    for name in COLUMNS:
+        value = getattr(row, name)
+        if value is None:
+            cells[name] = ""
+        elif name in _OPTIONAL_NUMBERS:
+            cells[name] = repr(float(value))
+        else:
+            cells[name] = " ".join(str(value).split())
+    return cells
+
+
+def cells_to_row(cells: dict[str, str]) -> Row:
+    """The row written in the cells. Raises ResultsError for a cell that is no number where one is due."""
+    values: dict[str, Any] = dict(cells)
+    try:
+        for name in _OPTIONAL_NUMBERS:
+            values[name] = float(cells[name]) if cells[name] else None
+        for name in _WHOLE_NUMBERS:
+            values[name] = int(cells[name])
+    except ValueError as error:
+        raise ResultsError(f"column {name}: {error}") from None
+    return Row(**values)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path`: renamed to it when the block ends well, removed when it does not."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+class RunFolder:
+    """The files of one run under `path`. Making the object creates nothing."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+
+    @property
+    def config_path(self) -> Path:
+        return self.path / "run.json"
+
+    @property
+    def rows_path(self) -> Path:
+        return self.path / "results.csv"
+
+    @property
+    def report_path(self) -> Path:
+        return self.path / "report.pdf"
+
+    @property
+    def tables(self) -> Path:
+        return self.path / "tables"
+
+    @property
+    def figures(self) -> Path:
+        return self.path / "figures"
+
+    @property
+    def models(self) -> Path:
+        return self.path / "models"
+
+    @property
+    def trajectories(self) -> Path:
+        return self.path / "trajectories"
+
+    def trajectory_path(self, scene: str, method: str, seed: int = 0) -> Path:
+        """trajectories/<scene>/<method>.vtkhdf; the slash of "dressed/walk" becomes "dressed-walk"."""
+        suffix = "" if seed == 0 else f"-seed{seed}"
+        return self.trajectories / scene.replace("/", "-") / f"{method}{suffix}.vtkhdf"
+
+    def write_config(self, config: dict[str, Any]) -> None:
+        """Write run.json whole or not at all."""
+        with replacing(self.config_path) as temporary:
+            temporary.write_text(json.dumps(config, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+    def read_config(self) -> dict[str, Any]:
+        """The configuration. Raises ResultsError when run.json is absent or broken."""
+        try:
+            config = json.loads(self.config_path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise ResultsError(f"{self.config_path}: no such file; is this the folder of a run?") from None
+        except (json.JSONDecodeError, UnicodeDecodeError) as error:
+            raise ResultsError(f"{self.config_path}: not readable as JSON ({error})") from None
+        if not isinstance(config, dict):
+            raise ResultsError(f"{self.config_path}: holds no JSON object")
+        return config
+
+    def write_rows(self, rows: Iterable[Row]) -> None:
+        """Write results.csv whole or not at all."""
+        with (
+            replacing(self.rows_path) as temporary,
+            temporary.open("w", newline="", encoding="utf-8") as stream,
+        ):
+            writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(row_to_cells(row) for row in rows)
+
+    def read_rows(self) -> list[Row]:
+        """All rows. Raises ResultsError naming file and line when the file is absent or broken."""
+        try:
+            stream = self.rows_path.open(newline="", encoding="utf-8")
+        except FileNotFoundError:
+            raise ResultsError(f"{self.rows_path}: no such file; is this the folder of a run?") from None
+        rows = []
+        with stream:
+            reader = csv.DictReader(stream)
+            if tuple(reader.fieldnames or ()) != COLUMNS:
+                raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
+            for cells in reader:
+                if None in cells or None in cells.values():
+                    line = f"{self.rows_path}: line {reader.line_num}"
+                    raise ResultsError(f"{line}: {len(COLUMNS)} cells are due")
+                try:
+                    rows.append(cells_to_row(cells))
+                except ResultsError as error:
+                    raise ResultsError(f"{self.rows_path}: line {reader.line_num}: {error}") from None
+        return rows
+
+
+def with_provenance(rows: Iterable[Row], **provenance: Any) -> list[Row]:
+    """The rows with their provenance columns (preset, commit, hardware, ...) filled in."""
+    return [dataclasses.replace(row, **provenance) for row in rows]

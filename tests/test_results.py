@@ -1,0 +1,117 @@
+"""The result files: what is written is read back, broken files are named, nothing half-written stays."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+
+import pytest
+
+from benchmarks.results import COLUMNS, ResultsError, Row, RunFolder, replacing, with_provenance
+
+ROWS = [
+    Row("garments", "dressed/walk", "snug", 0, "energy/strain", "J", 0.1 + 0.2, terms="strain+gravity"),
+    Row("garments", "dressed/walk", "pbns", 0, "energy/inertia", "J", None, "skipped", 'no "v", at all'),
+    Row("validation", "free_fall", "simulation", 3, "check", "m", 1e-17, expected=0.0, tolerance=1e-12),
+    Row("extremes", "stiff", "simulation", 0, "outcome", "weights", float("nan"), "failed", "line\ntwo"),
+]
+
+
+def test_columns_are_the_fields_of_a_row():
+    assert [field.name for field in dataclasses.fields(Row)] == list(COLUMNS)
+
+
+def test_rows_come_back_digit_for_digit(tmp_path):
+    folder = RunFolder(tmp_path / "run")
+    folder.write_rows(ROWS)
+    back = folder.read_rows()
+    assert back[0] == ROWS[0] and back[1] == ROWS[1] and back[2] == ROWS[2]
+    assert back[3].reason == "line two" and back[3].value != back[3].value
+    assert sorted(path.name for path in folder.path.iterdir()) == ["results.csv"]
+
+
+def test_config_comes_back(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.write_config({"preset": "smoke", "seeds": [0, 1], "note": "λ"})
+    assert folder.read_config() == {"preset": "smoke", "seeds": [0, 1], "note": "λ"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"status": "fine"}, "status 'fine'"),
+        ({"value": None}, "finite value"),
+        ({"value": float("nan")}, "finite value"),
+        ({"value": None, "status": "skipped"}, "reason"),
+        ({"status": "skipped", "reason": "why"}, "no value"),
+    ],
+)
+def test_a_row_that_says_nothing_true_is_refused(changes, word):
+    with pytest.raises(ResultsError, match=word):
+        dataclasses.replace(ROWS[0], **changes)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "line 1: the columns"),
+        ("a,b\n1,2\n", "line 1: the columns"),
+        (",".join(COLUMNS) + "\n1,2\n", "line 2: 17 cells"),
+        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,1,\n", "line 2: column seed"),
+    ],
+)
+def test_a_broken_file_is_named_with_its_line(tmp_path, text, word):
+    folder = RunFolder(tmp_path)
+    folder.rows_path.write_text(text)
+    with pytest.raises(ResultsError, match=word) as caught:
+        folder.read_rows()
+    assert "results.csv" in str(caught.value)
+
+
+def test_an_absent_or_broken_config_is_named(tmp_path):
+    folder = RunFolder(tmp_path / "absent")
+    with pytest.raises(ResultsError, match=r"run\.json"):
+        folder.read_config()
+    assert not folder.path.exists()
+    folder = RunFolder(tmp_path)
+    folder.config_path.write_text("{")
+    with pytest.raises(ResultsError, match="not readable as JSON"):
+        folder.read_config()
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.write_rows(ROWS[:1])
+
+    def rows():
+        yield ROWS[1]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        folder.write_rows(rows())
+    assert folder.read_rows() == ROWS[:1]
+    assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
+
+
+def test_replacing_keeps_the_suffix_for_writers_that_look_at_it(tmp_path):
+    with replacing(tmp_path / "a.vtkhdf") as temporary:
+        assert temporary.suffix == ".vtkhdf" and temporary.parent == tmp_path
+        temporary.write_text("x")
+    assert (tmp_path / "a.vtkhdf").read_text() == "x"
+
+
+def test_trajectory_paths_are_flat_and_told_apart(tmp_path):
+    folder = RunFolder(tmp_path)
+    paths = {folder.trajectory_path(s, m, k) for s in ("a/b", "a") for m in ("x", "y") for k in (0, 1)}
+    assert len(paths) == 8 and all(len(p.relative_to(tmp_path).parts) == 3 for p in paths)
+
+
+def test_provenance_is_filled_in():
+    assert {row.commit for row in with_provenance(ROWS, commit="abc")} == {"abc"}
+
+
+def test_the_module_is_light():
+    code = "import sys, benchmarks.results; print({'numpy', 'torch', 'pandas'} & set(sys.modules))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert answer.stdout.strip() == "set()", answer.stderr
