@@ -1,0 +1,1 @@
+"""What is measured of a trajectory. Curvature, distance and penetration know no energy."""

@@ -1,0 +1,39 @@
+"""Distances between surfaces and into the body, from positions alone. No physics here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from reference_sim import Obstacle
+
+Floats = NDArray[np.float64]
+
+
+def distance_rms(positions: Floats, reference: Floats) -> Floats:
+    """(T,) root mean square distance [m] between the same vertices of (T,V,3) and (T,V,3) [m].
+
+    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read
+    this beside the spread between two references, never alone.
+    """
+    return np.sqrt(((positions - reference) ** 2).sum(2).mean(1))
+
+
+@dataclass(frozen=True)
+class Penetration:
+    """Per frame, over all vertices with none left out: share below the skin and depth (0 outside) [m]."""
+
+    share: Floats  # (T,)
+    depth: Floats  # (T,V)
+
+
+def penetration(positions: Floats, obstacle: Obstacle) -> Penetration:
+    """How deep the vertices (T,V,3) [m] lie in the obstacle, by its true signed distance at that frame."""
+    depth = np.empty(positions.shape[:2])
+    for frame, x in enumerate(positions):
+        depth[frame] = np.maximum(0.0, -np.asarray(obstacle.signed_distance(x, frame)))
+    return Penetration(share=(depth > 0.0).mean(1), depth=depth)

@@ -1,0 +1,78 @@
+"""How much of everything a run takes: three frozen sizes, from a smoke test to the paper's scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preset:
+    """The sizes of one run. `None` for a number of motions means all of them.
+
+    frames: at most so many frames of each motion, at 30 per second. steps: optimiser steps per kind
+    of network. settle_frames: frames from the T-pose into the first pose of a motion.
+    sheet_cells: the small scenes are sheets of so many cells along each side.
+    """
+
+    name: str
+    description: str
+    garment_vertices: int
+    train_motions: int | None
+    test_motions: int | None
+    frames: int
+    settle_frames: int
+    steps: dict[str, int]
+    sheet_cells: int
+    sheet_frames: int
+    newton_cuts: tuple[int, ...]
+
+
+PRESETS = (
+    Preset(
+        name="smoke",
+        description="everything once, tiny: under 2 minutes on 2 cores; its numbers mean nothing",
+        garment_vertices=300,
+        train_motions=1,
+        test_motions=1,
+        frames=20,
+        settle_frames=12,
+        steps={"snug": 60, "supervised": 60, "pbns": 60},
+        sheet_cells=6,
+        sheet_frames=10,
+        newton_cuts=(1, 4),
+    ),
+    Preset(
+        name="quick",
+        description="1000-vertex T-shirt, all embedded motions: under 15 minutes on 2 cores",
+        garment_vertices=1000,
+        train_motions=None,
+        test_motions=None,
+        frames=150,
+        settle_frames=30,
+        steps={"snug": 4000, "supervised": 3000, "pbns": 6000},
+        sheet_cells=14,
+        sheet_frames=45,
+        newton_cuts=(1, 2, 4, 8),
+    ),
+    Preset(
+        name="paper",
+        description="4400-vertex T-shirt, every frame of every motion, training of paper length: hours",
+        garment_vertices=4400,
+        train_motions=None,
+        test_motions=None,
+        frames=100_000,
+        settle_frames=60,
+        steps={"snug": 60_000, "supervised": 60_000, "pbns": 60_000},
+        sheet_cells=30,
+        sheet_frames=90,
+        newton_cuts=(1, 2, 4, 8),
+    ),
+)
+
+
+def find_preset(name: str) -> Preset:
+    """The preset of that name. Raises ValueError naming the choices."""
+    for preset in PRESETS:
+        if preset.name == name:
+            return preset
+    raise ValueError(f"unknown preset '{name}'; choose from {', '.join(p.name for p in PRESETS)}")

@@ -1,0 +1,85 @@
+"""Where numbers come from: the code, the machine and the versions, stated on every row."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+PACKAGES = (
+    "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pyvista", "pyacvd",
+)  # fmt: skip
+
+
+def commit() -> str:
+    """The commit of the checkout, with "+changes" when tracked files differ; else the package version."""
+    root = Path(__file__).resolve().parent.parent
+
+    def git(*words: str) -> str:
+        answer = subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True, timeout=20)
+        return answer.stdout.strip() if answer.returncode == 0 else ""
+
+    try:
+        if (root / ".git").exists() and (head := git("rev-parse", "--short=10", "HEAD")):
+            return head + ("+changes" if git("status", "--porcelain", "--untracked-files=no") else "")
+    except (OSError, subprocess.TimeoutExpired):
+        pass  # no git on this machine: the installed version is what can be said
+    return f"version {package_version('neural-garment-benchmark')}"
+
+
+def package_version(name: str) -> str:
+    """The installed version of a distribution, read without importing it; "absent" when it is not there."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "absent"
+
+
+def processor_name() -> str:
+    """The name that the processor gives itself, or the architecture where it gives none."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return " ".join(line.split(":", 1)[1].split())
+    except OSError:
+        pass  # not Linux
+    return platform.processor() or platform.machine()
+
+
+def usable_cores() -> int:
+    """Processor cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def hardware(device: str = "cpu") -> dict[str, Any]:
+    """Processor, cores, memory [GB], system and, for cuda, the accelerator's name."""
+    facts: dict[str, Any] = {
+        "processor": processor_name(),
+        "cores": usable_cores(),
+        "system": f"{platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "device": device,
+    }
+    if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
+        facts["memory_gb"] = round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9, 1)
+    if device == "cuda":
+        import torch
+
+        facts["accelerator"] = torch.cuda.get_device_name()
+    return facts
+
+
+def hardware_line(facts: dict[str, Any]) -> str:
+    """One short line for the hardware column of a row."""
+    parts = (facts.get("accelerator"), f"{facts['processor']} ({facts['cores']} cores)")
+    return ", ".join(part for part in parts if part)
+
+
+def versions() -> dict[str, str]:
+    """The installed version of each package that can move a number."""
+    return {name: package_version(name) for name in PACKAGES}

@@ -1,0 +1,135 @@
+"""The metrics on surfaces whose answers are known: sphere, cylinder, plane, and energies by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.metrics.curvature import (
+    boundary_mask,
+    curvature_error,
+    curvature_series,
+    mean_curvature,
+)
+from benchmarks.metrics.geometry import distance_rms, penetration
+
+
+def icosphere(subdivisions: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    golden = (1 + 5**0.5) / 2
+    points = [(0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
+    points = np.array([np.roll(p, k) for k in range(3) for p in points], dtype=float)
+    lengths = np.linalg.norm(points[:, None] - points[None], axis=2)
+    near = np.isclose(lengths, 2.0)
+    faces = np.array(
+        [(i, j, k) for i in range(12) for j in range(12) for k in range(12)
+         if i < j and i < k and near[i, j] and near[j, k] and near[k, i]
+         and np.linalg.det(points[[i, j, k]]) > 0]
+    )  # fmt: skip
+    for _ in range(subdivisions):
+        edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+        unique, inverse = np.unique(edges, axis=0, return_inverse=True)
+        a, b, c = inverse.reshape(3, -1) + len(points)
+        points = np.concatenate([points, points[unique].mean(1)])
+        i, j, k = faces.T
+        faces = np.stack([(i, a, c), (a, j, b), (c, b, k), (a, b, c)]).transpose(0, 2, 1).reshape(-1, 3)
+    return radius * points / np.linalg.norm(points, axis=1, keepdims=True), faces
+
+
+def grid(rows: int, columns: int) -> np.ndarray:
+    i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
+    a = (i * (columns + 1) + j).ravel()
+    b, c, d = a + columns + 1, a + columns + 2, a + 1
+    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def cylinder(cells: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    angle, height = np.meshgrid(np.linspace(0, 2, cells + 1), np.linspace(0, 1, cells + 1), indexing="ij")
+    points = np.stack([radius * np.cos(angle), height * radius, radius * np.sin(angle)], -1)
+    return points.reshape(-1, 3), grid(cells, cells)
+
+
+def test_curvature_of_a_sphere_converges_at_second_order():
+    errors = []
+    for subdivisions in (2, 3, 4):
+        x, faces = icosphere(subdivisions, 0.25)
+        assert not boundary_mask(faces, len(x)).any()
+        curvature, area = mean_curvature(x, faces)
+        assert area.sum() == pytest.approx(4 * np.pi * 0.25**2, rel=0.06)
+        errors.append(np.abs(curvature * 0.25 - 1.0).max())  # the 5-valent vertices included
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders.min() > 1.9 and errors[-1] < 2e-3
+
+
+def test_curvature_of_a_cylinder():
+    x, faces = cylinder(40, 0.1)
+    curvature, _ = mean_curvature(x, faces)
+    inside = ~boundary_mask(faces, len(x))
+    assert np.abs(curvature[inside] - 5.0).max() < 2e-3  # 1/(2 R)
+
+
+def test_curvature_of_a_plane_is_zero_and_noise_gives_the_published_floor():
+    random = np.random.default_rng(3)
+    cells, h = 40, 0.015
+    i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
+    flat = np.stack([h * i, 0.0 * i, h * j], -1).reshape(-1, 3)
+    faces = grid(cells, cells)
+    inside = ~boundary_mask(faces, len(flat))
+    assert mean_curvature(flat, faces)[0][inside].max() < 1e-10
+    noisy = flat + random.normal(0, 0.5e-3, flat.shape)
+    series = curvature_series(noisy[None], faces)
+    assert 3.0 < series.means()[0] < 5.0  # 3.8 on an even mesh; right triangles lie near it
+
+
+def test_area_is_shared_out_whole_also_by_obtuse_triangles():
+    x = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.2, 0], [0.5, 1, 0.3]], float)
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 0, 2]])
+    corners = x[faces]
+    exact = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    assert mean_curvature(x, faces)[1].sum() == pytest.approx(exact.sum(), rel=1e-12)
+
+
+def test_curvature_is_blind_to_rigid_motion_and_scales_as_one_over_length():
+    x, faces = cylinder(12, 0.3)
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    inside = ~boundary_mask(faces, len(x))
+    first = mean_curvature(x, faces)[0][inside]
+    assert mean_curvature(x @ turn.T + 5.0, faces)[0][inside] == pytest.approx(first, rel=1e-9)
+    assert mean_curvature(2 * x, faces)[0][inside] == pytest.approx(first / 2, rel=1e-12)
+
+
+def test_curvature_error_sees_moved_wrinkles_where_the_difference_of_means_does_not():
+    cells = 30
+    i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
+    faces = grid(cells, cells)
+
+    def waves(phase: float) -> np.ndarray:
+        return np.stack([0.01 * i, 0.004 * np.sin(0.8 * i + phase), 0.01 * j], -1).reshape(1, -1, 3)
+
+    still, moved = curvature_series(waves(0.0), faces), curvature_series(waves(2.0), faces)
+    assert curvature_error(still, still)[0] == 0.0
+    difference = abs(moved.means() - still.means())[0]
+    assert curvature_error(moved, still)[0] > 5.0 * difference
+    flat = curvature_series(waves(0.0) * [1, 0, 1], faces)
+    assert curvature_error(flat, still)[0] == pytest.approx(still.means()[0], rel=1e-9)
+
+
+def test_distance_is_the_length_of_a_shift():
+    x = np.random.default_rng(0).normal(size=(4, 7, 3))
+    shift = np.array([0.03, 0.0, 0.04]) * np.arange(4)[:, None, None]
+    assert distance_rms(x + shift, x) == pytest.approx([0.0, 0.05, 0.10, 0.15])
+
+
+class Slab:
+    """Everything below y = frame is inside."""
+
+    def signed_distance(self, points, frame):
+        return points[:, 1] - frame
+
+
+def test_penetration_counts_every_vertex_and_measures_depth():
+    x = np.zeros((2, 4, 3))
+    x[:, :, 1] = [0.5, -0.25, 2.0, -0.5]
+    found = penetration(x, Slab())
+    assert found.share == pytest.approx([0.5, 0.75])
+    assert found.depth[0] == pytest.approx([0, 0.25, 0, 0.5])
+    assert found.depth[1] == pytest.approx([0.5, 1.25, 0, 1.5])
