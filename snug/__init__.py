@@ -1,0 +1,1 @@
+"""Bodies, garments, networks and their training."""

@@ -1,0 +1,135 @@
+"""A parametric human: a template, shape directions, joints and skinning weights, in the layout of SMPL.
+
+Rest pose: T-pose, y up, facing +z, left arm along +x, metres. The baked body stands with its soles on y = 0 and its
+pelvis above the origin, for every shape, so a motion's translation is zero where it stands.
+A posed vertex is the skinned rest vertex plus the translation; joint 0 goes to joints(betas)[0] + translation.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+JOINT_NAMES = (
+    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle",
+    "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder",
+    "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hand", "right_hand",
+)  # fmt: skip
+BAKED = Path(__file__).parent / "data" / "body.npz"
+_CHUNK = 64  # frames skinned in one matrix product, to bound memory
+
+
+class BodyError(ValueError):
+    """A body file, or an argument for a body, that cannot be used; the message names what and the remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A skinned parametric body. All arrays are float64 (indices int64) and are not to be written to.
+
+    template: (B, 3) [m]. shape_directions: (B, 3, S) [m per unit of beta]. skinning_weights: (B, 24), rows sum to
+    one. joint_template: (24, 3) [m]. joint_directions: (24, 3, S) [m]. faces: (F, 3), outward. parents: (24,), -1
+    for the root.
+    """
+
+    template: NDArray[np.float64]
+    shape_directions: NDArray[np.float64]
+    skinning_weights: NDArray[np.float64]
+    joint_template: NDArray[np.float64]
+    joint_directions: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    parents: NDArray[np.int64]
+    joint_names: tuple[str, ...] = JOINT_NAMES
+
+    @staticmethod
+    def load() -> "Body":
+        """The body that comes with this package."""
+        with np.load(BAKED) as stored:
+            arrays = {key: _widened(stored[key]) for key in stored.files}
+        # float32 in the file: make the rows sum to one again in float64.
+        arrays["skinning_weights"] /= arrays["skinning_weights"].sum(axis=1, keepdims=True)
+        return Body(**arrays)
+
+    @staticmethod
+    def from_file(path: str | Path) -> "Body":
+        """A user's body: an .npz in SMPL's layout. Raises BodyError.
+
+        Needs v_template, shapedirs, weights, kintree_table, f, and J_regressor or J_template (with J_shapedirs).
+        """
+        from snug.formats.smpl import read_smpl
+
+        return Body(**read_smpl(Path(path)))
+
+    @property
+    def shape_count(self) -> int:
+        return self.shape_directions.shape[-1]
+
+    def shaped(self, betas: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Vertices (B, 3) [m] of the unposed body with these shape coefficients. Raises BodyError."""
+        if betas is None:
+            return self.template.copy()
+        return self.template + self.shape_directions @ self._checked(betas)
+
+    def joints(self, betas: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Joints (24, 3) [m] of the unposed body with these shape coefficients. Raises BodyError."""
+        if betas is None:
+            return self.joint_template.copy()
+        return self.joint_template + self.joint_directions @ self._checked(betas)
+
+    def vertices(
+        self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None
+    ) -> NDArray[np.float64]:
+        """Posed vertices (T, B, 3) [m].
+
+        poses: (T, 24, 3) [rad], axis-angle relative to the parent joint. translations: (T, 3) [m]. Raises BodyError.
+        """
+        transforms = self.transforms(poses, translations, betas)
+        frames, joints = transforms.shape[:2]
+        # sum_j w_ij T_j (p_i, 1) is one matrix product: (w_ij p_ik) over (j, k) times T over (j, k).
+        points = np.concatenate([self.shaped(betas), np.ones((len(self.template), 1))], axis=1)
+        spread = (self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), joints * 4)
+        posed = np.empty((frames, len(points), 3))
+        for start in range(0, frames, _CHUNK):
+            part = transforms[start : start + _CHUNK]
+            columns = part.transpose(1, 3, 0, 2).reshape(joints * 4, -1)
+            posed[start : start + _CHUNK] = (spread @ columns).reshape(len(points), -1, 3).transpose(1, 0, 2)
+        return posed
+
+    def transforms(
+        self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None
+    ) -> NDArray[np.float64]:
+        """Rest-to-posed transform of each joint, (T, 24, 3, 4). Arguments and errors as for `vertices`."""
+        import torch
+
+        from snug.skinning import axis_angle_to_matrix, joint_transforms
+
+        poses, translations = np.asarray(poses, dtype=float), np.asarray(translations, dtype=float)
+        joints = len(self.joint_template)
+        if poses.ndim != 3 or poses.shape[1:] != (joints, 3) or translations.shape != (len(poses), 3):
+            raise BodyError(
+                f"poses {poses.shape} and translations {translations.shape}: expected (T, {joints}, 3) and (T, 3)"
+            )
+        if not (np.isfinite(poses).all() and np.isfinite(translations).all()):
+            raise BodyError("poses or translations hold values that are not finite; check the motion")
+        with torch.no_grad():
+            rotations = axis_angle_to_matrix(torch.from_numpy(poses))
+            rest = torch.from_numpy(self.joints(betas))
+            shifts = torch.from_numpy(translations)
+            return joint_transforms(rotations, rest, self.parents.tolist(), shifts).numpy()
+
+    @cached_property
+    def height(self) -> float:
+        """Height of the template [m]."""
+        return float(np.ptp(self.template[:, 1]))
+
+    def _checked(self, betas: ArrayLike) -> NDArray[np.float64]:
+        betas = np.asarray(betas, dtype=float)
+        if betas.shape != (self.shape_count,) or not np.isfinite(betas).all():
+            raise BodyError(f"betas of shape {betas.shape}: expected {self.shape_count} finite numbers")
+        return betas
+
+
+def _widened(array: np.ndarray) -> np.ndarray:
+    return array.astype(np.float64 if array.dtype.kind == "f" else np.int64)

@@ -1,0 +1,1 @@
+"""The baked body and the script that bakes it."""

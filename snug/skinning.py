@@ -1,0 +1,82 @@
+"""Linear blend skinning in torch, batched and differentiable.
+
+Rotations follow the SMPL convention: the rotation of a joint is relative to its parent joint, and all frames
+are parallel to the world in the rest pose. Leading axes `...` broadcast.
+"""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+
+def axis_angle_to_matrix(axis_angle: Tensor) -> Tensor:
+    """Rodrigues' formula, R = I + (sin t / t) [a] + ((1 - cos t) / t^2) [a]^2 with t = |a|.
+
+    axis_angle: (..., 3) [rad]. Returns (..., 3, 3). Both factors are smooth functions of t^2; near zero they are
+    taken from their series, so that the gradient is finite (and right) at the identity.
+    """
+    squared = (axis_angle * axis_angle).sum(-1)[..., None, None]
+    small = squared < 1e-6
+    # The inner `where` keeps the branch that is not used away from 0/0, whose gradient would be nan.
+    safe = torch.where(small, torch.ones_like(squared), squared)
+    angle = safe.sqrt()
+    first = torch.where(small, 1 - squared / 6 + squared**2 / 120, angle.sin() / angle)
+    # 1 - cos t = 2 sin^2(t/2) loses no digits for small angles.
+    half = (0.5 * angle).sin()
+    second = torch.where(small, 0.5 - squared / 24 + squared**2 / 720, 2 * half * half / safe)
+    cross = _cross_matrix(axis_angle)
+    identity = torch.eye(3, dtype=axis_angle.dtype, device=axis_angle.device)
+    return identity + first * cross + second * (cross @ cross)
+
+
+def _cross_matrix(a: Tensor) -> Tensor:
+    """[a] with [a] b = a x b. a: (..., 3) -> (..., 3, 3)."""
+    x, y, z = a.unbind(-1)
+    zero = torch.zeros_like(x)
+    return torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=-1).unflatten(-1, (3, 3))
+
+
+def matrix_to_6d(rotations: Tensor) -> Tensor:
+    """The first two columns of a rotation, one after the other: a continuous description of it.
+
+    rotations: (..., 3, 3). Returns (..., 6). Source: Zhou et al. 2019, "On the continuity of rotation
+    representations in neural networks".
+    """
+    return rotations[..., :, :2].transpose(-1, -2).flatten(-2)
+
+
+def joint_transforms(rotations: Tensor, joints: Tensor, parents: Sequence[int], translations: Tensor) -> Tensor:
+    """Rigid transforms that take points attached to each joint from the rest pose to the posed body.
+
+    With world rotation W_j = W_parent R_j and posed joint q_j = q_parent + W_parent (p_j - p_parent), the
+    transform is x -> W_j (x - p_j) + q_j. The root is at q_0 = p_0 + translation.
+
+    rotations: (..., J, 3, 3), relative to the parent. joints: (..., J, 3) [m], rest positions.
+    parents: J indices, -1 for a root, every parent before its children. translations: (..., 3) [m].
+    Returns (..., J, 3, 4): rotation and translation side by side.
+    """
+    world: list[Tensor] = []
+    posed: list[Tensor] = []
+    for joint, parent in enumerate(int(p) for p in parents):
+        rotation, rest = rotations[..., joint, :, :], joints[..., joint, :]
+        if parent < 0:
+            world.append(rotation)
+            posed.append(rest + translations)
+        else:
+            offset = rest - joints[..., parent, :]
+            world.append(world[parent] @ rotation)
+            posed.append(posed[parent] + (world[parent] @ offset[..., None])[..., 0])
+    turn = torch.stack(world, dim=-3)
+    shift = torch.stack(posed, dim=-2) - (turn @ joints[..., None])[..., 0]
+    return torch.cat([turn, shift[..., None]], dim=-1)
+
+
+def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
+    """Linear blend skinning: x_i = sum_j w_ij T_j p_i.
+
+    points: (..., V, 3) [m] in the rest pose. weights: (V, J), rows sum to one. transforms: (..., J, 3, 4).
+    Returns (..., V, 3) [m].
+    """
+    blended = (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))
+    return (blended[..., :3] @ points[..., None])[..., 0] + blended[..., 3]
