@@ -1,0 +1,200 @@
+"""The one rest state of a cloth: everything that a term may need to know about it, computed once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from .material import Material
+
+
+class MeshError(ValueError):
+    """A mesh that cannot be simulated; the message names the offending element."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cloth:
+    """A triangle mesh at rest with its material and pinned vertices.
+
+    Args:
+        rest_positions: (V, 3) [m]. The rest state of areas, masses, strain and hinges.
+        faces: (F, 3) vertex indices, consistently wound.
+        material: see `Material`.
+        pins: indices of vertices that never move by themselves.
+        rest_uv: (V, 2) [m], optional flat rest state; it then replaces rest_positions for areas, masses and
+            strain, so that one rest state serves every term. rest_positions stays the starting shape.
+
+    Raises:
+        MeshError: wrong shapes, NaN, zero-area face, coincident or unused vertices, non-manifold edge,
+            inconsistent winding, pin out of range.
+    """
+
+    rest_positions: np.ndarray
+    faces: np.ndarray
+    material: Material = field(default_factory=Material)
+    pins: np.ndarray | tuple | list = ()
+    rest_uv: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        positions = np.ascontiguousarray(self.rest_positions, dtype=np.float64)
+        faces = np.asarray(self.faces)
+        check_mesh(positions, faces)
+        faces = np.ascontiguousarray(faces, dtype=np.int64)
+        pins = np.unique(np.asarray(self.pins, dtype=np.int64))
+        if pins.size and (pins[0] < 0 or pins[-1] >= len(positions)):
+            raise MeshError(f"pin {pins[0] if pins[0] < 0 else pins[-1]} is no vertex of 0..{len(positions) - 1}")
+        uv = self.rest_uv
+        if uv is not None:
+            uv = np.ascontiguousarray(uv, dtype=np.float64)
+            if uv.shape != (len(positions), 2) or not np.isfinite(uv).all():
+                raise MeshError(f"rest_uv has shape {uv.shape}: expected finite ({len(positions)}, 2)")
+        for name, value in (("rest_positions", positions), ("faces", faces), ("pins", pins), ("rest_uv", uv)):
+            object.__setattr__(self, name, value)
+        self._check_elements()
+
+    def _check_elements(self) -> None:
+        small = np.flatnonzero(~(self.areas > 1e-12 * self.areas.max()))
+        if small.size:
+            raise MeshError(f"face {small[0]} has no rest area ({self.areas[small[0]]:.3g} m^2): remove it")
+        _ = self._edge_table  # raises on non-manifold edges
+
+    @property
+    def vertex_count(self) -> int:
+        return len(self.rest_positions)
+
+    @cached_property
+    def _frames(self) -> np.ndarray:
+        """(F, 2, 2) matrices Dm = [X1 - X0, X2 - X0] in a local orthonormal frame of the face [m]."""
+        if self.rest_uv is not None:
+            corner = self.rest_uv[self.faces]
+            return np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=-1)
+        corner = self.rest_positions[self.faces]
+        first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+        length = np.linalg.norm(first, axis=1)
+        along = np.einsum("fi,fi->f", first, second) / np.maximum(length, 1e-300)
+        across = np.linalg.norm(np.cross(first, second), axis=1) / np.maximum(length, 1e-300)
+        zero = np.zeros_like(length)
+        return np.stack([np.stack([length, along], -1), np.stack([zero, across], -1)], axis=1)
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """(F,) rest areas [m^2]."""
+        return 0.5 * np.abs(np.linalg.det(self._frames))
+
+    @cached_property
+    def Dm_inverse(self) -> np.ndarray:
+        """(F, 2, 2) inverse of Dm [1/m]; F = [x1 - x0, x2 - x0] Dm^-1 is the deformation gradient."""
+        return np.linalg.inv(self._frames)
+
+    @cached_property
+    def masses(self) -> np.ndarray:
+        """(V,) lumped masses [kg]: a third of each adjacent face."""
+        return self.material.areal_density * self.vertex_areas
+
+    @cached_property
+    def vertex_areas(self) -> np.ndarray:
+        """(V,) a third of the adjacent rest areas [m^2]."""
+        return np.bincount(self.faces.ravel(), np.repeat(self.areas / 3, 3), minlength=self.vertex_count)
+
+    @cached_property
+    def _edge_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Edges (E, 2), adjacent faces (E, 2) with -1 at the boundary, opposite vertices (E, 2)."""
+        half = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        opposite = self.faces[:, [2, 0, 1]].ravel()
+        low, high = half.min(1), half.max(1)
+        key = low * self.vertex_count + high
+        order = np.argsort(key, kind="stable")
+        unique, start, count = np.unique(key[order], return_index=True, return_counts=True)
+        if (count > 2).any():
+            edge = unique[np.argmax(count > 2)]
+            faces = order[start[np.argmax(count > 2)] :][: count.max()] // 3
+            raise MeshError(
+                f"edge ({edge // self.vertex_count}, {edge % self.vertex_count}) has {count.max()} faces "
+                f"{sorted(faces.tolist())}: a cloth is manifold, split it"
+            )
+        edges = np.stack([unique // self.vertex_count, unique % self.vertex_count], axis=1)
+        faces = np.full((len(unique), 2), -1, dtype=np.int64)
+        tips = np.full((len(unique), 2), -1, dtype=np.int64)
+        forward = half[:, 0] < half[:, 1]
+        for side in (0, 1):
+            has = count > side
+            halves = order[start[has] + side]
+            # Side 0 is the face that walks the edge from its lower to its higher vertex.
+            column = np.where(forward[halves], 0, 1)
+            taken = faces[has, column] >= 0
+            if taken.any():
+                bad = np.flatnonzero(has)[taken][0]
+                raise MeshError(
+                    f"faces {faces[bad].max()} and {halves[taken][0] // 3} walk edge "
+                    f"({edges[bad, 0]}, {edges[bad, 1]}) the same way: make the winding consistent"
+                )
+            faces[np.flatnonzero(has), column] = halves // 3
+            tips[np.flatnonzero(has), column] = opposite[halves]
+        return edges, faces, tips
+
+    @property
+    def edges(self) -> np.ndarray:
+        """(E, 2) vertex indices, lower first, sorted."""
+        return self._edge_table[0]
+
+    @cached_property
+    def edge_lengths(self) -> np.ndarray:
+        """(E,) rest lengths [m]."""
+        points = self.rest_positions if self.rest_uv is None else self.rest_uv
+        return np.linalg.norm(points[self.edges[:, 1]] - points[self.edges[:, 0]], axis=1)
+
+    @cached_property
+    def _inner(self) -> np.ndarray:
+        return np.flatnonzero((self._edge_table[1] >= 0).all(axis=1))
+
+    @cached_property
+    def hinges(self) -> np.ndarray:
+        """(H, 4) inner edges: edge start, edge end, tip of the first face, tip of the second face."""
+        edges, _, tips = self._edge_table
+        return np.ascontiguousarray(np.concatenate([edges[self._inner], tips[self._inner]], axis=1))
+
+    @cached_property
+    def hinge_lengths(self) -> np.ndarray:
+        """(H,) rest length of the hinge edge [m]."""
+        return self.edge_lengths[self._inner]
+
+    @cached_property
+    def hinge_areas(self) -> np.ndarray:
+        """(H,) sum of the two rest areas beside the hinge [m^2]."""
+        return self.areas[self._edge_table[1][self._inner]].sum(axis=1)
+
+    @cached_property
+    def boundary_vertices(self) -> np.ndarray:
+        """Sorted indices of vertices on a boundary edge."""
+        edges, faces, _ = self._edge_table
+        return np.unique(edges[(faces < 0).any(axis=1)])
+
+
+def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:
+    """Refuse shapes, indices and vertices that no cloth can have; raises MeshError naming the element."""
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise MeshError(f"rest_positions has shape {positions.shape}: expected (V, 3)")
+    if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
+        raise MeshError(f"faces has shape {faces.shape} and type {faces.dtype}: expected integers (F, 3)")
+    if len(faces) == 0:
+        raise MeshError("the mesh has no faces")
+    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if bad.size:
+        raise MeshError(f"vertex {bad[0]} is not finite: {positions[bad[0]].tolist()}")
+    bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
+    if bad.size:
+        raise MeshError(f"face {bad[0]} = {faces[bad[0]].tolist()} names a vertex outside 0..{len(positions) - 1}")
+    repeated = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    if repeated.any():
+        bad_face = int(np.argmax(repeated))
+        raise MeshError(f"face {bad_face} = {faces[bad_face].tolist()} names a vertex twice: remove it")
+    unused = np.setdiff1d(np.arange(len(positions)), faces)
+    if unused.size:
+        raise MeshError(f"vertex {unused[0]} belongs to no face: remove it")
+    order = np.lexsort(positions.T)
+    same = np.flatnonzero((np.diff(positions[order], axis=0) == 0).all(axis=1))
+    if same.size:
+        pair = sorted(order[same[0] : same[0] + 2].tolist())
+        raise MeshError(f"vertices {pair[0]} and {pair[1]} coincide: merge them")

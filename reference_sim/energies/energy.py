@@ -1,0 +1,97 @@
+"""What every physical term is: a definition in torch on one stencil, and its derivatives.
+
+A term states `element_energy` once, in torch. Gradient and Hessian follow from it by automatic
+differentiation; a term may override them with closed-form kernels in its own file. tests/test_derivatives.py
+holds every override to the default. Torch is imported only where the definition is evaluated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from ..obstacle import Obstacle
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a term may read before one backward-Euler step: all of it is frozen during the step.
+
+    previous: (V, 3) positions [m] and velocity: (V, 3) [m/s] at the start, guess: (V, 3) initial guess of the
+    end [m], dt [s], obstacle and its frame at the end of the step.
+    """
+
+    previous: np.ndarray
+    velocity: np.ndarray
+    guess: np.ndarray
+    dt: float
+    obstacle: Obstacle | None = None
+    frame: int = 0
+
+
+class Energy:
+    """One physical term on one stencil.
+
+    Attributes:
+        name: the term's name in tables.
+        stencils: (N, k) vertex indices of each element.
+    """
+
+    name: str
+    stencils: np.ndarray
+
+    def energy(self, x: Tensor) -> Tensor:
+        """Energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""
+        import torch
+
+        index = torch.as_tensor(self.stencils, device=x.device)
+        return self.element_energy(x[..., index, :])
+
+    def element_energy(self, u: Tensor) -> Tensor:
+        """Energy of each element from its own vertices: u (..., N, k, 3) [m] -> (..., N) [J]."""
+        raise NotImplementedError
+
+    def prepare(self, step: Step) -> None:
+        """Freeze what this term needs for one step; most terms need nothing."""
+
+    def parameters(self) -> dict[str, Any]:
+        """Numbers that identify the term in a result file."""
+        return {}
+
+    def _elements(self, x: np.ndarray) -> Tensor:
+        import torch
+
+        u = torch.as_tensor(np.asarray(x, dtype=np.float64)[self.stencils])
+        return u.requires_grad_(True)
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Sum over elements [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
+        import torch
+
+        u = self._elements(x)
+        value = self.element_energy(u).sum()
+        (local,) = torch.autograd.grad(value, u)
+        gradient = np.zeros((len(x), 3))
+        np.add.at(gradient, self.stencils.ravel(), local.reshape(-1, 3).numpy())
+        return float(value.detach()), gradient
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Second derivatives of each element at x (V, 3): (N, 3k, 3k) [N/m]."""
+        import torch
+
+        u = self._elements(x)
+        (local,) = torch.autograd.grad(self.element_energy(u).sum(), u, create_graph=True)
+        local = local.flatten(-2)
+        if not local.requires_grad:  # linear in x
+            return np.zeros((*local.shape, local.shape[-1]))
+        rows = [
+            torch.autograd.grad(local[:, i].sum(), u, retain_graph=True, allow_unused=True)[0]
+            for i in range(local.shape[1])
+        ]
+        zero = torch.zeros_like(u)
+        return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()

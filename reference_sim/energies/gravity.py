@@ -1,0 +1,46 @@
+"""Weight: E = m g (y - y0) for each vertex, y up (SNUG, eq. 12). y0 only moves the zero of the energy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..cloth import Cloth
+from ..material import GRAVITY
+from .energy import Energy
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+class Gravity(Energy):
+    """Potential energy of the weight [J] of each vertex of `cloth`.
+
+    Args:
+        origin_height: y0 [m] where the energy is zero.
+        acceleration: g [m/s^2].
+    """
+
+    name = "gravity"
+
+    def __init__(self, cloth: Cloth, origin_height: float = 0.0, *, acceleration: float = GRAVITY) -> None:
+        self.stencils = np.arange(cloth.vertex_count)[:, None]
+        self.weights = cloth.masses * acceleration
+        self.origin_height = float(origin_height)
+
+    def parameters(self) -> dict[str, Any]:
+        return {"origin_height_m": self.origin_height, "total_weight_N": float(self.weights.sum())}
+
+    def element_energy(self, u: Tensor) -> Tensor:
+        import torch
+
+        return torch.as_tensor(self.weights).to(u) * (u[..., 0, 1] - self.origin_height)
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        gradient = np.zeros_like(x)
+        gradient[:, 1] = self.weights
+        return float(self.weights @ (x[:, 1] - self.origin_height)), gradient
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        return np.zeros((len(self.stencils), 3, 3))

@@ -1,0 +1,57 @@
+"""Backward Euler's inertia: E = m / (2 dt^2) |x - x_hat|^2 with x_hat = x_t + dt v_t (SNUG, eq. 3 and 4).
+
+x_hat holds no gravity: the weight is a term of its own, so a body in free fall carries m g^2 dt^2 / 2.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..cloth import Cloth
+from .energy import Energy, Step
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+class Inertia(Energy):
+    """Incremental kinetic term [J] of each vertex; `prepare` (or the argument x_hat) sets the target."""
+
+    name = "inertia"
+
+    def __init__(self, cloth: Cloth, dt: float) -> None:
+        if not (np.isfinite(dt) and dt > 0):
+            raise ValueError(f"Inertia dt = {dt!r}: must be a finite number of seconds above 0")
+        self.stencils = np.arange(cloth.vertex_count)[:, None]
+        self.dt = float(dt)
+        self.masses = cloth.masses
+        self.x_hat = cloth.rest_positions
+
+    def parameters(self) -> dict[str, Any]:
+        return {"dt_s": self.dt}
+
+    def prepare(self, step: Step) -> None:
+        self.x_hat = step.previous + step.dt * step.velocity
+
+    def energy(self, x: Tensor, x_hat: Tensor | None = None) -> Tensor:
+        """x, x_hat (..., V, 3) [m] -> (..., V) [J]; x_hat defaults to the prepared one."""
+        import torch
+
+        target = torch.as_tensor(self.x_hat).to(x) if x_hat is None else x_hat
+        mass = torch.as_tensor(self.masses).to(x)
+        return 0.5 / self.dt**2 * mass * ((x - target) ** 2).sum(-1)
+
+    def element_energy(self, u: Tensor) -> Tensor:
+        return self.energy(u[..., 0, :])
+
+    def value_and_gradient(
+        self, x: np.ndarray, x_hat: np.ndarray | None = None
+    ) -> tuple[float, np.ndarray]:
+        offset = x - (self.x_hat if x_hat is None else x_hat)
+        gradient = (self.masses / self.dt**2)[:, None] * offset
+        return 0.5 * float(np.vdot(gradient, offset)), gradient
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        return (self.masses / self.dt**2)[:, None, None] * np.eye(3)

@@ -1,0 +1,67 @@
+"""Mass-spring stretch on edges: E = k (l - l0)^2, the membrane of PBNS (Bertiche et al. 2021), k = 15 N/m."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import njit
+
+from ..cloth import Cloth
+from .energy import Energy
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+class StretchSpring(Energy):
+    """Spring energy [J] of each edge of `cloth`; stiffness [N/m] is the same for all edges."""
+
+    name = "spring"
+
+    def __init__(self, cloth: Cloth, *, stiffness: float = 15.0) -> None:
+        self.stencils = cloth.edges
+        self.rest_lengths = cloth.edge_lengths
+        self.stiffness = float(stiffness)
+
+    def parameters(self) -> dict[str, Any]:
+        return {"stiffness_N_per_m": self.stiffness}
+
+    def element_energy(self, u: Tensor) -> Tensor:
+        import torch
+
+        length = torch.linalg.vector_norm(u[..., 1, :] - u[..., 0, :], dim=-1)
+        return self.stiffness * (length - torch.as_tensor(self.rest_lengths).to(u)) ** 2
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        gradient = np.zeros_like(x)
+        return _gradient(x, self.stencils, self.rest_lengths, self.stiffness, gradient), gradient
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """+-2k [n n^T + (1 - l0/l)(I - n n^T)] for the two ends."""
+        d = x[self.stencils[:, 1]] - x[self.stencils[:, 0]]
+        length = np.linalg.norm(d, axis=1)
+        n = d / length[:, None]
+        outer = n[:, :, None] * n[:, None, :]
+        slack = (1 - self.rest_lengths / length)[:, None, None]
+        block = 2 * self.stiffness * (outer + slack * (np.eye(3) - outer))
+        return np.block([[block, -block], [-block, block]])
+
+
+@njit(cache=True)
+def _gradient(x, edges, rest_lengths, stiffness, gradient):
+    total = 0.0
+    for e in range(edges.shape[0]):
+        a, b = edges[e]
+        dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
+        stretch = length - rest_lengths[e]
+        total += stiffness * stretch * stretch
+        s = 2 * stiffness * stretch / length
+        gradient[a, 0] -= s * dx
+        gradient[a, 1] -= s * dy
+        gradient[a, 2] -= s * dz
+        gradient[b, 0] += s * dx
+        gradient[b, 1] += s * dy
+        gradient[b, 2] += s * dz
+    return total

@@ -1,0 +1,86 @@
+"""The one material of a cloth: SI inputs, and the membrane constants that follow from them."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+
+GRAVITY = 9.81  # [m/s^2], downwards along -y
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic fabric. Defaults are the cotton of the SNUG paper.
+
+    Args:
+        young_modulus: E [Pa].
+        poisson_ratio: nu [1], in (-1, 0.5].
+        thickness: t [m].
+        density: rho [kg/m^3].
+        bending_stiffness: k of the hinge energy k/2 theta^2 [J].
+
+    The paper prints lambda = 20.9 and mu = 11.1 and multiplies them by a volume; the printed numbers are
+    only consistent with E = 70 kPa, nu = 0.485 if they are membrane constants in N/m, thickness included.
+
+    Raises:
+        ValueError: a value is not finite or outside its physical range.
+    """
+
+    young_modulus: float = 70e3
+    poisson_ratio: float = 0.485
+    thickness: float = 0.47e-3
+    density: float = 426.0
+    bending_stiffness: float = 3.96e-5
+
+    def __post_init__(self) -> None:
+        for name in ("young_modulus", "thickness", "density"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"Material.{name} = {value!r}: must be a finite number above 0 (SI units)")
+        if not -1 < self.poisson_ratio <= 0.5:
+            raise ValueError(f"Material.poisson_ratio = {self.poisson_ratio!r}: must lie in (-1, 0.5]")
+        if not (math.isfinite(self.bending_stiffness) and self.bending_stiffness >= 0):
+            raise ValueError(
+                f"Material.bending_stiffness = {self.bending_stiffness!r}: must be finite and not negative [J]"
+            )
+
+    @property
+    def lame_mu(self) -> float:
+        """Membrane shear modulus mu = t E / (2 (1 + nu)) [N/m]."""
+        return self.thickness * self.young_modulus / (2 * (1 + self.poisson_ratio))
+
+    @property
+    def lame_lambda(self) -> float:
+        """Membrane lambda of plane stress, t E nu / (1 - nu^2) [N/m]."""
+        return self.thickness * self.young_modulus * self.poisson_ratio / (1 - self.poisson_ratio**2)
+
+    @property
+    def membrane_modulus(self) -> float:
+        """E2 = 4 mu (lambda + mu) / (lambda + 2 mu) [N/m]: force per width in uniaxial stress."""
+        mu, lam = self.lame_mu, self.lame_lambda
+        return 4 * mu * (lam + mu) / (lam + 2 * mu)
+
+    @property
+    def membrane_poisson_ratio(self) -> float:
+        """nu2 = lambda / (lambda + 2 mu) [1]."""
+        return self.lame_lambda / (self.lame_lambda + 2 * self.lame_mu)
+
+    @property
+    def areal_density(self) -> float:
+        """rho t [kg/m^2]."""
+        return self.density * self.thickness
+
+    def self_weight_stretch(self, length: float) -> float:
+        """Linear estimate of the relative stretch at the top of a strip of `length` [m] under its own weight.
+
+        Warns above 10 %: at that point a unit is usually wrong (the thickness counted twice, say).
+        """
+        stretch = self.areal_density * GRAVITY * length / self.membrane_modulus
+        if stretch > 0.1:
+            warnings.warn(
+                f"a strip of {length:g} m stretches by about {100 * stretch:.0f} % under its own weight: "
+                "check the units of young_modulus [Pa], thickness [m] and density [kg/m^3]",
+                stacklevel=2,
+            )
+        return stretch
