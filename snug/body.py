@@ -1,21 +1,23 @@
 """A parametric human: a template, shape directions, joints and skinning weights, in the layout of SMPL.
 
-Rest pose: T-pose, y up, facing +z, left arm along +x, metres. The baked body stands with its soles on y = 0 and its
-pelvis above the origin, for every shape, so a motion's translation is zero where it stands.
-A posed vertex is the skinned rest vertex plus the translation; joint 0 goes to joints(betas)[0] + translation.
+Rest pose: T-pose, y up, facing +z, left arm along +x, metres. The baked body stands with its soles on y = 0
+and its pelvis above the origin, for every shape, so a motion's translation is zero where it stands.
+A posed vertex is the skinned rest vertex plus the translation: joint 0 is at joints(betas)[0] + translation.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 JOINT_NAMES = (
-    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle",
-    "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder",
-    "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hand", "right_hand",
+    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle",
+    "right_ankle", "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head",
+    "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hand",
+    "right_hand",
 )  # fmt: skip
 BAKED = Path(__file__).parent / "data" / "body.npz"
 _CHUNK = 64  # frames skinned in one matrix product, to bound memory
@@ -29,9 +31,9 @@ class BodyError(ValueError):
 class Body:
     """A skinned parametric body. All arrays are float64 (indices int64) and are not to be written to.
 
-    template: (B, 3) [m]. shape_directions: (B, 3, S) [m per unit of beta]. skinning_weights: (B, 24), rows sum to
-    one. joint_template: (24, 3) [m]. joint_directions: (24, 3, S) [m]. faces: (F, 3), outward. parents: (24,), -1
-    for the root.
+    template: (B, 3) [m]. shape_directions: (B, 3, S) [m], for one unit of each shape coefficient.
+    skinning_weights: (B, 24), rows sum to one. joint_template: (24, 3) [m]. joint_directions: (24, 3, S) [m].
+    faces: (F, 3), outward. parents: (24,), -1 for the root. joint_names: 24 names, the same for every body.
     """
 
     template: NDArray[np.float64]
@@ -41,7 +43,7 @@ class Body:
     joint_directions: NDArray[np.float64]
     faces: NDArray[np.int64]
     parents: NDArray[np.int64]
-    joint_names: tuple[str, ...] = JOINT_NAMES
+    joint_names: ClassVar[tuple[str, ...]] = JOINT_NAMES
 
     @staticmethod
     def load() -> "Body":
@@ -56,9 +58,9 @@ class Body:
     def from_file(path: str | Path) -> "Body":
         """A user's body: an .npz in SMPL's layout. Raises BodyError.
 
-        Needs v_template, shapedirs, weights, kintree_table, f, and J_regressor or J_template (with J_shapedirs).
+        Needs v_template, shapedirs, weights, kintree_table, f; J_regressor, or J_template with J_shapedirs.
         """
-        from snug.formats.smpl import read_smpl
+        from snug.formats.smpl_body import read_smpl
 
         return Body(**read_smpl(Path(path)))
 
@@ -83,7 +85,8 @@ class Body:
     ) -> NDArray[np.float64]:
         """Posed vertices (T, B, 3) [m].
 
-        poses: (T, 24, 3) [rad], axis-angle relative to the parent joint. translations: (T, 3) [m]. Raises BodyError.
+        poses: (T, 24, 3) [rad], axis-angle relative to the parent joint. translations: (T, 3) [m].
+        betas: (S,). Raises BodyError.
         """
         transforms = self.transforms(poses, translations, betas)
         frames, joints = transforms.shape[:2]
@@ -109,7 +112,8 @@ class Body:
         joints = len(self.joint_template)
         if poses.ndim != 3 or poses.shape[1:] != (joints, 3) or translations.shape != (len(poses), 3):
             raise BodyError(
-                f"poses {poses.shape} and translations {translations.shape}: expected (T, {joints}, 3) and (T, 3)"
+                f"poses {poses.shape} and translations {translations.shape}: "
+                f"expected (T, {joints}, 3) and (T, 3)"
             )
         if not (np.isfinite(poses).all() and np.isfinite(translations).all()):
             raise BodyError("poses or translations hold values that are not finite; check the motion")

@@ -13,8 +13,8 @@ from torch import Tensor
 def axis_angle_to_matrix(axis_angle: Tensor) -> Tensor:
     """Rodrigues' formula, R = I + (sin t / t) [a] + ((1 - cos t) / t^2) [a]^2 with t = |a|.
 
-    axis_angle: (..., 3) [rad]. Returns (..., 3, 3). Both factors are smooth functions of t^2; near zero they are
-    taken from their series, so that the gradient is finite (and right) at the identity.
+    axis_angle: (..., 3) [rad]. Returns (..., 3, 3). Both factors are smooth functions of t^2; near zero they
+    are taken from their series, so that the gradient is finite (and right) at the identity.
     """
     squared = (axis_angle * axis_angle).sum(-1)[..., None, None]
     small = squared < 1e-6
@@ -46,7 +46,9 @@ def matrix_to_6d(rotations: Tensor) -> Tensor:
     return rotations[..., :, :2].transpose(-1, -2).flatten(-2)
 
 
-def joint_transforms(rotations: Tensor, joints: Tensor, parents: Sequence[int], translations: Tensor) -> Tensor:
+def joint_transforms(
+    rotations: Tensor, joints: Tensor, parents: Sequence[int], translations: Tensor
+) -> Tensor:
     """Rigid transforms that take points attached to each joint from the rest pose to the posed body.
 
     With world rotation W_j = W_parent R_j and posed joint q_j = q_parent + W_parent (p_j - p_parent), the

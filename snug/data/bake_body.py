@@ -73,7 +73,8 @@ def sample_adults(count: int, seed: int) -> Adults:
     torch.manual_seed(seed)
     # Without eyes and tongue what is left is one closed surface.
     model = anny.Anny(rig="cmu_mb", topology="anny-noeyes-notongue", skinning_method="lbs")
-    ages = torch.distributions.Uniform(*(torch.tensor(age, dtype=model.dtype) for age in AGES))
+    youngest, oldest = (torch.tensor(age, dtype=model.dtype) for age in AGES)
+    ages = torch.distributions.Uniform(youngest, oldest)
     people = SimpleShapeDistribution(model, morphological_age_distribution=ages)
     _, phenotypes = people.sample(count)
     vertices, heads = [], []
@@ -94,7 +95,7 @@ def sample_adults(count: int, seed: int) -> Adults:
 
 
 def merge_weights(weights: np.ndarray, labels: list[str], parents: list[int]) -> np.ndarray:
-    """Give each bone that is no SMPL joint (fingers, upper neck, hip sockets) to its nearest ancestor that is."""
+    """Give each bone that is no SMPL joint (fingers, upper neck, hip sockets) to the nearest one above it."""
     kept = {bone: index for index, (bone, _) in enumerate(JOINTS.values())}
     merged = np.zeros((len(weights), len(JOINTS)))
     for bone in range(len(labels)):
@@ -106,7 +107,7 @@ def merge_weights(weights: np.ndarray, labels: list[str], parents: list[int]) ->
 
 
 def rotation_between(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """The smallest rotation taking the direction `start` to the direction `end`: R = I + [w] + [w]^2/(1 + c)."""
+    """The smallest rotation taking direction `start` to direction `end`: R = I + [w] + [w]^2 / (1 + c)."""
     a, b = start / np.linalg.norm(start), end / np.linalg.norm(end)
     w = np.cross(a, b)
     cross = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
@@ -124,7 +125,8 @@ def t_pose_rotations(joints: np.ndarray) -> np.ndarray:
         outward = np.array([sign, 0.0, 0.0])
         down = np.array([sign * np.sin(LEG_SPREAD), -np.cos(LEG_SPREAD), 0.0])
         upper_arm = rotation_between(at[f"{side}_elbow"] - at[f"{side}_shoulder"], outward)
-        forearm = rotation_between(upper_arm @ (at[f"{side}_wrist"] - at[f"{side}_elbow"]), outward) @ upper_arm
+        bent = upper_arm @ (at[f"{side}_wrist"] - at[f"{side}_elbow"])
+        forearm = rotation_between(bent, outward) @ upper_arm
         leg = rotation_between(at[f"{side}_ankle"] - at[f"{side}_hip"], down)
         for name, rotation in (
             ("shoulder", upper_arm), ("elbow", forearm), ("wrist", forearm), ("hand", forearm),
@@ -161,9 +163,7 @@ def vertex_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
 
 
-def principal_shapes(
-    vertices: np.ndarray, joints: np.ndarray, faces: np.ndarray
-) -> dict[str, np.ndarray]:
+def principal_shapes(vertices: np.ndarray, joints: np.ndarray, faces: np.ndarray) -> dict[str, np.ndarray]:
     """Mean body and its `SHAPES` main directions, one standard deviation each, for vertices and joints."""
     count = len(vertices)
     template, joint_template = vertices.mean(axis=0), joints.mean(axis=0)

@@ -1,0 +1,238 @@
+"""The baked body is a closed adult that poses as SMPL does; a user's file is read or refused in one line."""
+
+import time
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from snug.body import JOINT_NAMES, Body, BodyError
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Body.load()
+
+
+def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def joint(name: str) -> int:
+    return JOINT_NAMES.index(name)
+
+
+def test_surface_is_closed_and_without_handles(body):
+    edges = np.concatenate([body.faces[:, [0, 1]], body.faces[:, [1, 2]], body.faces[:, [2, 0]]])
+    assert len(np.unique(edges, axis=0)) == len(edges)  # each edge once in each direction: one winding
+    undirected, counts = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    assert np.all(counts == 2)
+    assert len(body.template) - len(undirected) + len(body.faces) == 2  # Euler: one sphere
+    assert len(np.unique(body.faces)) == len(body.template)
+
+
+def test_template_is_an_adult(body):
+    assert 1.5 < body.height < 1.9
+    assert 0.050 < volume(body.template, body.faces) < 0.100
+    assert abs(body.template[:, 1].min()) < 0.002  # stands on y = 0
+    assert np.abs(body.joint_template[0, [0, 2]]).max() < 1e-6
+
+
+def test_weights_are_sparse_and_sum_to_one(body):
+    assert body.skinning_weights.min() >= 0.0
+    np.testing.assert_allclose(body.skinning_weights.sum(axis=1), 1.0, atol=1e-12)
+    assert (body.skinning_weights > 0).sum(axis=1).max() <= 8
+
+
+def test_t_pose_faces_z_with_the_left_arm_along_x(body):
+    at = {name: body.joint_template[index] for index, name in enumerate(JOINT_NAMES)}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        arm = at[f"{side}_wrist"] - at[f"{side}_shoulder"]
+        np.testing.assert_allclose(arm / np.linalg.norm(arm), [sign, 0.0, 0.0], atol=1e-4)
+        assert at[f"{side}_foot"][2] - at[f"{side}_ankle"][2] > 0.05  # toes forward
+        assert at[f"{side}_hip"][0] * sign > 0.05
+    heights = [at[name][1] for name in ("left_ankle", "left_knee", "pelvis", "spine2", "neck", "head")]
+    assert np.all(np.diff(heights) > 0)
+    mirrored = body.joint_template[[joint(n.replace("left", "right")) for n in JOINT_NAMES if "left" in n]]
+    own = body.joint_template[[joint(n) for n in JOINT_NAMES if "left" in n]]
+    np.testing.assert_allclose(mirrored * [-1, 1, 1], own, atol=1e-3)
+
+
+def test_parents_are_those_of_smpl(body):
+    expected = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21]
+    assert body.parents.tolist() == expected
+
+
+def test_shapes_start_at_the_template_and_the_first_one_is_height(body):
+    np.testing.assert_array_equal(body.shaped(np.zeros(10)), body.template)
+    np.testing.assert_array_equal(body.joints(np.zeros(10)), body.joint_template)
+    tall = np.eye(10)[0]
+    gain = np.ptp(body.shaped(tall)[:, 1]) - np.ptp(body.shaped(-tall)[:, 1])
+    assert 0.10 < gain < 0.30  # two standard deviations of the height of adults of both sexes
+    fat = np.eye(10)[1]
+    change = volume(body.shaped(fat), body.faces) / volume(body.shaped(-fat), body.faces)
+    assert change > 1.1 and abs(np.ptp(body.shaped(fat)[:, 1]) - np.ptp(body.shaped(-fat)[:, 1])) < 0.03
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_joints_stay_inside_every_body(body, seed):
+    from igl import fast_winding_number
+
+    betas = np.random.default_rng(seed).normal(size=10)
+    inside = fast_winding_number(body.shaped(betas), body.faces, body.joints(betas))
+    assert inside.min() > 0.5, [JOINT_NAMES[j] for j in np.flatnonzero(inside < 0.5)]
+
+
+def test_identity_pose_is_the_shaped_body(body):
+    betas = np.linspace(-1.0, 1.0, 10)
+    shift = np.array([0.1, 0.2, 0.3])
+    posed = body.vertices(np.zeros((2, 24, 3)), np.stack([0 * shift, shift]), betas)
+    np.testing.assert_allclose(posed[0], body.shaped(betas), atol=1e-13)
+    np.testing.assert_allclose(posed[1], body.shaped(betas) + shift, atol=1e-13)
+
+
+def test_the_root_moves_everything_rigidly_about_the_pelvis(body):
+    poses = np.random.default_rng(0).normal(scale=0.4, size=(1, 24, 3))
+    poses[:, 0] = 0.0
+    turned = poses.copy()
+    turned[:, 0] = [0.4, -1.9, 0.7]
+    shift = np.array([[0.3, -0.2, 1.0]])
+    pelvis = body.joint_template[0]
+    turn = Rotation.from_rotvec(turned[0, 0]).as_matrix()
+    expected = (body.vertices(poses, 0 * shift)[0] - pelvis) @ turn.T + pelvis + shift
+    np.testing.assert_allclose(body.vertices(turned, shift)[0], expected, atol=1e-12)
+
+
+def test_vertices_agree_with_the_skinning_used_in_training(body):
+    import torch
+
+    from snug.skinning import axis_angle_to_matrix, joint_transforms, skin
+
+    random = np.random.default_rng(1)
+    poses, shifts = random.normal(scale=0.5, size=(70, 24, 3)), random.normal(size=(70, 3))
+    betas = random.normal(size=10)
+    transforms = joint_transforms(
+        axis_angle_to_matrix(torch.from_numpy(poses)),
+        torch.from_numpy(body.joints(betas)),
+        body.parents.tolist(),
+        torch.from_numpy(shifts),
+    )
+    some = slice(0, None, 97)
+    expected = skin(
+        torch.from_numpy(body.shaped(betas)[some]), torch.from_numpy(body.skinning_weights[some]), transforms
+    )
+    np.testing.assert_allclose(body.vertices(poses, shifts, betas)[:, some], expected.numpy(), atol=1e-12)
+
+
+def test_elbow_and_knee_bend_their_own_side(body):
+    """An elbow turned by -90 degrees about y points forward; a knee by +90 about x puts the foot behind."""
+    poses = np.zeros((1, 24, 3))
+    poses[0, joint("left_elbow"), 1] = -np.pi / 2
+    poses[0, joint("left_knee"), 0] = np.pi / 2
+    posed = body.vertices(poses, np.zeros((1, 3)))[0]
+    moving = [joint(f"left_{name}") for name in ("elbow", "wrist", "hand", "knee", "ankle", "foot")]
+    still = body.skinning_weights[:, moving].sum(axis=1) == 0
+    assert 1000 < still.sum() < len(still) - 1000
+    np.testing.assert_allclose(posed[still], body.template[still], atol=1e-13)
+    hand = body.skinning_weights[:, joint("left_hand")] > 0.9
+    foot = body.skinning_weights[:, joint("left_foot")] > 0.9
+    elbow, knee = body.joint_template[joint("left_elbow")], body.joint_template[joint("left_knee")]
+    assert np.all(posed[hand, 2] > elbow[2] + 0.15) and np.abs(posed[hand, 0] - elbow[0]).max() < 0.15
+    assert np.all(posed[foot, 2] < knee[2] - 0.3)
+
+
+def test_lowered_arms_keep_the_volume(body):
+    poses = np.zeros((1, 24, 3))
+    poses[0, joint("left_shoulder"), 2], poses[0, joint("right_shoulder"), 2] = -1.2, 1.2
+    lowered = volume(body.vertices(poses, np.zeros((1, 3)))[0], body.faces)
+    assert lowered == pytest.approx(volume(body.template, body.faces), rel=0.02)
+
+
+def test_a_motion_of_75_frames_takes_less_than_a_second(body):
+    poses = np.random.default_rng(0).normal(scale=0.3, size=(75, 24, 3))
+    body.vertices(poses[:1], np.zeros((1, 3)))
+    start = time.process_time()
+    body.vertices(poses, np.zeros((75, 3)))
+    assert time.process_time() - start < 1.0  # measured 0.03 s on one core
+
+
+@pytest.mark.parametrize(
+    ("poses", "translations", "betas"),
+    [
+        (np.zeros((2, 22, 3)), np.zeros((2, 3)), None),
+        (np.zeros((2, 24, 3)), np.zeros((3, 3)), None),
+        (np.full((2, 24, 3), np.nan), np.zeros((2, 3)), None),
+        (np.zeros((2, 24, 3)), np.zeros((2, 3)), np.zeros(3)),
+    ],
+)
+def test_wrong_arguments_are_refused(body, poses, translations, betas):
+    with pytest.raises(BodyError):
+        body.vertices(poses, translations, betas)
+
+
+def smpl_layout(body: Body) -> dict[str, np.ndarray]:
+    """A small body (a tetrahedron) in SMPL's layout."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1.7, 0], [0, 0, 1]])
+    table = np.stack([body.parents, np.arange(24)]).astype(np.int64)
+    table[0, 0] = 2**32 - 1
+    regressor = np.full((24, 4), 0.25)
+    return {
+        "v_template": corners,
+        "shapedirs": np.random.default_rng(0).normal(size=(4, 3, 16)),
+        "J_regressor": regressor,
+        "weights": np.full((4, 24), 1 / 24),
+        "kintree_table": table.astype(np.uint32),
+        "f": np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype=np.uint32),
+    }
+
+
+def test_a_body_in_smpl_layout_is_read(body, tmp_path):
+    arrays = smpl_layout(body)
+    np.savez(tmp_path / "user.npz", **arrays)
+    user = Body.from_file(tmp_path / "user.npz")
+    betas = np.linspace(0, 1, 10)
+    assert user.shape_count == 10 and user.parents.tolist() == body.parents.tolist()
+    np.testing.assert_allclose(user.joints(betas)[5], user.shaped(betas).mean(axis=0), atol=1e-14)
+    assert user.vertices(np.zeros((3, 24, 3)), np.zeros((3, 3)), betas).shape == (3, 4, 3)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("weights", None, "no array weights"),
+        ("weights", np.full((4, 52), 1 / 52), "expected numbers of shape (4, 24)"),
+        ("weights", np.full((4, 24), 1.0), "sum to one"),
+        ("v_template", np.full((4, 3), np.nan), "not finite"),
+        ("v_template", np.eye(4, 3) * 170, "in metres"),
+        ("shapedirs", np.zeros((3, 3, 10)), "shapedirs"),
+        ("J_regressor", None, "no joints"),
+        ("J_regressor", np.array([{"sparse": 1}], dtype=object), "plain arrays"),
+        ("kintree_table", np.full((2, 24), 30), "parent"),
+        ("f", np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]]), "closed"),
+        ("f", np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]), "inwards"),
+        ("f", np.array([[0, 2, 9]]), "vertex 9"),
+    ],
+)
+def test_a_broken_body_is_refused_in_one_line(body, tmp_path, key, value, says):
+    arrays = smpl_layout(body)
+    if value is None:
+        del arrays[key]
+    else:
+        arrays[key] = value
+    path = tmp_path / "broken.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(BodyError) as caught:
+        Body.from_file(path)
+    message = str(caught.value)
+    assert says in message and str(path) in message and "\n" not in message
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not a zip", b"PK\x03\x04 cut", b"\x93NUMPY\x01\x00"])
+def test_a_file_that_is_no_body_is_refused_in_one_line(tmp_path, content):
+    path = tmp_path / "body.npz"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BodyError) as caught:
+        Body.from_file(path)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
