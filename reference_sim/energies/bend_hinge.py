@@ -43,6 +43,7 @@ class BendHinge(Energy):
     ) -> None:
         if scaling not in SCALINGS:
             raise ValueError(f"BendHinge scaling {scaling!r}: choose one of {', '.join(SCALINGS)}")
+        self.cloth = cloth
         self.stencils = cloth.hinges
         self.scaling = scaling
         scale = np.ones(len(self.stencils))

@@ -57,6 +57,7 @@ class ContactPenalty(Energy):
     ) -> None:
         if samples not in ("all", "vertices"):
             raise ValueError(f"ContactPenalty samples {samples!r}: choose 'all' or 'vertices'")
+        self.cloth = cloth
         self.samples = samples
         self.margin = float(margin)
         self.stencils, self.weights, self.sample_areas = _samples(cloth, samples)
@@ -119,10 +120,14 @@ class ContactPenalty(Energy):
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
         blocks = np.zeros((len(self.stencils), 9, 9))
-        _hessian(
-            x, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals, blocks
-        )
+        elements, active = self.active_hessian_blocks(x)
+        blocks[elements] = active
         return blocks
+
+    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _hessian(
+            x, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals
+        )
 
 
 def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -174,15 +179,24 @@ def _gradient(x, stencils, weights, stiffness, margin, points, normals, gradient
 
 
 @njit(cache=True)
-def _hessian(x, stencils, weights, stiffness, margin, points, normals, blocks):
+def _hessian(x, stencils, weights, stiffness, margin, points, normals):
+    """6 k a_s depth n n^T, spread by the sample's weights; only samples in contact have a block."""
+    elements = np.empty(stencils.shape[0], dtype=np.int64)
+    depths = np.empty(stencils.shape[0])
+    count = 0
     for s in range(stencils.shape[0]):
         depth = _depth(x, stencils[s], weights[s], margin, points[s], normals[s])
         if depth > 0.0:
-            curvature = 6.0 * stiffness[s] * depth
-            for a in range(3):
-                for b in range(3):
-                    w = curvature * weights[s, a] * weights[s, b]
-                    if w != 0.0:
-                        for i in range(3):
-                            for j in range(3):
-                                blocks[s, 3 * a + i, 3 * b + j] = w * normals[s, i] * normals[s, j]
+            elements[count], depths[count] = s, depth
+            count += 1
+    blocks = np.empty((count, 9, 9))
+    for k in range(count):
+        s = elements[k]
+        curvature = 6.0 * stiffness[s] * depths[k]
+        for a in range(3):
+            for b in range(3):
+                w = curvature * weights[s, a] * weights[s, b]
+                for i in range(3):
+                    for j in range(3):
+                        blocks[k, 3 * a + i, 3 * b + j] = w * normals[s, i] * normals[s, j]
+    return elements[:count], blocks

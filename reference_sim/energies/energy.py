@@ -15,6 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from ..cloth import Cloth
     from ..obstacle import Obstacle
 
 
@@ -39,10 +40,12 @@ class Energy:
 
     Attributes:
         name: the term's name in tables.
+        cloth: the rest state that the term was built on.
         stencils: (N, k) vertex indices of each element.
     """
 
     name: str
+    cloth: Cloth
     stencils: np.ndarray
 
     def energy(self, x: Tensor) -> Tensor:
@@ -95,3 +98,7 @@ class Energy:
         ]
         zero = torch.zeros_like(u)
         return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()
+
+    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Elements with a non-zero Hessian (n,) and their blocks (n, 3k, 3k): all of them unless overridden."""
+        return np.arange(len(self.stencils)), self.hessian_blocks(x)

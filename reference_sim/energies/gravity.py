@@ -25,6 +25,7 @@ class Gravity(Energy):
     name = "gravity"
 
     def __init__(self, cloth: Cloth, origin_height: float = 0.0, *, acceleration: float = GRAVITY) -> None:
+        self.cloth = cloth
         self.stencils = np.arange(cloth.vertex_count)[:, None]
         self.weights = cloth.masses * acceleration
         self.origin_height = float(origin_height)
@@ -44,3 +45,6 @@ class Gravity(Energy):
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
         return np.zeros((len(self.stencils), 3, 3))
+
+    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.arange(0), np.zeros((0, 3, 3))

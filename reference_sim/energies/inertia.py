@@ -24,6 +24,7 @@ class Inertia(Energy):
     def __init__(self, cloth: Cloth, dt: float) -> None:
         if not (np.isfinite(dt) and dt > 0):
             raise ValueError(f"Inertia dt = {dt!r}: must be a finite number of seconds above 0")
+        self.cloth = cloth
         self.stencils = np.arange(cloth.vertex_count)[:, None]
         self.dt = float(dt)
         self.masses = cloth.masses

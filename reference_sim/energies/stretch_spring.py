@@ -20,6 +20,7 @@ class StretchSpring(Energy):
     name = "spring"
 
     def __init__(self, cloth: Cloth, *, stiffness: float = 15.0) -> None:
+        self.cloth = cloth
         self.stencils = cloth.edges
         self.rest_lengths = cloth.edge_lengths
         self.stiffness = float(stiffness)

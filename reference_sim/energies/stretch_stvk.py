@@ -28,6 +28,7 @@ class StretchStVK(Energy):
     name = "strain"
 
     def __init__(self, cloth: Cloth) -> None:
+        self.cloth = cloth
         self.stencils = cloth.faces
         self.Dm_inverse = cloth.Dm_inverse
         self.areas = cloth.areas

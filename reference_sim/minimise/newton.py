@@ -1,0 +1,226 @@
+"""Newton's method on the true Hessian, shifted only where that is not positive definite.
+
+Each iteration solves (H + sigma M/dt^2) p = -g with the smallest sigma of a geometric ladder for which the
+Cholesky factorisation exists, and backtracks along p until the energy has fallen enough. Projecting every
+element to positive definite would be simpler and needs several times the iterations once cloth wrinkles.
+
+The Newton decrement -g.p bounds what is left to gain; near round-off of the energy the line search
+therefore judges by slopes (Hager and Zhang 2005, approximate Wolfe conditions).
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from ..linear_solver import analyse
+from ..material import GRAVITY
+from ..potential import Potential
+from .result import Result
+
+SUFFICIENT_DECREASE = 1e-4
+MAX_SHIFT = 1e12  # in units of M/dt^2; beyond it a step is shorter than round-off
+STEP_TOLERANCE = 1e-3  # of a mean edge length
+
+
+def minimise(potential: Potential, x0: np.ndarray, **options: float) -> Result:
+    """Minimise `potential` from x0 (V, 3) [m]; pinned vertices stay where x0 has them.
+
+    Options are those of `Newton`. Failure is a status in the result.
+    """
+    return Newton(potential, **options).minimise(x0)
+
+
+class Newton:
+    """A minimiser bound to one potential: its symbolic analysis is done once and serves every step.
+
+    Args:
+        tolerance: largest gradient component at the end, in mean vertex weights.
+        max_iterations: iterations before giving up with status max_iterations.
+        timeout: seconds before giving up with status timeout.
+        reference_dt: time [s] in the shift M/dt^2 where the potential has no inertia of its own.
+    """
+
+    def __init__(
+        self,
+        potential: Potential,
+        *,
+        tolerance: float = 1e-6,
+        max_iterations: int = 300,
+        timeout: float = float("inf"),
+        reference_dt: float = 1 / 30,
+    ) -> None:
+        cloth = potential.cloth
+        self.potential = potential
+        self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
+        free = np.ones(cloth.vertex_count, dtype=bool)
+        free[cloth.pins] = False
+        self._pattern = potential.pattern(free)
+        self._free = self._pattern.free
+        self._solver = analyse(self._pattern)
+        dt = next((e.dt for e in potential.energies if e.name == "inertia"), reference_dt)
+        self._metric = np.repeat(cloth.masses[self._free] / dt**2, 3)
+        self._weight = float(cloth.masses.mean() * GRAVITY)
+        self._step_tolerance = STEP_TOLERANCE * float(cloth.edge_lengths.mean())
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        """Run from x0 (V, 3) [m]."""
+        return _Run(self, np.array(x0, dtype=np.float64, order="C")).to_the_end()
+
+
+class _Run:
+    """State of one minimisation."""
+
+    def __init__(self, newton: Newton, x: np.ndarray) -> None:
+        self.n = newton
+        self.x = x
+        self.shift = 0.0
+        self.iterations = self.factorisations = 0
+        self.seconds = dict.fromkeys(("assemble", "factorise", "solve", "evaluate"), 0.0)
+        self.started = time.perf_counter()
+        self.value, self.g = self.evaluate(x)
+
+    def evaluate(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Value and gradient over the free vertices, flat."""
+        start = time.perf_counter()
+        with np.errstate(all="ignore"):  # a hopeless trial point is judged by its value, not by a warning
+            value, gradient = self.n.potential.value_and_gradient(x)
+        self.seconds["evaluate"] += time.perf_counter() - start
+        return value, gradient[self.n._free].ravel()
+
+    def to_the_end(self) -> Result:
+        if not (np.isfinite(self.value) and np.isfinite(self.g).all()):
+            return self.result("diverged", "energy or gradient is not finite at the starting point")
+        while True:
+            data = self.assemble()
+            if not np.isfinite(data).all():
+                return self.result("diverged", "the Hessian is not finite")
+            if self.gradient_norm() <= self.target(data):
+                verdict = self.verdict(data)
+                if verdict is not None:
+                    return verdict
+            elif time.perf_counter() - self.started > self.n.timeout:
+                return self.result("timeout", f"gave up after {self.n.timeout:g} s")
+            if self.iterations >= self.n.max_iterations:
+                return self.result("max_iterations", f"gave up after {self.iterations} iterations")
+            if not self.newton_step(data):
+                return self.result("stalled", "no step along the shifted Newton direction lowers the energy")
+            self.iterations += 1
+
+    def gradient_norm(self) -> float:
+        return float(np.abs(self.g).max(initial=0.0)) / self.n._weight
+
+    def target(self, data: np.ndarray) -> float:
+        """The tolerance, but never below what round-off of the positions does to the gradient."""
+        stiffest = float(np.abs(data[self.n._pattern.diagonal]).max(initial=0.0))
+        round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(self.x).max(initial=0.0))
+        return max(self.n.tolerance, round_off / self.n._weight)
+
+    def assemble(self) -> np.ndarray:
+        start = time.perf_counter()
+        with np.errstate(all="ignore"):
+            data = self.n._pattern.assemble(self.n.potential.energies, self.x)
+        self.seconds["assemble"] += time.perf_counter() - start
+        return data
+
+    def factorise(self, data: np.ndarray, shift: float) -> bool:
+        start = time.perf_counter()
+        if shift > 0:
+            data = data.copy()
+            data[self.n._pattern.diagonal] += shift * self.n._metric
+        done = self.n._solver.factorise(data)
+        self.factorisations += 1
+        self.seconds["factorise"] += time.perf_counter() - start
+        return done
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        start = time.perf_counter()
+        x = self.n._solver.solve(b)
+        self.seconds["solve"] += time.perf_counter() - start
+        return x
+
+    def newton_step(self, data: np.ndarray) -> bool:
+        """One accepted step; the shift climbs until a factorisation exists and the energy falls."""
+        shift = self.shift / 4 if self.shift > 0.25 else 0.0
+        while shift <= MAX_SHIFT:
+            if self.factorise(data, shift):
+                p = self.solve(-self.g)
+                slope = float(self.g @ p)
+                if np.isfinite(slope) and slope < 0 and self.line_search(p, slope):
+                    self.shift = shift
+                    return True
+            shift = max(4 * shift, 1.0)
+        return False
+
+    def line_search(self, p: np.ndarray, slope: float) -> bool:
+        """Backtrack until the energy falls enough; True once a step was taken."""
+        step = p.reshape(-1, 3)
+        noise = 1e-13 * abs(self.value)
+        alpha = 1.0
+        for _ in range(24):
+            trial = self.x.copy()
+            trial[self.n._free] += alpha * step
+            value, gradient = self.evaluate(trial)
+            if np.isfinite(value) and np.isfinite(gradient).all():
+                enough = value <= self.value + SUFFICIENT_DECREASE * alpha * slope
+                flat = value <= self.value + noise and -slope * alpha < 100 * noise
+                if enough or (flat and float(gradient @ p) <= (2 * SUFFICIENT_DECREASE - 1) * slope):
+                    self.x, self.value, self.g = trial, value, gradient
+                    return True
+            alpha *= 0.5
+        return False
+
+    def verdict(self, data: np.ndarray) -> Result | None:
+        """Converged, stuck on a saddle, or None: go on.
+
+        The gradient is small. What is left to ask is whether the true Hessian is positive definite (up to
+        round-off, so that rigid motions of an unpinned cloth do not count) and its step negligible.
+        """
+        diagonal = data[self.n._pattern.diagonal]
+        tiny = 1e-10 * float((np.abs(diagonal) / self.n._metric).max())
+        if self.factorise(data, tiny):
+            step = float(np.abs(self.solve(-self.g)).max())
+            if step <= self.n._step_tolerance or self.gradient_norm() == 0.0:
+                return self.result("converged", f"gradient within tolerance, Newton step {step:.1e} m")
+            return None
+        if self.escape_saddle(data):
+            self.iterations += 1
+            return None
+        return self.result("stalled", "a saddle: negative curvature, and no step along it lowers the energy")
+
+    def escape_saddle(self, data: np.ndarray) -> bool:
+        """Step along the most negative curvature direction, found by inverse iteration."""
+        shift = max(self.shift, 1.0)
+        while not self.factorise(data, shift):
+            shift *= 4
+            if shift > MAX_SHIFT:
+                return False
+        v = np.random.default_rng(0).standard_normal(len(self.g))
+        for _ in range(8):
+            v = self.solve(self.n._metric * v)
+            v /= np.abs(v).max()
+        v *= -1.0 if float(v @ self.g) > 0 else 1.0
+        scale = 100 * self.n._step_tolerance
+        for _ in range(30):
+            trial = self.x.copy()
+            trial[self.n._free] += scale * v.reshape(-1, 3)
+            value, gradient = self.evaluate(trial)
+            if np.isfinite(value) and value < self.value - 1e-13 * abs(self.value):
+                self.x, self.value, self.g = trial, value, gradient
+                return True
+            scale *= 0.5
+        return False
+
+    def result(self, status: str, reason: str) -> Result:
+        return Result(
+            positions=self.x,
+            status=status,
+            reason=reason,
+            iterations=self.iterations,
+            factorisations=self.factorisations,
+            gradient_norm=self.gradient_norm(),
+            energy=self.value,
+            terms=self.n.potential.terms(self.x),
+            seconds=self.seconds,
+        )

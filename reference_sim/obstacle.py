@@ -1,0 +1,239 @@
+"""A moving closed triangle mesh that cloth may touch: contact planes for a step, and true distances.
+
+The simulator knows a body as nothing more than this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from numba import njit
+
+from .cloth import MeshError
+
+DEFAULT_REGION = 0.20  # [m]
+
+
+@dataclass(frozen=True)
+class Planes:
+    """One contact plane per sample: points (S, 3) [m], unit outward normals (S, 3), and where it was found.
+
+    faces: (S,) face of the obstacle; barycentric: (S, 3) place on it.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    barycentric: np.ndarray
+
+
+class Obstacle:
+    """A closed mesh that moves through T frames.
+
+    Args:
+        positions: (T, B, 3) [m], or (B, 3) for one that stands still.
+        faces: (F, 3) outward wound.
+        rest_positions: (B, 3) [m], the obstacle in the pose in which the cloth was made. With it, a cloth
+            sample only ever meets faces whose rest centroid lies within `region` of the sample's own rest
+            position: without that rule arms grab the shirt and legs catch the hem.
+        region: radius of that rule [m].
+
+    Raises:
+        MeshError: wrong shapes, NaN, an open or inside-out mesh.
+    """
+
+    def __init__(
+        self,
+        positions: np.ndarray,
+        faces: np.ndarray,
+        *,
+        rest_positions: np.ndarray | None = None,
+        region: float = DEFAULT_REGION,
+    ) -> None:
+        positions = np.asarray(positions, dtype=np.float64)
+        self.positions = positions[None] if positions.ndim == 2 else positions
+        self.faces = np.ascontiguousarray(faces, dtype=np.int64)
+        _check_closed(self.positions, self.faces)
+        self.region = float(region)
+        self.rest_centroids: np.ndarray | None = None
+        if rest_positions is not None:
+            rest = np.asarray(rest_positions, dtype=np.float64)
+            if rest.shape != self.positions.shape[1:]:
+                raise MeshError(f"obstacle rest_positions {rest.shape}: expected {self.positions.shape[1:]}")
+            self.rest_centroids = np.ascontiguousarray(rest[self.faces].mean(axis=1))
+        self._tree: tuple[int, igl.AABB, np.ndarray] | None = None
+
+    @property
+    def frames(self) -> int:
+        return len(self.positions)
+
+    def at(self, frame: int) -> np.ndarray:
+        """Vertices (B, 3) at `frame`; the last frame holds on for ever."""
+        return self.positions[min(frame, self.frames - 1)]
+
+    def _closest(self, points: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Nearest face and point on the whole mesh; the tree of the last frame asked for is kept."""
+        frame = min(frame, self.frames - 1)
+        if self._tree is None or self._tree[0] != frame:
+            vertices = np.asfortranarray(self.at(frame))
+            tree = igl.AABB()
+            tree.init(vertices, self.faces)
+            self._tree = (frame, tree, vertices)
+        _, tree, vertices = self._tree
+        _, face, nearest = tree.squared_distance(vertices, self.faces, np.asfortranarray(points))
+        return np.asarray(face, dtype=np.int64).ravel(), np.ascontiguousarray(nearest)
+
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+        """Contact planes at `frame` for samples at points (S, 3), whose rest positions are rest_points (S, 3).
+
+        The plane goes through the closest allowed point of the surface; its normal points from there to the
+        sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
+        sample's own position.
+        """
+        vertices = self.at(frame)
+        face, nearest = self._closest(points, frame)
+        if self.rest_centroids is not None and rest_points is not None:
+            offset = self.rest_centroids[face] - rest_points
+            far = np.flatnonzero(np.einsum("si,si->s", offset, offset) > self.region**2)
+            face, nearest = face.copy(), nearest.copy()
+            _closest_allowed(
+                points, far, rest_points, vertices, self.faces, self.rest_centroids, self.region, face, nearest
+            )
+        corners = vertices[self.faces[face]]
+        barycentric = _barycentric(nearest, corners)
+        smooth = np.einsum("sa,sai->si", barycentric, self._vertex_normals(frame)[self.faces[face]])
+        smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
+        offset = points - nearest
+        length = np.linalg.norm(offset, axis=1, keepdims=True)
+        cosine = np.einsum("si,si->s", offset, smooth)[:, None] / np.maximum(length, 1e-300)
+        # Within a micrometre, or looking along the surface, the offset has no direction to trust.
+        trusted = (length > 1e-6) & (np.abs(cosine) > 0.3)
+        normals = np.where(trusted, np.sign(cosine) * offset / np.maximum(length, 1e-300), smooth)
+        return Planes(nearest, normals, face, barycentric)
+
+    def carried(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> np.ndarray:
+        """Where points (N, 3) at frame - 1 would go if each kept its place beside its nearest face.
+
+        The best known initial guess for a garment: the body's own motion, face by face.
+        """
+        planes = self.planes(points, frame - 1, rest_points)
+        before = _face_frames(self.at(frame - 1)[self.faces[planes.faces]])
+        after = _face_frames(self.at(frame)[self.faces[planes.faces]])
+        anchor = np.einsum("sa,sai->si", planes.barycentric, self.at(frame)[self.faces[planes.faces]])
+        local = np.einsum("sij,si->sj", before, points - planes.points)
+        return anchor + np.einsum("sij,sj->si", after, local)
+
+    def signed_distance(self, points: np.ndarray, frame: int) -> np.ndarray:
+        """True distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
+        _, nearest = self._closest(points, frame)
+        distance = np.linalg.norm(points - nearest, axis=1)
+        near = np.flatnonzero(distance < 0.15)  # nothing of a body is deeper than that below its skin
+        vertices = np.asfortranarray(self.at(frame))
+        winding = igl.fast_winding_number(vertices, self.faces, np.asfortranarray(points[near]))
+        distance[near] *= np.where(np.asarray(winding).ravel() > 0.5, -1.0, 1.0)
+        return distance
+
+    def _vertex_normals(self, frame: int) -> np.ndarray:
+        return np.asarray(igl.per_vertex_normals(np.asfortranarray(self.at(frame)), self.faces))
+
+
+def _check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
+    if positions.ndim != 3 or positions.shape[2] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise MeshError(f"obstacle positions {positions.shape}, faces {faces.shape}: expected (T, B, 3), (F, 3)")
+    if faces.min() < 0 or faces.max() >= positions.shape[1]:
+        raise MeshError(f"obstacle faces name a vertex outside 0..{positions.shape[1] - 1}")
+    bad = np.argwhere(~np.isfinite(positions))
+    if bad.size:
+        raise MeshError(f"obstacle vertex {bad[0, 1]} of frame {bad[0, 0]} is not finite")
+    half = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    size = positions.shape[1]
+    forward, backward = half[:, 0] * size + half[:, 1], half[:, 1] * size + half[:, 0]
+    lonely = np.flatnonzero(~np.isin(forward, backward))
+    if lonely.size:
+        a, b = half[lonely[0]]
+        raise MeshError(f"obstacle is not closed: edge ({a}, {b}) of face {lonely[0] // 3} has one face only")
+    corner = positions[0][faces]
+    volume = np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6
+    if volume <= 0:
+        raise MeshError(f"obstacle is inside out (volume {volume:.3g} m^3): reverse its faces")
+
+
+def _face_frames(corners: np.ndarray) -> np.ndarray:
+    """Orthonormal frames (N, 3, 3), axes as columns, of triangles (N, 3, 3)."""
+    first = corners[:, 1] - corners[:, 0]
+    first = first / np.linalg.norm(first, axis=1, keepdims=True)
+    normal = np.cross(first, corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normal, first), normal], axis=-1)
+
+
+def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (N, 3) of points on triangles (N, 3, 3)."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    r = points - corners[:, 0]
+    aa, ab, bb = (np.einsum("ni,ni->n", p, q) for p, q in ((a, a), (a, b), (b, b)))
+    ra, rb = np.einsum("ni,ni->n", r, a), np.einsum("ni,ni->n", r, b)
+    det = np.maximum(aa * bb - ab * ab, 1e-300)
+    v, w = (bb * ra - ab * rb) / det, (aa * rb - ab * ra) / det
+    return np.clip(np.stack([1 - v - w, v, w], axis=1), 0.0, 1.0)
+
+
+@njit(cache=True)
+def _closest_allowed(points, which, rest_points, vertices, faces, rest_centroids, region, face, nearest):
+    """For the samples `which`, replace face and nearest by the closest among allowed faces.
+
+    A sample with no allowed face at all keeps its global answer.
+    """
+    best_point = np.empty(3)
+    q = np.empty(3)
+    for s in which:
+        best = np.inf
+        for f in range(faces.shape[0]):
+            dx = rest_centroids[f, 0] - rest_points[s, 0]
+            dy = rest_centroids[f, 1] - rest_points[s, 1]
+            dz = rest_centroids[f, 2] - rest_points[s, 2]
+            if dx * dx + dy * dy + dz * dz > region * region:
+                continue
+            distance = _closest_on_triangle(
+                points[s], vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], q
+            )
+            if distance < best:
+                best = distance
+                face[s] = f
+                best_point[:] = q
+        if best < np.inf:
+            nearest[s] = best_point
+
+
+@njit(cache=True)
+def _closest_on_triangle(p, a, b, c, q):
+    """Squared distance from p to triangle abc, the point itself in q (Ericson 2005, section 5.1.5)."""
+    ab, ac, ap = b - a, c - a, p - a
+    d1, d2 = np.dot(ab, ap), np.dot(ac, ap)
+    bp = p - b
+    d3, d4 = np.dot(ab, bp), np.dot(ac, bp)
+    cp = p - c
+    d5, d6 = np.dot(ab, cp), np.dot(ac, cp)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0 and d2 <= 0:
+        v, w = 0.0, 0.0
+    elif d3 >= 0 and d4 <= d3:
+        v, w = 1.0, 0.0
+    elif d6 >= 0 and d5 <= d6:
+        v, w = 0.0, 1.0
+    elif vc <= 0 and d1 >= 0 and d3 <= 0:
+        v, w = d1 / (d1 - d3), 0.0
+    elif vb <= 0 and d2 >= 0 and d6 <= 0:
+        v, w = 0.0, d2 / (d2 - d6)
+    elif va <= 0 and d4 - d3 >= 0 and d5 - d6 >= 0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
+    total = 0.0
+    for i in range(3):
+        q[i] = a[i] + v * ab[i] + w * ac[i]
+        total += (p[i] - q[i]) ** 2
+    return total

@@ -1,0 +1,70 @@
+"""The sum of energies that a simulator minimises, a network is trained on, and every method is judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+
+from .energies.energy import Energy, Step
+from .hessian_pattern import HessianPattern
+
+
+class Potential:
+    """Sum of energies: value, gradient and sparse Hessian on a fixed pattern.
+
+    Leaving a term out of `energies` is an ablation; nothing of it is evaluated.
+
+    Raises:
+        ValueError: no energies, or energies of different cloths.
+    """
+
+    def __init__(self, energies: Sequence[Energy]) -> None:
+        if not energies:
+            raise ValueError("a Potential needs at least one energy")
+        self.energies = tuple(energies)
+        self.cloth = self.energies[0].cloth
+        for energy in self.energies:
+            if energy.cloth is not self.cloth:
+                raise ValueError(f"energy {energy.name!r} was built on another cloth: use one Cloth for all terms")
+        self._patterns: dict[bytes, HessianPattern] = {}
+
+    def prepare(self, step: Step) -> None:
+        """Freeze in every term what it needs for one step."""
+        for energy in self.energies:
+            energy.prepare(step)
+
+    def terms(self, x: np.ndarray) -> dict[str, float]:
+        """Energy of each term [J] at x (V, 3) [m], by name."""
+        return {energy.name: energy.value_and_gradient(x)[0] for energy in self.energies}
+
+    def value(self, x: np.ndarray) -> float:
+        """Sum [J] at x (V, 3) [m]."""
+        return self.value_and_gradient(x)[0]
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """dPhi/dx (V, 3) [N] at x (V, 3) [m]."""
+        return self.value_and_gradient(x)[1]
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Both at once: they share most of their work."""
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        total, gradient = 0.0, np.zeros_like(x)
+        for energy in self.energies:
+            value, part = energy.value_and_gradient(x)
+            total += value
+            gradient += part
+        return total, gradient
+
+    def hessian(self, x: np.ndarray) -> sp.csc_matrix:
+        """Second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
+        pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
+        return pattern.symmetric(pattern.assemble(self.energies, np.ascontiguousarray(x, dtype=np.float64)))
+
+    def pattern(self, free: np.ndarray) -> HessianPattern:
+        """The Hessian's pattern over the vertices marked free (V,); built once and kept."""
+        key = np.packbits(free).tobytes()
+        if key not in self._patterns:
+            self._patterns[key] = HessianPattern(self.energies, self.cloth.vertex_count, free)
+        return self._patterns[key]

@@ -1,0 +1,211 @@
+"""A trajectory: positions over time with the truth about how they came to be, and its file.
+
+The file is VTKHDF (temporal PolyData), so ParaView opens it as it is; what VTK has no place for lies in the
+top-level group /benchmark. Frames are appended and flushed one by one: a killed run keeps every whole frame.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import h5py
+
+
+class TrajectoryError(ValueError):
+    """A trajectory file that cannot be read; the message names file and remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Positions of one cloth over time.
+
+    Attributes:
+        positions: (T, V, 3) [m].
+        faces: (F, 3).
+        times: (T,) [s].
+        frame_seconds: (T,) time on the clock for each frame [s]; nan where none was taken.
+        status: "converged", or the first failure among the frames (stalled, max_iterations, diverged,
+            timeout); "ok" for a method that does not minimise.
+        reason: one line in words.
+        provenance: what made it (JSON values).
+        frame_fields: further numbers per frame, each (T,).
+    """
+
+    positions: np.ndarray
+    faces: np.ndarray
+    times: np.ndarray
+    frame_seconds: np.ndarray
+    status: str = "ok"
+    reason: str = ""
+    provenance: dict[str, Any] = field(default_factory=dict)
+    frame_fields: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def frames(self) -> int:
+        return len(self.positions)
+
+    @property
+    def dt(self) -> float:
+        """Time between frames [s]."""
+        return float(self.times[1] - self.times[0]) if self.frames > 1 else float("nan")
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole file under a temporary name, then put it in place."""
+        path = Path(path)
+        part = path.with_name(path.name + ".part")
+        with TrajectoryWriter(part, self.faces, self.provenance, vertex_count=self.positions.shape[1]) as writer:
+            for k in range(self.frames):
+                fields = {name: values[k] for name, values in self.frame_fields.items()}
+                writer.append(self.positions[k], self.times[k], self.frame_seconds[k], fields, flush=False)
+            writer.finish(self.status, self.reason)
+        os.replace(part, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Trajectory:
+        """Read a file of this project; an unfinished one gives its whole frames and status "unfinished".
+
+        Raises:
+            TrajectoryError: missing file, or not a trajectory.
+        """
+        import h5py
+
+        try:
+            with h5py.File(path, "r") as file:
+                return cls._read(file)
+        except FileNotFoundError:
+            raise TrajectoryError(f"{path}: no such trajectory file") from None
+        except (OSError, KeyError) as error:
+            raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({error})") from None
+
+    @classmethod
+    def _read(cls, file: h5py.File) -> Trajectory:
+        own, vtk = file["benchmark"], file["VTKHDF"]
+        frames = int(own.attrs["frames"])
+        vertex_count = int(vtk["NumberOfPoints"][0])
+        return cls(
+            positions=vtk["Points"][: frames * vertex_count].reshape(frames, vertex_count, 3),
+            faces=vtk["Polygons/Connectivity"][:].reshape(-1, 3),
+            times=vtk["Steps/Values"][:frames],
+            frame_seconds=own["frame_seconds"][:frames],
+            status=str(own.attrs["status"]),
+            reason=str(own.attrs["reason"]),
+            provenance=json.loads(own.attrs["provenance"]),
+            frame_fields={k.replace(":", "/"): v[:frames] for k, v in own["frame_fields"].items()},
+        )
+
+
+class TrajectoryWriter:
+    """Appends frames to a VTKHDF file; use it in a `with` block.
+
+    Args:
+        path: the file, replaced if it exists.
+        faces: (F, 3).
+        provenance: JSON values.
+        vertex_count: V.
+    """
+
+    def __init__(
+        self, path: str | Path, faces: np.ndarray, provenance: dict[str, Any], *, vertex_count: int
+    ) -> None:
+        import h5py
+
+        self._file = h5py.File(path, "w")
+        self._vertex_count = vertex_count
+        self.frames = 0
+        _vtk_skeleton(self._file, np.asarray(faces, dtype=np.int64), vertex_count)
+        own = self._file.create_group("benchmark")
+        own.create_group("frame_fields")
+        own.create_dataset("frame_seconds", (0,), maxshape=(None,), dtype="f8")
+        own.attrs.update(
+            {
+                "frames": 0,
+                "status": "unfinished",
+                "reason": "the run that wrote this did not end",
+                "provenance": json.dumps(provenance),
+            }
+        )
+
+    def append(
+        self,
+        positions: np.ndarray,
+        time: float,
+        seconds: float = float("nan"),
+        fields: dict[str, float] | None = None,
+        *,
+        flush: bool = True,
+    ) -> None:
+        """Add one frame: positions (V, 3) [m], its time [s], the clock's seconds, further numbers by name."""
+        k, vtk, own = self.frames, self._file["VTKHDF"], self._file["benchmark"]
+        steps = vtk["Steps"]
+        # VTK crashes on Values longer than NSteps, so the count is raised first.
+        steps.attrs["NSteps"] = k + 1
+        _extend(vtk["Points"], positions)
+        _extend(steps["Values"], [time])
+        _extend(steps["PointOffsets"], [k * self._vertex_count])
+        _extend(steps["PartOffsets"], [0])
+        _extend(steps["NumberOfParts"], [1])
+        for name in ("CellOffsets", "ConnectivityIdOffsets"):
+            _extend(steps[name], np.zeros((1, 4), dtype=np.int64))
+        _extend(own["frame_seconds"], [seconds])
+        for name, value in (fields or {}).items():
+            group = own["frame_fields"]
+            # An energy's name has a slash in it; HDF5 would make a group of that.
+            key = name.replace("/", ":")
+            if key not in group:
+                group.create_dataset(key, (0,), maxshape=(None,), dtype="f8", fillvalue=np.nan)
+            group[key].resize((k + 1,))
+            group[key][k] = value
+        self.frames = k + 1
+        own.attrs["frames"] = self.frames  # last: a reader trusts only whole frames
+        if flush:
+            self._file.flush()
+
+    def finish(self, status: str, reason: str) -> None:
+        """Say how it ended."""
+        self._file["benchmark"].attrs.update({"status": status, "reason": reason})
+
+    def __enter__(self) -> TrajectoryWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+
+def _extend(dataset: h5py.Dataset, rows: Any) -> None:
+    rows = np.asarray(rows)
+    size = dataset.shape[0]
+    dataset.resize(size + len(rows), axis=0)
+    dataset[size:] = rows
+
+
+def _vtk_skeleton(file: h5py.File, faces: np.ndarray, vertex_count: int) -> None:
+    """The groups VTK's reader insists on, for one moving PolyData with fixed faces."""
+    root = file.create_group("VTKHDF")
+    root.attrs["Version"] = np.array([2, 3], dtype="i8")
+    root.attrs.create("Type", b"PolyData", dtype="S8")
+    root["NumberOfPoints"] = np.array([vertex_count], dtype="i8")
+    chunk = (vertex_count, 3)
+    root.create_dataset(
+        "Points", (0, 3), maxshape=(None, 3), dtype="f8", chunks=chunk, compression=1, shuffle=True
+    )
+    for name in ("Vertices", "Lines", "Polygons", "Strips"):
+        cells = faces if name == "Polygons" else np.zeros((0, 3), dtype=np.int64)
+        group = root.create_group(name)
+        group["NumberOfCells"] = np.array([len(cells)], dtype="i8")
+        group["NumberOfConnectivityIds"] = np.array([cells.size], dtype="i8")
+        group["Connectivity"] = cells.ravel()
+        group["Offsets"] = np.arange(len(cells) + 1, dtype="i8") * 3
+    steps = root.create_group("Steps")
+    steps.attrs["NSteps"] = 0
+    steps.create_dataset("Values", (0,), maxshape=(None,), dtype="f8")
+    for name in ("PointOffsets", "PartOffsets", "NumberOfParts"):
+        steps.create_dataset(name, (0,), maxshape=(None,), dtype="i8")
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        steps.create_dataset(name, (0, 4), maxshape=(None, 4), dtype="i8")
