@@ -1,0 +1,204 @@
+"""Even triangles on half of a garment: cluster a dense sheet, put its rim on the exact cut lines, relax.
+
+pyacvd's clusters give the number of vertices that was asked for, but a ragged rim. So rim vertices are spread
+evenly along the cut lines of the dense sheet, and the inner ones move to the area-weighted mean of the
+triangles around them (Lloyd's iteration, which evens out areas), kept on the form, between Delaunay flips.
+"""
+
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def boundary_loops(faces: Index) -> list[Index]:
+    """Boundary loops of a manifold mesh: vertex indices in order, longest first, along the faces' winding."""
+    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    size = int(faces.max()) + 1
+    forward, backward = halves @ [size, 1], halves @ [1, size]
+    rim = halves[~np.isin(forward, backward)]
+    following = dict(rim.tolist())
+    if len(following) != len(rim):
+        raise ValueError("a vertex where two boundary loops touch: the mesh is not manifold")
+    loops = []
+    while following:
+        vertex, after = next(iter(following.items()))
+        loop = [vertex]
+        del following[vertex]
+        while after != loop[0]:
+            loop.append(after)
+            after = following.pop(after)
+        loops.append(np.array(loop, dtype=np.int64))
+    return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
+
+
+def triangle_areas(points: Array, faces: Index) -> Array:
+    """Areas (F,) [m^2]."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def corner_angles(points: Array, faces: Index) -> Array:
+    """Angles (F,3) [rad] at the faces' corners."""
+    sides = [points[np.roll(faces, -k, axis=1)] - points[faces] for k in (1, 2)]
+    return np.arctan2(np.linalg.norm(np.cross(*sides), axis=2), np.sum(sides[0] * sides[1], axis=2))
+
+
+def vertex_normals(points: Array, faces: Index) -> Array:
+    """Unit normals (V,3), area-weighted."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normals = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(normals, faces[:, k], np.cross(b - a, c - a))
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+
+
+def along(curve: Array, shares: Array) -> Array:
+    """Points at the given shares (N,) of the length of a polyline (P,3)."""
+    steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.stack([np.interp(shares * length[-1], length, curve[:, k]) for k in range(3)], axis=1)
+
+
+def interior_edges(faces: Index) -> tuple[Index, Index, Index]:
+    """Edges with two faces: ends (E,2) as wound in the first face, the two faces (E,2), the two far corners."""
+    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    key = np.sort(halves, axis=1) @ [int(faces.max()) + 1, 1]
+    order = np.argsort(key, kind="stable")
+    twin = np.flatnonzero(key[order][1:] == key[order][:-1])
+    first, second = order[twin], order[twin + 1]
+    opposite = faces[:, [2, 0, 1]].reshape(-1)
+    return (
+        halves[first],
+        np.stack([first // 3, second // 3], 1),
+        np.stack([opposite[first], opposite[second]], 1),
+    )
+
+
+def _angle_cotangent(tip: Array, a: Array, b: Array) -> Array:
+    u, v = a - tip, b - tip
+    return np.sum(u * v, axis=1) / np.maximum(np.linalg.norm(np.cross(u, v), axis=1), 1e-30)
+
+
+def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
+    """Faces after flipping interior edges whose two opposite angles add up to more than pi."""
+    faces = faces.copy()
+    for _ in range(passes):
+        ends, sides, far = interior_edges(faces)
+        p, q, r, s = points[ends[:, 0]], points[ends[:, 1]], points[far[:, 0]], points[far[:, 1]]
+        excess = _angle_cotangent(r, p, q) + _angle_cotangent(s, p, q)
+        # A flip must not turn a triangle over: both new normals agree with the old ones' sum.
+        normal = np.cross(q - p, r - p) + np.cross(p - q, s - q)
+        upright = (np.sum(np.cross(s - p, r - p) * normal, 1) > 0) & (
+            np.sum(np.cross(r - q, s - q) * normal, 1) > 0
+        )
+        candidates = np.flatnonzero((excess < -1e-6) & upright)
+        if not len(candidates):
+            break
+        present = {tuple(edge) for edge in np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1).tolist()}
+        touched = np.zeros(len(faces), dtype=bool)
+        for e in candidates[np.argsort(excess[candidates], kind="stable")]:
+            (a, b), (f, g), (c, d) = ends[e], sides[e], far[e]
+            edge = (int(min(c, d)), int(max(c, d)))
+            if touched[f] or touched[g] or edge in present:
+                continue
+            touched[[f, g]] = True
+            present.add(edge)
+            faces[f], faces[g] = (a, d, c), (b, c, d)
+    return faces
+
+
+def relax(
+    points: Array, faces: Index, held: NDArray[np.bool_], project, *, rounds: int = 40
+) -> tuple[Array, Index]:
+    """Even triangles by Lloyd's iteration and Delaunay flips; `held` (V,) vertices stay where they are.
+
+    project: maps points (N,3) back onto the surface.
+    """
+    points = points.copy()
+    for _ in range(rounds):
+        faces = delaunay_flips(points, faces, passes=1)
+        areas = triangle_areas(points, faces)
+        centroids = points[faces].mean(axis=1)
+        weight = np.zeros(len(points))
+        target = np.zeros_like(points)
+        for k in range(3):
+            np.add.at(weight, faces[:, k], areas)
+            np.add.at(target, faces[:, k], areas[:, None] * centroids)
+        moved = target / weight[:, None]
+        points[~held] = project(moved[~held])
+    return points, delaunay_flips(points, faces)
+
+
+def _cluster(points: Array, faces: Index, count: int) -> tuple[Array, Index]:
+    """A coarser mesh of about `count` vertices by centroidal clustering (pyacvd)."""
+    import pyacvd
+    import pyvista
+
+    sheet = pyvista.PolyData.from_regular_faces(points, faces)
+    while sheet.n_points < 12 * count:
+        sheet = sheet.subdivide(1, "linear")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # pyacvd 0.4 reads a property that pyvista 0.49 calls deprecated
+        clustering = pyacvd.Clustering(sheet)
+        clustering.cluster(count)
+        coarse = clustering.create_mesh(moveclus=False)
+    coarse_points = np.asarray(coarse.points, dtype=np.float64)
+    coarse_faces = np.asarray(coarse.regular_faces, dtype=np.int64)
+    # The clusters' winding is not promised: take the sheet's, by its nearest vertex's normal.
+    nearest = cKDTree(np.asarray(sheet.points)).query(coarse_points[coarse_faces].mean(axis=1))[1]
+    outward = vertex_normals(np.asarray(sheet.points, dtype=np.float64), np.asarray(sheet.regular_faces))[
+        nearest
+    ]
+    a, b, c = (coarse_points[coarse_faces[:, k]] for k in range(3))
+    turned = np.sum(np.cross(b - a, c - a) * outward, axis=1) < 0
+    coarse_faces[turned] = coarse_faces[turned][:, ::-1]
+    return coarse_points, coarse_faces
+
+
+def _spread(curve: Array, count: int, *, closed: bool) -> Array:
+    """`count` points (count,3) evenly along a polyline (P,3), its first point included, its last not."""
+    line = np.concatenate([curve, curve[:1]]) if closed else curve
+    return along(line, np.arange(count) / count)
+
+
+def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
+    """Spread a loop's vertices, in place, evenly along its outline: one closed curve, or several end to end."""
+    if len(outline) == 1:
+        curve = outline[0]
+        start = int(np.argmin(np.linalg.norm(points[loop] - curve[0], axis=1)))
+        points[np.roll(loop, -start)] = _spread(curve, len(loop), closed=True)
+        return
+    corners = [int(np.argmin(np.linalg.norm(points[loop] - curve[0], axis=1))) for curve in outline]
+    loop = np.roll(loop, -corners[0])
+    stops = [(corner - corners[0]) % len(loop) for corner in corners] + [len(loop)]
+    if np.any(np.diff(stops) < 1):
+        raise ValueError("the rim of the mesh does not follow its outline")
+    for curve, begin, end in zip(outline, stops[:-1], stops[1:], strict=True):
+        points[loop[begin:end]] = _spread(curve, end - begin, closed=False)
+
+
+def remesh(
+    points: Array, faces: Index, outlines: list[list[Array]], count: int, project
+) -> tuple[Array, Index]:
+    """Even mesh of about `count` vertices of a sheet whose boundary loops are the `outlines`.
+
+    outlines: per loop its curves (P,3) end to end along the sheet's winding; one curve alone is closed.
+    project: maps points (N,3) back onto the surface.
+    Errors: ValueError where the clusters are too coarse to keep the sheet's topology.
+    """
+    coarse, triangles = _cluster(points, faces, count)
+    loops = boundary_loops(triangles)
+    if len(loops) != len(outlines):
+        raise ValueError(f"{count} vertices are too few to keep {len(outlines)} boundary loops apart")
+    centres = np.stack([coarse[loop].mean(axis=0) for loop in loops])
+    for outline in outlines:
+        centre = np.concatenate(outline).mean(axis=0)
+        _place_rim(coarse, loops[int(np.argmin(np.linalg.norm(centres - centre, axis=1)))], outline)
+    held = np.zeros(len(coarse), dtype=bool)
+    held[np.concatenate(loops)] = True
+    return relax(coarse, triangles, held, project)
