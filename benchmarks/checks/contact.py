@@ -1,0 +1,52 @@
+"""A sheet at rest on a plane: the depth and the force of the penalty are known."""
+
+from __future__ import annotations
+
+import numpy as np
+from reference_sim import Cloth, Material, Obstacle, Potential, minimise
+from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
+from reference_sim.material import GRAVITY
+
+from .meshes import in_space, jittered_patch
+
+
+def penalty_depth() -> float:
+    """Mean depth into the margin over sqrt(rho_a g / (3 k)), contact on vertices.
+
+    A vertex of area a carries rho_a a g and is pushed by 3 k a depth^2: the area cancels.
+    """
+    potential, contact, x, areal_density = _sheet_at_rest("vertices")
+    stiffness = contact.stiffness / contact.sample_areas  # k [J/m^5]
+    exact = np.sqrt(areal_density * GRAVITY / (3 * stiffness))
+    return float(((contact.margin - x[:, 1]) / exact).mean())
+
+
+def contact_force() -> float:
+    """Total upward contact force over the weight of the sheet, all contact samples on."""
+    potential, contact, x, areal_density = _sheet_at_rest("all")
+    upward = -contact.value_and_gradient(x)[1][:, 1].sum()
+    return float(upward / (areal_density * GRAVITY))  # the sheet has unit area
+
+
+def _sheet_at_rest(samples: str) -> tuple[Potential, ContactPenalty, np.ndarray, float]:
+    points, faces = jittered_patch(8)
+    material = Material()
+    rest = in_space(points)[:, [0, 2, 1]] - [0.5, 0.0, 0.5]
+    cloth = Cloth(rest, faces[:, ::-1], material)
+    floor = Obstacle(*box(half=2.0, height=1.0))
+    contact = ContactPenalty(cloth, samples=samples)
+    start = rest + [0.0, 0.002, 0.0]
+    contact.prepare(Step(previous=start, velocity=np.zeros_like(start), guess=start, dt=1 / 30, obstacle=floor))
+    potential = Potential([StretchStVK(cloth), Gravity(cloth), contact])
+    result = minimise(potential, start)
+    if result.status != "converged":
+        raise RuntimeError(f"the sheet did not come to rest: {result.reason}")
+    return potential, contact, result.positions, material.areal_density
+
+
+def box(*, half: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """A closed box under the plane y = 0, `half` to each side and `height` deep [m]; outward faces."""
+    corners = np.array([[x, y, z] for x in (-half, half) for y in (-height, 0.0) for z in (-half, half)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+    return corners, faces

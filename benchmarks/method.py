@@ -1,0 +1,52 @@
+"""A method: prepare off the clock, run on it, give a trajectory. Only the harness owns a clock."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from reference_sim import Trajectory
+
+    from .scene import BuiltScene, Scene
+
+
+class Method(Protocol):
+    """What a method does; one object serves one cell."""
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Load, compile, warm up: all that a user pays once. Not timed."""
+
+    def run(self) -> Trajectory:
+        """The work, frame by frame. Timed. Failure is a status in the trajectory, not an exception."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodEntry:
+    """The declaration of a method: cheap to list. Its module is imported when a cell needs it.
+
+    needs_body: whether it works on dressed scenes alone. trained: the kind of network it needs, if any.
+    seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
+    """
+
+    name: str
+    description: str
+    module: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    needs_body: bool = False
+    trained: str | None = None
+    seeded: bool = False
+
+    def skip(self, scene: Scene) -> str | None:
+        """Why this method cannot do that scene, or None."""
+        if self.needs_body and not scene.dressed:
+            return f"{self.name} moves a garment with a body's joints; this scene has no body"
+        return None
+
+    def make(self, *, models: Path, seed: int, device: str = "cpu") -> Method:
+        """A fresh method for one cell; `models` is the folder of trained networks."""
+        module = importlib.import_module(self.module)
+        return module.make(models=models, seed=seed, device=device, **self.options)

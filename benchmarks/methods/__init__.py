@@ -1,0 +1,73 @@
+"""The visible tuple of methods: one line each. Nothing is imported until a cell needs it."""
+
+from __future__ import annotations
+
+from ..method import MethodEntry
+
+_SIMULATION = "benchmarks.methods.simulation"
+_TRUNCATED = "benchmarks.methods.truncated_newton"
+_NETWORKS = "benchmarks.methods.networks"
+
+METHODS = (
+    MethodEntry(
+        name="simulation",
+        description="the reference: backward Euler minimised to tolerance 1e-6",
+        module=_SIMULATION,
+    ),
+    MethodEntry(
+        name="skinning",
+        description="the garment follows the body's joints, nothing else: the free baseline",
+        module="benchmarks.methods.skinning",
+        needs_body=True,
+    ),
+    MethodEntry(
+        name="untrained",
+        description="the SNUG network before its first training step",
+        module=_NETWORKS,
+        options={"kind": "untrained"},
+        needs_body=True,
+        trained="untrained",
+        seeded=True,
+    ),
+    MethodEntry(
+        name="snug",
+        description="recurrent network trained on the energies alone (Santesteban et al. 2022)",
+        module=_NETWORKS,
+        options={"kind": "snug"},
+        needs_body=True,
+        trained="snug",
+        seeded=True,
+    ),
+    MethodEntry(
+        name="supervised",
+        description="the SNUG network trained on simulated vertices instead",
+        module=_NETWORKS,
+        options={"kind": "supervised"},
+        needs_body=True,
+        trained="supervised",
+        seeded=True,
+    ),
+    MethodEntry(
+        name="pbns",
+        description="static pose-space deformation trained on the energies (Bertiche et al. 2021)",
+        module=_NETWORKS,
+        options={"kind": "pbns"},
+        needs_body=True,
+        trained="pbns",
+        seeded=True,
+    ),
+    *(
+        MethodEntry(
+            name=f"newton-{cut}",
+            description=f"the reference's Newton method, stopped after {cut} iteration{'s' * (cut > 1)} a step",
+            module=_TRUNCATED,
+            options={"iterations": cut},
+        )
+        for cut in (1, 2, 4, 8)
+    ),
+)
+
+
+def find_method(name: str) -> MethodEntry:
+    """The entry of that name. Raises KeyError."""
+    return {entry.name: entry for entry in METHODS}[name]

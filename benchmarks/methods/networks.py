@@ -1,0 +1,48 @@
+"""The trained networks, rolled out one frame at a time as an application would run them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from reference_sim import Trajectory
+
+from ..scene import BuiltScene
+
+
+def model_path(models: Path, kind: str, seed: int) -> Path:
+    """Where the model of that kind and seed lies."""
+    return models / f"{kind}-seed{seed}.safetensors"
+
+
+@dataclass
+class Network:
+    """A model read from its file. Features are made and the network is warmed up before the clock runs."""
+
+    path: Path
+    device: str
+
+    def prepare(self, scene: BuiltScene) -> None:
+        from snug.dresser import DressedBody
+        from snug.trained_model import TrainedModel
+
+        assert scene.dressed is not None
+        self.model = TrainedModel.load(self.path)
+        self.motion = scene.dressed.motion
+        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+
+    def run(self) -> Trajectory:
+        from snug.rollout import roll_out
+
+        return roll_out(self.model, self.dressed, self.motion)
+
+    def held(self) -> Trajectory:
+        """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""
+        from snug.rollout import roll_out
+
+        return roll_out(self.model, self.dressed, self.motion, held_pose=True)
+
+
+def make(*, models: Path, seed: int, device: str, kind: str) -> Network:
+    """The network of that kind ("snug", "supervised", "pbns" or "untrained") and seed."""
+    return Network(model_path(models, kind, seed), device)

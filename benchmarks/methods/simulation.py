@@ -1,0 +1,47 @@
+"""The reference simulator, to its full tolerance: every other method is measured against it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from reference_sim import Trajectory, simulate
+
+from ..scene import BuiltScene
+
+
+@dataclass
+class Simulation:
+    """Newton steps until the gradient is within tolerance, or stopped after `max_iterations` a step."""
+
+    options: dict[str, Any]
+    scene: BuiltScene | None = None
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Settle the start, and compile the kernels by simulating two frames that nobody looks at."""
+        self.scene = scene
+        self._simulate(frames=min(2, scene.frames))
+
+    def run(self) -> Trajectory:
+        """All frames."""
+        assert self.scene is not None
+        return self._simulate(frames=self.scene.frames)
+
+    def _simulate(self, *, frames: int) -> Trajectory:
+        scene = self.scene
+        assert scene is not None
+        return simulate(
+            scene.cloth,
+            scene.energies,
+            dt=scene.dt,
+            frames=frames,
+            obstacle=scene.obstacle,
+            start=scene.start,
+            **self.options,
+        )
+
+
+def make(*, models: Path, seed: int, device: str) -> Simulation:
+    """A simulation to the reference's own tolerance."""
+    return Simulation(options={})

@@ -1,0 +1,66 @@
+"""The garment follows the body's joints and nothing else: the free baseline that belongs in every table.
+
+Weights are smoothed as much as those of the networks' default recipe, so that what a network adds to
+skinning is all that tells them apart.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+from reference_sim import Trajectory
+
+from ..scene import BuiltScene
+
+WARM_UP = 10
+
+
+class Skinning:
+    """One linear blend a frame; joint transforms are ready before, as for the networks."""
+
+    def prepare(self, scene: BuiltScene) -> None:
+        from snug.dresser import DressedBody
+        from snug.recipe import DEFAULT
+        from snug.skinning import skin
+
+        assert scene.dressed is not None
+        self.motion = scene.dressed.motion
+        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.rest, self.weights = dressed.rest(), dressed.weights(DEFAULT.smoothing)
+        self.transforms = dressed.transforms(self.motion.poses)
+        self.pelvis = dressed.pelvis(self.motion)
+        self.faces = np.asarray(scene.cloth.faces)
+        for frame in range(min(WARM_UP, self.motion.frames)):
+            skin(self.rest, self.weights, self.transforms[frame])
+
+    def run(self) -> Trajectory:
+        import torch
+
+        from snug.skinning import skin
+
+        frames = self.motion.frames
+        posed = np.empty((frames, *self.rest.shape))
+        seconds = np.empty(frames)
+        with torch.inference_mode():
+            for frame in range(frames):
+                start = time.perf_counter()
+                vertices = skin(self.rest, self.weights, self.transforms[frame])
+                seconds[frame] = time.perf_counter() - start
+                posed[frame] = vertices.numpy()
+        return Trajectory(
+            positions=posed + self.pelvis[:, None],
+            faces=self.faces,
+            times=np.arange(frames) / self.motion.fps,
+            frame_seconds=seconds,
+            status="ok",
+            reason="",
+            provenance={"method": "skinning"},
+            frame_fields={},
+        )
+
+
+def make(*, models: Path, seed: int, device: str) -> Skinning:
+    """Skinning alone; it has no seed and no model."""
+    return Skinning()

@@ -1,0 +1,12 @@
+"""The reference's own Newton method, cut short: the baseline that a fast approximation has to beat."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .simulation import Simulation
+
+
+def make(*, models: Path, seed: int, device: str, iterations: int) -> Simulation:
+    """A simulation that stops every step after `iterations` Newton iterations, converged or not."""
+    return Simulation(options={"max_iterations": iterations})

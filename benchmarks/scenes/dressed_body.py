@@ -1,0 +1,73 @@
+"""A body in a T-shirt, doing one motion. The simulator sees the body as a moving mesh and nothing more.
+
+Before the motion starts the shirt settles: the body, already facing and standing as in the first frame,
+moves its limbs from the T-pose into the first pose, then holds still for a while.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from reference_sim import Cloth, Material, Obstacle, Trajectory, simulate
+from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
+
+from ..presets import Preset
+from ..scene import BuiltScene, Dressed
+from ..wardrobe import Wardrobe
+
+HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
+
+
+def build(name: str, preset: Preset, wardrobe: Wardrobe) -> BuiltScene:
+    """The built scene of "dressed/<motion>"."""
+    body, garment = wardrobe.body, wardrobe.garment
+    motion = wardrobe.motions[name.split("/", 1)[1]]
+    cloth = Cloth(garment.rest_positions, garment.faces, Material())
+    energies = declared_energies(cloth)
+    obstacle = Obstacle(
+        body.vertices(motion.poses, motion.translations), body.faces, rest_positions=body.shaped()
+    )
+    return BuiltScene(
+        name=name,
+        cloth=cloth,
+        energies=energies,
+        dt=1.0 / motion.fps,
+        frames=motion.frames,
+        settle=lambda: settled(cloth, energies, wardrobe, motion, preset.settle_frames),
+        obstacle=obstacle,
+        origin_heights=body.joints()[0, 1] + motion.translations[:, 1],
+        dressed=Dressed(body, garment, motion),
+    )
+
+
+def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
+    """The paper's terms of a garment; inertia comes with the time step."""
+    return (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth))
+
+
+def settled(
+    cloth: Cloth, energies: tuple[Energy, ...], wardrobe: Wardrobe, motion, frames: int
+) -> np.ndarray:
+    """Positions (V,3) [m] of the cloth at rest on the body in the motion's first pose.
+
+    Raises RuntimeError when the simulation of the approach did not stay finite.
+    """
+    from snug.motion import transition
+
+    body = wardrobe.body
+    first = motion.poses[0]
+    t_pose = np.zeros_like(first)
+    t_pose[0] = first[0]
+    approach = transition(t_pose, first, frames)
+    poses = np.concatenate([approach, np.repeat(first[None], int(HOLD * frames), axis=0)])
+    translations = np.repeat(motion.translations[:1], len(poses), axis=0)
+    obstacle = Obstacle(body.vertices(poses, translations), body.faces, rest_positions=body.shaped())
+    # The shirt, still in its rest shape, goes where the root takes a body in T-pose: a rigid motion.
+    root = body.transforms(t_pose[None], translations[:1])[0, 0]
+    start = cloth.rest_positions @ root[:, :3].T + root[:, 3]
+    trajectory: Trajectory = simulate(
+        cloth, energies, dt=1.0 / motion.fps, frames=len(poses), obstacle=obstacle, start=start
+    )
+    end = trajectory.positions[-1]
+    if not np.isfinite(end).all():
+        raise RuntimeError(f"the approach to the first pose of {motion.name} ended as {trajectory.status}")
+    return end

@@ -1,0 +1,45 @@
+"""A thrown sheet under its weight alone: backward Euler's own discrete answer is exact.
+
+    x_n = x_0 + n dt v_0 + g dt^2 n (n+1)/2
+
+The parabola of the continuous problem is not the answer: at 30 frames per second it is 0.16 m away after
+one second. With weight alone every vertex moves alike, so that strain and bending have nothing to do and
+are not declared.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from reference_sim import Cloth, Material
+from reference_sim.energies import Gravity
+from reference_sim.material import GRAVITY
+
+from ..presets import Preset
+from ..scene import BuiltScene
+from .sheet import square_sheet
+
+VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s]
+
+
+def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
+    """The built scene with its exact answer; the wardrobe is not looked at."""
+    positions, faces = square_sheet(preset.sheet_cells, 0.4)
+    cloth = Cloth(positions, faces, Material())
+    dt, frames = 1.0 / 30.0, preset.sheet_frames
+    return BuiltScene(
+        name=name,
+        cloth=cloth,
+        energies=(Gravity(cloth),),
+        dt=dt,
+        frames=frames,
+        settle=lambda: positions,
+        start_velocity=np.tile(VELOCITY, (len(positions), 1)),
+        exact=exact_fall(positions, VELOCITY, dt, frames),
+    )
+
+
+def exact_fall(start: np.ndarray, velocity: np.ndarray, dt: float, frames: int) -> np.ndarray:
+    """(T,V,3) [m] of backward Euler from start (V,3) [m] with one velocity (3,) [m/s]."""
+    n = np.arange(frames)[:, None, None]
+    fall = np.array([0.0, -GRAVITY, 0.0]) * dt**2 * n * (n + 1) / 2
+    return start + n * dt * velocity + fall
