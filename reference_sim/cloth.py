@@ -108,10 +108,11 @@ class Cloth:
         order = np.argsort(key, kind="stable")
         unique, start, count = np.unique(key[order], return_index=True, return_counts=True)
         if (count > 2).any():
-            edge = unique[np.argmax(count > 2)]
-            faces = order[start[np.argmax(count > 2)] :][: count.max()] // 3
+            bad = np.argmax(count > 2)
+            edge = unique[bad]
+            faces = order[start[bad] :][: count[bad]] // 3
             raise MeshError(
-                f"edge ({edge // self.vertex_count}, {edge % self.vertex_count}) has {count.max()} faces "
+                f"edge ({edge // self.vertex_count}, {edge % self.vertex_count}) has {count[bad]} faces "
                 f"{sorted(faces.tolist())}: a cloth is manifold, split it"
             )
         edges = np.stack([unique // self.vertex_count, unique % self.vertex_count], axis=1)
