@@ -1,0 +1,75 @@
+"""The membrane constants against numbers worked out by hand, and what a material refuses."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import FrozenInstanceError
+
+import pytest
+
+from reference_sim import GRAVITY, Material
+
+
+def test_the_default_cotton_has_the_constants_that_the_paper_prints():
+    cotton = Material()
+    # Printed with three digits: 11.1, 20.9 N/m and 3.96e-5 J.
+    assert cotton.lame_mu == pytest.approx(11.1, abs=0.05)
+    assert cotton.lame_lambda == pytest.approx(20.9, abs=0.05)
+    E, nu, t = 70e3, 0.485, 0.47e-3
+    assert cotton.bending_stiffness == pytest.approx(50 * E * t**3 / (12 * (1 - nu**2)), rel=2e-3)
+
+
+def test_constants_of_a_material_with_round_numbers():
+    # mu = 2 * 9 / (2 * 1.5) = 6, lambda = 2 * 9 * 0.5 / 0.75 = 12, E2 = E t = 18, nu2 = nu.
+    m = Material(young_modulus=9.0, poisson_ratio=0.5, thickness=2.0, density=3.0, bending_stiffness=0.0)
+    assert m.lame_mu == pytest.approx(6.0, rel=1e-15)
+    assert m.lame_lambda == pytest.approx(12.0, rel=1e-15)
+    assert m.membrane_modulus == pytest.approx(18.0, rel=1e-15)
+    assert m.membrane_poisson_ratio == pytest.approx(0.5, rel=1e-15)
+    assert m.areal_density == 6.0
+
+
+@pytest.mark.parametrize("nu", [-0.9, -0.3, 0.0, 0.3, 0.5])
+def test_plane_stress_in_two_dimensions_is_the_same_sheet(nu):
+    """The membrane's own modulus and Poisson ratio are E t and nu: lambda is that of plane stress."""
+    m = Material(young_modulus=5e4, poisson_ratio=nu, thickness=1e-3)
+    assert m.membrane_modulus == pytest.approx(50.0, rel=1e-13)  # round-off
+    assert m.membrane_poisson_ratio == pytest.approx(nu, abs=1e-15)
+
+
+def test_self_weight_stretch_warns_where_a_unit_is_wrong():
+    cotton = Material()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        stretch = cotton.self_weight_stretch(0.7)
+    assert stretch == pytest.approx(426.0 * GRAVITY * 0.7 / 70e3, rel=1e-13)  # rho g L / E
+    with pytest.warns(UserWarning, match=r"young_modulus \[Pa\]"):
+        Material(young_modulus=70e3 * 0.47e-3).self_weight_stretch(0.7)
+
+
+@pytest.mark.parametrize("name", ["young_modulus", "thickness", "density"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+def test_what_must_be_positive_is_refused_by_name(name, value):
+    with pytest.raises(ValueError, match=rf"Material\.{name} = "):
+        Material(**{name: value})
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"poisson_ratio": -1.0},
+        {"poisson_ratio": 0.51},
+        {"poisson_ratio": math.nan},
+        {"bending_stiffness": -1e-9},
+        {"bending_stiffness": math.inf},
+    ],
+)
+def test_other_impossible_values_are_refused_by_name(wrong):
+    with pytest.raises(ValueError, match=rf"Material\.{next(iter(wrong))} = "):
+        Material(**wrong)
+
+
+def test_a_material_is_frozen():
+    with pytest.raises(FrozenInstanceError):
+        Material().density = 1.0
