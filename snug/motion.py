@@ -1,0 +1,222 @@
+"""Motions: joint rotations and root translations over time, from the embedded library or from a file.
+
+A motion follows the convention of `snug.body.Body`: rotation of each joint relative to its parent as
+axis-angle, joint 0 at its rest position plus the translation, y up, facing +z at first, standing at
+translation zero. Only numpy is loaded here, so that names can be listed quickly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices, sole_points
+
+TRAIN: tuple[str, ...] = (
+    "walk", "brisk_walk", "run", "jump", "jumping_jack", "squat", "arm_raise", "arm_circle", "torso_twist",
+    "side_bend", "turn", "sidestep", "bow", "lunge",
+)  # fmt: skip
+# None of these kinds of motion occurs in TRAIN.
+TEST: tuple[str, ...] = ("sudden_stop", "kick", "punch", "spin_jump")
+
+ARMS_NEAR = np.deg2rad(20.0)  # an upper arm this close to the spine's direction pinches the shirt
+
+
+class MotionError(ValueError):
+    """A motion that cannot be read, named or built; the message says where and what to do."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """poses: (T, 24, 3) axis-angle [rad]; translations: (T, 3) [m]; fps [1/s].
+
+    kind groups motions of one sort ("walk", "jump"); source tells where it came from and every repair.
+    Raises MotionError when the shapes disagree, a number is not finite or there is no frame.
+    """
+
+    name: str
+    poses: np.ndarray
+    translations: np.ndarray
+    fps: float = 30.0
+    kind: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        poses = np.ascontiguousarray(self.poses, dtype=np.float64)
+        translations = np.ascontiguousarray(self.translations, dtype=np.float64)
+        if poses.ndim != 3 or poses.shape[1:] != (24, 3) or len(poses) == 0:
+            raise MotionError(f"motion {self.name}: poses have shape {poses.shape}; give (frames, 24, 3)")
+        if translations.shape != (len(poses), 3):
+            raise MotionError(
+                f"motion {self.name}: translations have shape {translations.shape}; give ({len(poses)}, 3)"
+            )
+        if not (np.isfinite(poses).all() and np.isfinite(translations).all()):
+            raise MotionError(f"motion {self.name}: not every number is finite; repair the file")
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise MotionError(f"motion {self.name}: {self.fps} frames per second; give a positive rate")
+        object.__setattr__(self, "poses", poses)
+        object.__setattr__(self, "translations", translations)
+
+    @property
+    def frames(self) -> int:
+        return len(self.poses)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last."""
+        return (self.frames - 1) / self.fps
+
+    def cut(self, start: int, stop: int) -> Motion:
+        """Frames start to stop - 1. Raises MotionError when nothing is left."""
+        return replace(self, poses=self.poses[start:stop], translations=self.translations[start:stop])
+
+
+def make_motion(name: str) -> Motion:
+    """A motion of the embedded library at 30 fps, arms already spread clear of the torso.
+
+    Deterministic. Raises MotionError for a name that is in neither TRAIN nor TEST.
+    """
+    if name not in TRAIN + TEST:
+        raise MotionError(f"unknown motion '{name}'; the library has: {', '.join(TRAIN + TEST)}")
+    from snug.motions import build
+
+    return build(name)
+
+
+def load_motions(path: str | Path, *, spread_degrees: float = 20.0, fps: float = 30.0) -> list[Motion]:
+    """Motions from a .amc or .npz file, or from every such file of a folder, in the order of their names.
+
+    Each comes back whole, at `fps`, placed on the floor at the origin facing +z, with the arms spread by
+    `spread_degrees` (0 leaves them as recorded). CMU files (.amc) need their skeleton (.asf) beside them.
+    Raises MotionError, one line with file, line and remedy, for anything that cannot be read.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise MotionError(f"{path}: no such file or folder; give an .amc or .npz file, or a folder of them")
+    files = [path]
+    if path.is_dir():
+        files = sorted(file for file in path.iterdir() if file.suffix.lower() in (".amc", ".npz"))
+    if not files:
+        raise MotionError(f"{path}: holds no .amc and no .npz file; give a folder of motion capture clips")
+    clips = (spread_arms(resample(place(_read(file)), fps), spread_degrees) for file in files)
+    return [_flag_arms(clip) for clip in clips]
+
+
+def _flag_arms(motion: Motion) -> Motion:
+    """Note in the source how often an upper arm is too near the torso for a shirt between them."""
+    share = (arm_clearance(motion).min(axis=1) < ARMS_NEAR).mean()
+    if share == 0.0:
+        return motion
+    note = f"an upper arm within {np.degrees(ARMS_NEAR):.0f} degrees of the torso in {100 * share:.0f} % of frames"
+    return replace(motion, source=f"{motion.source}; {note}")
+
+
+def _read(file: Path) -> Motion:
+    from snug.formats import READERS
+
+    reader = READERS.get(file.suffix.lower())
+    if reader is None:
+        remedy = " Give the .amc clips that belong to it." if file.suffix.lower() == ".asf" else ""
+        raise MotionError(
+            f"{file}: unknown kind of file; motions are read from {', '.join(READERS)}.{remedy}"
+        )
+    return reader(file)
+
+
+def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
+    """Turn both shoulders outward and up by the same angle in all frames, about the chest's front axis.
+
+    So did the authors of SNUG with their data: a T-shirt pinched between upper arm and torso has no good
+    solution (and the simulator's contact planes no good choice).
+    """
+    if degrees == 0.0:
+        return motion
+    poses = motion.poses.copy()
+    for joint, sign in ((JOINT["left_shoulder"], 1.0), (JOINT["right_shoulder"], -1.0)):
+        turn = rotation_matrices(np.array([0.0, 0.0, sign * np.deg2rad(degrees)]))
+        poses[:, joint] = axis_angles(turn @ rotation_matrices(poses[:, joint]))
+    source = f"{motion.source}; arms spread by {degrees:g} degrees".lstrip("; ")
+    return replace(motion, poses=poses, source=source)
+
+
+def resample(motion: Motion, fps: float = 30.0) -> Motion:
+    """The same motion at another frame rate: spherical interpolation of rotations, linear of translations.
+
+    First and last pose stay. Where the rates do not divide, the clip is stretched by at most half a new
+    frame in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed).
+    """
+    if not (np.isfinite(fps) and fps > 0):
+        raise MotionError(f"motion {motion.name}: cannot resample to {fps} frames per second")
+    if motion.frames == 1 or fps == motion.fps:
+        return replace(motion, fps=fps)
+    intervals = max(1, round(motion.duration * fps))
+    at = np.linspace(0.0, motion.frames - 1.0, intervals + 1)
+    left = np.minimum(at.astype(int), motion.frames - 2)
+    share = at - left
+    poses = _slerp(motion.poses[left], motion.poses[left + 1], share[:, None])
+    low, high = motion.translations[left], motion.translations[left + 1]
+    return replace(motion, poses=poses, translations=low + share[:, None] * (high - low), fps=fps)
+
+
+def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarray:
+    """From one pose to another in `frames` frames, both ends included, at rest at both.
+
+    pose_a, pose_b: (24, 3) [rad] -> (frames, 24, 3) [rad]. Each joint turns along the shortest arc with
+    the minimum-jerk timing 10 s^3 - 15 s^4 + 6 s^5 (Flash and Hogan 1985).
+    """
+    if frames < 2:
+        raise MotionError(f"a transition needs at least 2 frames, not {frames}")
+    s = np.linspace(0.0, 1.0, frames)[:, None]
+    ease = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    shape = (frames, 24, 3)
+    return _slerp(np.broadcast_to(pose_a, shape), np.broadcast_to(pose_b, shape), ease)
+
+
+def place(motion: Motion) -> Motion:
+    """Move a clip so that it starts above the origin, facing +z, with its feet on the floor y = 0.
+
+    The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second
+    percentile of the lower foot's height over all frames is taken for the floor.
+    """
+    root = rotation_matrices(motion.poses[:, 0])
+    facing = root[0, :, 2]
+    # A body lying on its back or front has no heading; it keeps the recorded one.
+    heading = np.arctan2(facing[0], facing[2]) if np.hypot(facing[0], facing[2]) > 0.1 else 0.0
+    turn = rotation_matrices(np.array([0.0, -heading, 0.0]))
+    poses = motion.poses.copy()
+    poses[:, 0] = axis_angles(turn @ root)
+    translations = (motion.translations - motion.translations[0]) @ turn.T
+    lowest = sole_points(poses, translations)[..., 1].min(axis=1)
+    translations[:, 1] -= np.percentile(lowest, 2.0)
+    return replace(motion, poses=poses, translations=translations)
+
+
+def joint_speeds(motion: Motion) -> np.ndarray:
+    """Angular speed of every joint relative to its parent. -> (T - 1, 24) [rad/s]."""
+    rotations = rotation_matrices(motion.poses)
+    steps = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
+    return np.linalg.norm(steps, axis=-1) * motion.fps
+
+
+def arm_clearance(motion: Motion) -> np.ndarray:
+    """Angle between each upper arm and the downward spine: small when the arm lies on the torso.
+
+    -> (T, 2) [rad], left and right.
+    """
+    joints = joint_positions(motion.poses, motion.translations)
+    down = joints[:, JOINT["spine1"]] - joints[:, JOINT["spine3"]]
+    angles = []
+    for side in ("left", "right"):
+        arm = joints[:, JOINT[f"{side}_elbow"]] - joints[:, JOINT[f"{side}_shoulder"]]
+        cosine = (arm * down).sum(-1) / np.linalg.norm(arm, axis=-1) / np.linalg.norm(down, axis=-1)
+        angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return np.stack(angles, axis=1)
+
+
+def _slerp(poses_a: np.ndarray, poses_b: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Interpolate along the shortest arc: (T, 24, 3), (T, 24, 3), (T, 1) in [0, 1] -> (T, 24, 3)."""
+    start = rotation_matrices(poses_a)
+    arc = axis_angles(np.swapaxes(start, -1, -2) @ rotation_matrices(poses_b))
+    return axis_angles(start @ rotation_matrices(arc * share[..., None]))
