@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 from numba import njit
+from scipy.spatial import cKDTree
 
 from .cloth import MeshError
 
@@ -63,7 +64,9 @@ class Obstacle:
             if rest.shape != self.positions.shape[1:]:
                 raise MeshError(f"obstacle rest_positions {rest.shape}: expected {self.positions.shape[1:]}")
             self.rest_centroids = np.ascontiguousarray(rest[self.faces].mean(axis=1))
-        self._tree: tuple[int, igl.AABB, np.ndarray] | None = None
+        self._seen: list[np.ndarray] = []  # rest points asked about so far, and
+        self._reachable = np.arange(len(self.faces))  # the faces that any of them may meet
+        self._trees: dict[bool, tuple[int, igl.AABB, np.ndarray, np.ndarray]] = {}
 
     @property
     def frames(self) -> int:
@@ -73,17 +76,55 @@ class Obstacle:
         """Vertices (B, 3) at `frame`; the last frame holds on for ever."""
         return self.positions[min(frame, self.frames - 1)]
 
-    def _closest(self, points: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Nearest face and point on the whole mesh; the tree of the last frame asked for is kept."""
+    def _closest(
+        self, points: np.ndarray, frame: int, *, reachable: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Nearest face and point, on the whole mesh or on the reachable faces; the last tree is kept."""
         frame = min(frame, self.frames - 1)
-        if self._tree is None or self._tree[0] != frame:
+        if reachable not in self._trees or self._trees[reachable][0] != frame:
             vertices = np.asfortranarray(self.at(frame))
+            faces = self.faces[self._reachable] if reachable else self.faces
             tree = igl.AABB()
-            tree.init(vertices, self.faces)
-            self._tree = (frame, tree, vertices)
-        _, tree, vertices = self._tree
-        _, face, nearest = tree.squared_distance(vertices, self.faces, np.asfortranarray(points))
-        return np.asarray(face, dtype=np.int64).ravel(), np.ascontiguousarray(nearest)
+            tree.init(vertices, faces)
+            self._trees[reachable] = (frame, tree, vertices, faces)
+        _, tree, vertices, faces = self._trees[reachable]
+        _, face, nearest = tree.squared_distance(vertices, faces, np.asfortranarray(points))
+        face = np.asarray(face, dtype=np.int64).ravel()
+        return self._reachable[face] if reachable else face, np.ascontiguousarray(nearest)
+
+    def _reach(self, rest_points: np.ndarray) -> None:
+        """Let the tree of reachable faces cover what these rest points may meet.
+
+        Most of a body is head, hands and feet; leaving them out makes the tree several times smaller and
+        changes no answer.
+        """
+        if any(rest_points is seen for seen in self._seen):
+            return
+        assert self.rest_centroids is not None
+        self._seen.append(rest_points)
+        gap, _ = cKDTree(np.concatenate(self._seen)).query(
+            self.rest_centroids, distance_upper_bound=self.region
+        )
+        near = np.flatnonzero(np.isfinite(gap))
+        self._reachable = near if near.size else np.arange(len(self.faces))
+        self._trees.pop(True, None)
+
+    def _nearest_allowed(
+        self, points: np.ndarray, frame: int, rest_points: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Face (S,), closest point (S, 3) and its barycentric place (S, 3), under the rule of regions."""
+        vertices = self.at(frame)
+        local = self.rest_centroids is not None and rest_points is not None
+        if local:
+            self._reach(rest_points)
+        face, nearest = self._closest(points, frame, reachable=local)
+        if local:
+            offset = self.rest_centroids[face] - rest_points
+            far = np.flatnonzero(np.einsum("si,si->s", offset, offset) > self.region**2)
+            _closest_allowed(
+                points, far, rest_points, vertices, self.faces, self.rest_centroids, self.region, face, nearest
+            )
+        return face, nearest, _barycentric(nearest, vertices[self.faces[face]])
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         """Contact planes at `frame` for samples at points (S, 3), whose rest positions are rest_points (S, 3).
@@ -92,17 +133,7 @@ class Obstacle:
         sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
         sample's own position.
         """
-        vertices = self.at(frame)
-        face, nearest = self._closest(points, frame)
-        if self.rest_centroids is not None and rest_points is not None:
-            offset = self.rest_centroids[face] - rest_points
-            far = np.flatnonzero(np.einsum("si,si->s", offset, offset) > self.region**2)
-            face, nearest = face.copy(), nearest.copy()
-            _closest_allowed(
-                points, far, rest_points, vertices, self.faces, self.rest_centroids, self.region, face, nearest
-            )
-        corners = vertices[self.faces[face]]
-        barycentric = _barycentric(nearest, corners)
+        face, nearest, barycentric = self._nearest_allowed(points, frame, rest_points)
         smooth = np.einsum("sa,sai->si", barycentric, self._vertex_normals(frame)[self.faces[face]])
         smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
         offset = points - nearest
@@ -118,16 +149,15 @@ class Obstacle:
 
         The best known initial guess for a garment: the body's own motion, face by face.
         """
-        planes = self.planes(points, frame - 1, rest_points)
-        before = _face_frames(self.at(frame - 1)[self.faces[planes.faces]])
-        after = _face_frames(self.at(frame)[self.faces[planes.faces]])
-        anchor = np.einsum("sa,sai->si", planes.barycentric, self.at(frame)[self.faces[planes.faces]])
-        local = np.einsum("sij,si->sj", before, points - planes.points)
-        return anchor + np.einsum("sij,sj->si", after, local)
+        face, nearest, barycentric = self._nearest_allowed(points, frame - 1, rest_points)
+        corners = self.at(frame)[self.faces[face]]
+        before, after = _face_frames(self.at(frame - 1)[self.faces[face]]), _face_frames(corners)
+        local = np.einsum("sij,si->sj", before, points - nearest)
+        return np.einsum("sa,sai->si", barycentric, corners) + np.einsum("sij,sj->si", after, local)
 
     def signed_distance(self, points: np.ndarray, frame: int) -> np.ndarray:
         """True distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
-        _, nearest = self._closest(points, frame)
+        _, nearest = self._closest(points, frame, reachable=False)
         distance = np.linalg.norm(points - nearest, axis=1)
         near = np.flatnonzero(distance < 0.15)  # nothing of a body is deeper than that below its skin
         vertices = np.asfortranarray(self.at(frame))

@@ -90,7 +90,7 @@ def _wrap(angle):
 
 
 @njit(cache=True, inline="always")
-def _half(x, i0, i1, i2, m, weights):
+def _half(x, i0, i1, i2, m, w):
     """One face of a hinge: m = n/|n|^2 and the weights w_a with d theta/d x_a = +- w_a m.
 
     Moving the tip along the normal by h (its height over the edge) turns the face by one radian; the edge's
@@ -103,20 +103,27 @@ def _half(x, i0, i1, i2, m, weights):
     n2 = nx * nx + ny * ny + nz * nz
     m[0], m[1], m[2] = nx / n2, ny / n2, nz / n2
     t = (ex * rx + ey * ry + ez * rz) / length
-    weights[0], weights[1], weights[2] = length - t, t, -length
+    w[0], w[1], w[2] = length - t, t, -length
     return length, n2
 
 
 @njit(cache=True, inline="always")
-def _angle(e, length, mA, nA2, mB, nB2):
-    """Dihedral angle from the scaled normals m = n/|n|^2; the second one points the other way."""
-    nA, nB = mA * nA2, mB * -nB2
-    sine = (
-        (nA[1] * nB[2] - nA[2] * nB[1]) * e[0]
-        + (nA[2] * nB[0] - nA[0] * nB[2]) * e[1]
-        + (nA[0] * nB[1] - nA[1] * nB[0]) * e[2]
-    ) / length
-    return np.arctan2(sine, nA[0] * nB[0] + nA[1] * nB[1] + nA[2] * nB[2])
+def _angle(x, i0, i1, length, mA, nA2, mB, nB2):
+    """Dihedral angle from m = n/|n|^2 of both faces; the second one points the other way."""
+    cx = mB[1] * mA[2] - mB[2] * mA[1]
+    cy = mB[2] * mA[0] - mB[0] * mA[2]
+    cz = mB[0] * mA[1] - mB[1] * mA[0]
+    ex, ey, ez = x[i1, 0] - x[i0, 0], x[i1, 1] - x[i0, 1], x[i1, 2] - x[i0, 2]
+    scale = nA2 * nB2
+    sine = scale * (cx * ex + cy * ey + cz * ez) / length
+    return np.arctan2(sine, -scale * (mA[0] * mB[0] + mA[1] * mB[1] + mA[2] * mB[2]))
+
+
+@njit(cache=True, inline="always")
+def _from_rest(theta, rest):
+    """theta - theta_0 in [-pi, pi)."""
+    theta -= rest
+    return theta - 2 * np.pi * np.floor((theta + np.pi) / (2 * np.pi))
 
 
 @njit(cache=True)
@@ -125,10 +132,10 @@ def dihedral_angles(x, hinges):
     mA, mB, w = np.empty(3), np.empty(3), np.empty(3)
     angles = np.empty(hinges.shape[0])
     for h in range(hinges.shape[0]):
-        i0, i1, i2, i3 = hinges[h]
+        i0, i1, i2, i3 = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
         length, nA2 = _half(x, i0, i1, i2, mA, w)
         _, nB2 = _half(x, i0, i1, i3, mB, w)
-        angles[h] = _angle(x[i1] - x[i0], length, mA, nA2, mB, nB2)
+        angles[h] = _angle(x, i0, i1, length, mA, nA2, mB, nB2)
     return angles
 
 
@@ -137,11 +144,10 @@ def _gradient(x, hinges, stiffness, rest, gradient):
     mA, mB, wA, wB = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     total = 0.0
     for h in range(hinges.shape[0]):
-        i0, i1, i2, i3 = hinges[h]
+        i0, i1, i2, i3 = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
         length, nA2 = _half(x, i0, i1, i2, mA, wA)
         _, nB2 = _half(x, i0, i1, i3, mB, wB)
-        theta = _angle(x[i1] - x[i0], length, mA, nA2, mB, nB2) - rest[h]
-        theta -= 2 * np.pi * np.floor((theta + np.pi) / (2 * np.pi))
+        theta = _from_rest(_angle(x, i0, i1, length, mA, nA2, mB, nB2), rest[h])
         total += 0.5 * stiffness[h] * theta * theta
         s = stiffness[h] * theta
         for i in range(3):
@@ -153,60 +159,61 @@ def _gradient(x, hinges, stiffness, rest, gradient):
 
 
 @njit(cache=True, inline="always")
-def _add_half_hessian(x, i0, i1, i2, tip, sign, m, n2, w, length, H):
-    """Add sign * d(w_a m)/dx_b for the three vertices of one face: m dw_a/dx_b^T + w_a (dm/dn) (dn/dx_b)."""
-    e, r = np.empty(3), np.empty(3)
-    for i in range(3):
-        e[i] = x[i1, i] - x[i0, i]
-        r[i] = x[i2, i] - x[i0, i]
-    dt = np.empty((3, 3))  # derivative of the tip's foot t = r.e/|e| by each vertex
-    dL = np.zeros((3, 3))  # derivative of |e|
-    N = np.empty((3, 3, 3))  # dn/dx_b as a cross-product matrix of c_b: dn = c_b x dx_b
-    for i in range(3):
-        unit = e[i] / length
-        dt[1, i] = (r[i] - w[1] * unit) / length
-        dt[2, i] = unit
-        dt[0, i] = -dt[1, i] - dt[2, i]
-        dL[1, i], dL[0, i] = unit, -unit
+def _add_half_hessian(x, i0, i1, i2, tip, scale, m, n2, w, length, D, B):
+    """Add scale * d(w_a m)/dx_b of one face to the element's matrix B.
+
+    d(w_a m)/dx_b = m dw_a/dx_b^T + w_a (dm/dn) (c_b x .), with dm/dn = (I - 2 n n^T/|n|^2)/|n|^2 and the
+    vectors c_b of dn = sum_b c_b x dx_b. D is scratch for dm/dx_b.
+    """
     for b in range(3):
-        c0 = -r[0] if b == 1 else (e[0] if b == 2 else r[0] - e[0])
-        c1 = -r[1] if b == 1 else (e[1] if b == 2 else r[1] - e[1])
-        c2 = -r[2] if b == 1 else (e[2] if b == 2 else r[2] - e[2])
-        N[b, 0, 0], N[b, 0, 1], N[b, 0, 2] = 0.0, -c2, c1
-        N[b, 1, 0], N[b, 1, 1], N[b, 1, 2] = c2, 0.0, -c0
-        N[b, 2, 0], N[b, 2, 1], N[b, 2, 2] = -c1, c0, 0.0
-    for b in range(3):
+        column = 3 * tip if b == 2 else 3 * b
+        c = D[3]  # c_b, then the derivatives of the tip's foot t and of the edge's length
+        for i in range(3):
+            e, r = x[i1, i] - x[i0, i], x[i2, i] - x[i0, i]
+            unit = e / length
+            along = (r - w[1] * unit) / length
+            if b == 1:
+                c[i], D[4, i], D[5, i] = -r, along, unit
+            elif b == 2:
+                c[i], D[4, i], D[5, i] = e, unit, 0.0
+            else:
+                c[i], D[4, i], D[5, i] = r - e, -along - unit, -unit
+        D[0, 0], D[0, 1], D[0, 2] = 0.0, -c[2] / n2, c[1] / n2
+        D[1, 0], D[1, 1], D[1, 2] = c[2] / n2, 0.0, -c[0] / n2
+        D[2, 0], D[2, 1], D[2, 2] = -c[1] / n2, c[0] / n2, 0.0
         for j in range(3):
-            mN = m[0] * N[b, 0, j] + m[1] * N[b, 1, j] + m[2] * N[b, 2, j]
-            dw0, dw1, dw2 = dL[b, j] - dt[b, j], dt[b, j], -dL[b, j]
-            column = 3 * (tip if b == 2 else b) + j
+            mN = 2.0 * n2 * (m[0] * D[0, j] + m[1] * D[1, j] + m[2] * D[2, j])
+            dt, dL = D[4, j], D[5, j]
             for i in range(3):
-                dm = N[b, i, j] / n2 - 2.0 * m[i] * mN
-                H[i, column] += sign * (m[i] * dw0 + w[0] * dm)
-                H[3 + i, column] += sign * (m[i] * dw1 + w[1] * dm)
-                H[3 * tip + i, column] += sign * (m[i] * dw2 + w[2] * dm)
+                dm = scale * (D[i, j] - m[i] * mN)
+                sm = scale * m[i]
+                B[i, column + j] += sm * (dL - dt) + w[0] * dm
+                B[3 + i, column + j] += sm * dt + w[1] * dm
+                B[3 * tip + i, column + j] += -sm * dL + w[2] * dm
 
 
 @njit(cache=True)
 def _hessian(x, hinges, stiffness, rest, blocks):
-    """k [grad theta grad theta^T + (theta - theta_0) Hess theta]."""
+    """k [grad theta grad theta^T + (theta - theta_0) Hess theta].
+
+    The two halves of Hess theta are symmetric only in their sum.
+    """
     mA, mB, wA, wB = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    g = np.empty(12)
-    H = np.empty((12, 12))
+    g, D = np.empty(12), np.empty((6, 3))
     for h in range(hinges.shape[0]):
-        i0, i1, i2, i3 = hinges[h]
+        i0, i1, i2, i3 = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
         length, nA2 = _half(x, i0, i1, i2, mA, wA)
         _, nB2 = _half(x, i0, i1, i3, mB, wB)
-        theta = _angle(x[i1] - x[i0], length, mA, nA2, mB, nB2) - rest[h]
-        theta -= 2 * np.pi * np.floor((theta + np.pi) / (2 * np.pi))
+        theta = _from_rest(_angle(x, i0, i1, length, mA, nA2, mB, nB2), rest[h])
         for i in range(3):
             g[i] = wA[0] * mA[i] - wB[0] * mB[i]
             g[3 + i] = wA[1] * mA[i] - wB[1] * mB[i]
             g[6 + i] = wA[2] * mA[i]
             g[9 + i] = -wB[2] * mB[i]
-        H[:, :] = 0.0
-        _add_half_hessian(x, i0, i1, i2, 2, 1.0, mA, nA2, wA, length, H)
-        _add_half_hessian(x, i0, i1, i3, 3, -1.0, mB, nB2, wB, length, H)
+        B = blocks[h]
         for i in range(12):
             for j in range(12):
-                blocks[h, i, j] = stiffness[h] * (g[i] * g[j] + theta * 0.5 * (H[i, j] + H[j, i]))
+                B[i, j] = stiffness[h] * g[i] * g[j]
+        s = stiffness[h] * theta
+        _add_half_hessian(x, i0, i1, i2, 2, s, mA, nA2, wA, length, D, B)
+        _add_half_hessian(x, i0, i1, i3, 3, -s, mB, nB2, wB, length, D, B)
