@@ -22,8 +22,8 @@ class Wardrobe:
     garment: Garment
     motions: dict[str, Motion]
 
-    def train(self, names: Iterable[str]) -> list[Motion]:
-        """The motions of those names."""
+    def named(self, names: Iterable[str]) -> list[Motion]:
+        """The motions of those names, in that order."""
         return [self.motions[name] for name in names]
 
 

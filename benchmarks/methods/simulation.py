@@ -38,6 +38,7 @@ class Simulation:
             frames=frames,
             obstacle=scene.obstacle,
             start=scene.start,
+            velocity=scene.start_velocity,
             **self.options,
         )
 

@@ -1,0 +1,71 @@
+"""The table printed at the end of a run: what came out, in one screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from .results import Row
+
+COLUMNS = (
+    ("energy/total", "total J"),
+    ("energy/strain", "strain J"),
+    ("energy/bending", "bend J"),
+    ("energy/inertia", "inertia J"),
+    ("curvature/error", "dH 1/m"),
+    ("distance/rms", "rms mm"),
+    ("penetration/vertices", "inside %"),
+    ("cost/frame", "ms/frame"),
+    ("cost/train", "train s"),
+)
+DASH = "-"
+
+
+def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
+    """Means over scenes and seeds of each suite and method; counts of checks and cases; stage times."""
+    parts = []
+    for suite in ("garments", "speed"):
+        of_suite = [row for row in rows if row.suite == suite]
+        for title, kept in _groups(suite, of_suite):
+            parts.append(_table(title, kept))
+    for suite in ("validation", "extremes"):
+        kept = [row for row in rows if row.suite == suite]
+        if kept:
+            counts = {s: sum(row.status == s for row in kept) for s in dict.fromkeys(r.status for r in kept)}
+            parts.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in counts.items()))
+    parts.append("stages: " + ", ".join(f"{stage['name']} {stage['seconds']:.0f} s" for stage in stages))
+    return "\n\n".join(parts)
+
+
+def _groups(suite: str, rows: list[Row]) -> list[tuple[str, list[Row]]]:
+    """All scenes of garments together; of speed each by itself, as errors of different scenes do not add."""
+    if not rows:
+        return []
+    scenes = list(dict.fromkeys(row.scene for row in rows))
+    if suite == "garments":
+        return [(f"garments, mean of {len(scenes)} scene{'s' * (len(scenes) > 1)}", rows)]
+    return [(f"speed, {scene}", [row for row in rows if row.scene == scene]) for scene in scenes]
+
+
+def _table(title: str, rows: list[Row]) -> str:
+    methods = list(dict.fromkeys(row.method for row in rows))
+    values: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        if row.value is not None:
+            values.setdefault((row.method, row.metric), []).append(row.value)
+    columns = [(metric, head) for metric, head in COLUMNS if any((m, metric) in values for m in methods)]
+    lines = [[title, *(head for _, head in columns), "status"]]
+    for method in methods:
+        numbers = [_number(values.get((method, metric))) for metric, _ in columns]
+        statuses = dict.fromkeys(row.status for row in rows if row.method == method)
+        lines.append([method, *numbers, ", ".join(statuses)])
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    return "\n".join(
+        "  ".join(cell.ljust(w) if k in (0, len(widths) - 1) else cell.rjust(w)
+                  for k, (cell, w) in enumerate(zip(line, widths))).rstrip()
+        for line in lines
+    )  # fmt: skip
+
+
+def _number(values: list[float] | None) -> str:
+    return f"{sum(values) / len(values):.4g}" if values else DASH

@@ -1,0 +1,37 @@
+"""The text of --list: every name that the command knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from .methods import METHODS
+from .presets import PRESETS
+from .scenes import PREFIX, SMALL_SCENES
+from .suites import SUITES
+from .suites.extremes import CASES
+from .suites.validation import CHECKS
+
+
+def listing() -> str:
+    """Suites, scenes, methods, motions and presets, one line each."""
+    from snug.motion import TEST, TRAIN
+
+    dressed = [(PREFIX + name, "a body in a T-shirt; unseen in training") for name in TEST]
+    parts = (
+        ("suites", ((s.name, s.description) for s in SUITES)),
+        ("scenes", [*((s.name, s.description) for s in SMALL_SCENES), *dressed]),
+        ("methods", ((m.name, m.description) for m in METHODS)),
+        ("training motions", ((name, "") for name in TRAIN)),
+        ("presets", ((p.name, p.description) for p in PRESETS)),
+        ("validation checks", ((c.name, c.description) for c in CHECKS)),
+        ("extreme cases", ((c.name, c.description) for c in CASES)),
+    )
+    return "\n\n".join(_section(title, rows) for title, rows in parts)
+
+
+def _section(title: str, rows: Iterable[tuple[str, str]]) -> str:
+    rows = list(rows)
+    if not any(description for _, description in rows):
+        return f"{title}\n  {', '.join(name for name, _ in rows)}"
+    width = max(len(name) for name, _ in rows)
+    return "\n".join([title, *(f"  {name:<{width}}  {description}".rstrip() for name, description in rows)])

@@ -1,0 +1,207 @@
+"""What a run will do, decided and checked before anything is created."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .methods import METHODS, find_method
+from .presets import Preset
+from .scene import Scene
+from .scenes import PREFIX, all_scenes
+from .suites import SUITE_NAMES
+from .suites.extremes import CASES, Case
+from .suites.extremes import METHOD as EXTREMES_METHOD
+from .suites.validation import CHECKS, Check
+from .suites.validation import METHOD as VALIDATION_METHOD
+
+if TYPE_CHECKING:
+    from snug.motion import Motion
+
+MEETINGS = ("garments", "speed")  # suites in which scenes meet methods
+
+
+class PlanError(ValueError):
+    """A request that cannot be met; the message names the word and what there is instead."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One scene met by one method with one seed; `suites` are those that report it."""
+
+    scene: Scene
+    method: str
+    seed: int
+    suites: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        return f"{self.scene.name} x {self.method}" + (f" (seed {self.seed})" if self.seed else "")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Everything to be done. train and test are names of motions; files holds those read from files."""
+
+    preset: Preset
+    suites: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    checks: tuple[Check, ...]
+    cases: tuple[Case, ...]
+    train: tuple[str, ...]
+    test: tuple[str, ...]
+    files: dict[str, Motion] = field(default_factory=dict)
+    seeds: tuple[int, ...]
+    device: str
+    folder: Path
+    command: str
+
+    @property
+    def scenes(self) -> tuple[Scene, ...]:
+        """The scenes of all cells, each once."""
+        return tuple({cell.scene.name: cell.scene for cell in self.cells}.values())
+
+    @property
+    def models(self) -> tuple[tuple[str, int], ...]:
+        """(kind, seed) of every network that some cell needs."""
+        wanted = ((find_method(cell.method), cell) for cell in self.cells if runs(cell))
+        return tuple(dict.fromkeys((entry.trained, cell.seed) for entry, cell in wanted if entry.trained))
+
+    @property
+    def needs_wardrobe(self) -> bool:
+        return any(cell.scene.dressed for cell in self.cells)
+
+    @property
+    def needs_training_motions(self) -> bool:
+        return bool(self.models)
+
+    @property
+    def needs_targets(self) -> bool:
+        """Whether training motions have to be simulated."""
+        return any(kind == "supervised" for kind, _ in self.models)
+
+
+def runs(cell: Cell) -> bool:
+    """Whether the cell is computed at all."""
+    return find_method(cell.method).skip(cell.scene) is None
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Names of the motions of a run, training apart from test, and those that came from files."""
+
+    train: tuple[str, ...]
+    test: tuple[str, ...]
+    files: dict[str, Motion]
+
+
+def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Preset) -> Motions:
+    """Which motions train and which test. Raises PlanError (or the reader's own error) for a bad request.
+
+    Without paths: the embedded library with its own division. With paths: the files alone, plus the library
+    where "library" is among the paths. test_names moves motions to the test set; without it the test
+    motions of the library test, and of files alone the first in order of names. A single file tests, and the
+    library trains.
+    """
+    from snug.motion import TEST, TRAIN, load_motions
+
+    files: dict[str, Motion] = {}
+    for path in paths:
+        for motion in load_motions(path) if path != "library" else ():
+            if motion.name in files or motion.name in (*TRAIN, *TEST):
+                raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename one of the files")
+            files[motion.name] = motion
+    with_library = not paths or "library" in paths
+    names = [*sorted(files), *((*TRAIN, *TEST) if with_library else ())]
+    for name in test_names:
+        if name not in names:
+            raise PlanError(f"--test-motions: unknown motion '{name}'; {_nearest(name, names)}")
+    if test_names:
+        test = tuple(name for name in names if name in test_names)
+    else:
+        test = TEST if with_library else tuple(names[:1])
+    train = tuple(name for name in names if name not in test)
+    train = train if test_names else tuple(name for name in train if name not in TEST)
+    if not train:
+        train = tuple(name for name in TRAIN if name not in test)
+    return Motions(train[: preset.train_motions], test[: preset.test_motions], files)
+
+
+def choose_cells(
+    suites: Sequence[str],
+    *,
+    full: bool,
+    preset: Preset,
+    motions: Motions,
+    scenes: Sequence[str],
+    methods: Sequence[str],
+    seeds: Sequence[int],
+) -> tuple[tuple[Cell, ...], tuple[Check, ...], tuple[Case, ...]]:
+    """Cells, checks and cases that the request names. Raises PlanError for a word that names nothing.
+
+    scenes and methods are names or patterns; empty means all. Naming scenes reaches all of each suite.
+    """
+    declared = all_scenes(motions.test)
+    rows = [*(check.name for check in CHECKS), *(case.name for case in CASES)]
+    _check_words("scene", scenes, [*declared, *rows])
+    _check_words("method", methods, [entry.name for entry in METHODS])
+    full = full or bool(scenes)
+
+    found: dict[tuple[str, str, int], Cell] = {}
+    for suite in suites:
+        if suite not in MEETINGS:
+            continue
+        module = importlib.import_module(f"benchmarks.suites.{suite}")
+        for scene in module.scenes(motions.test, full=full):
+            for method in module.methods(preset.newton_cuts):
+                if not (_named(scene, scenes) and _named(method, methods)):
+                    continue
+                for seed in seeds if find_method(method).seeded else seeds[:1]:
+                    key = (scene, method, seed)
+                    before = found[key].suites if key in found else ()
+                    found[key] = Cell(declared[scene], method, seed, (*before, suite))
+    checks = _matching(CHECKS, scenes, "validation" in suites and _named(VALIDATION_METHOD, methods))
+    cases = _matching(CASES, scenes, "extremes" in suites and _named(EXTREMES_METHOD, methods))
+    if not (found or checks or cases):
+        raise PlanError("nothing to run: no suite asked for has these scenes and methods together; see --list")
+    # The reference first: an error against it can be said as soon as another cell is done.
+    order = {entry.name: place for place, entry in enumerate(METHODS)}
+    places = {name: place for place, name in enumerate(declared)}
+    cells = sorted(found.values(), key=lambda c: (places[c.scene.name], order[c.method], c.seed))
+    return tuple(cells), checks, cases
+
+
+def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
+    """The suites named, "all" meaning each; none named means each too. Raises PlanError."""
+    words = list(words)
+    for word in words:
+        if word not in (*SUITE_NAMES, "all"):
+            raise PlanError(f"--suite: unknown suite '{word}'; choose from {', '.join((*SUITE_NAMES, 'all'))}")
+    return tuple(name for name in SUITE_NAMES if not words or "all" in words or name in words)
+
+
+def _matching(items, patterns: Sequence[str], wanted: bool):
+    return tuple(item for item in items if wanted and _named(item.name, patterns))
+
+
+def _named(name: str, patterns: Sequence[str]) -> bool:
+    return not patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _check_words(what: str, patterns: Sequence[str], names: Sequence[str]) -> None:
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            hint = ""
+            if what == "scene" and pattern.startswith(PREFIX):
+                hint = " (scenes of a dressed body are the test motions: see --test-motions)"
+            raise PlanError(f"unknown {what} '{pattern}'; {_nearest(pattern, names)}{hint}")
+
+
+def _nearest(word: str, names: Sequence[str]) -> str:
+    near = difflib.get_close_matches(word, names, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(near)}?" if near else "see --list"

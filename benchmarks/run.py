@@ -1,0 +1,212 @@
+"""python -m benchmarks.run: the main job, from a body and motions to a report.
+
+This file is the command alone: words in, a checked plan, stages run in order, an exit status. Nothing
+heavy is imported before the plan stands, so that --help and --list answer at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
+from .plan import MEETINGS, Plan, PlanError, choose_cells, choose_motions, choose_suites, runs
+from .presets import PRESETS, find_preset
+
+PROGRAM = "benchmarks.run"
+EXAMPLES = """examples:
+  python -m benchmarks.run                                    the quick run: every suite's quick subset
+  python -m benchmarks.run --preset smoke                     everything once, tiny, under 2 minutes
+  python -m benchmarks.run --suite garments -o reports/runs/mine
+  python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
+  python -m benchmarks.run --scenes 'dressed/*' --methods snug,skinning,simulation --seeds 0,1,2
+  python -m benchmarks.run --motions clips/ --test-motions 01_01
+  python -m benchmarks.run --motions library --motions mine.amc
+
+motions: without --motions the embedded library, which has its own test set. With --motions the files
+  replace the library; "library" among the paths keeps it. --test-motions names those to test on, all
+  others train. Without it the library's test set tests; of files alone the first by name tests and
+  the others train; a single file tests and the library trains. Files are brought to 30 frames per
+  second, placed on the floor, arms spread by 20 degrees, and cut to the preset's length.
+
+exit status: 0 when every cell ended as ok or as an explained skip (in extremes an honest failure with
+  its reason is an accepted outcome); 1 when a cell failed: its row says why and the rest went on;
+  2 when the request cannot be met: one line says why and nothing is left behind."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """One clear line for a wrong word, in place of the whole usage."""
+
+    def error(self, message: str):
+        raise PlanError(f"{message}; see --help")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    parser = _Parser(
+        prog=f"python -m {PROGRAM}",
+        description="Dress a body, simulate the ground truth, train the networks, compare all of them "
+        "and write tables, figures and a PDF.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    names = ", ".join(preset.name for preset in PRESETS)
+    add("--preset", default="quick", metavar="NAME", help=f"how much of everything: {names} (default quick)")
+    add("--suite", action="append", default=[], metavar="NAME",
+        help="garments, speed, validation, extremes or all, in full; repeat or separate by commas "
+        "(default: the quick subset of each)")  # fmt: skip
+    add("--scenes", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
+    add("--methods", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
+    add("--motions", action="append", default=[], metavar="PATH",
+        help="motion file or folder (.amc with its .asf, .npz), or the word library; may be repeated")  # fmt: skip
+    add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
+    add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
+    add("--device", default="cpu", metavar="cpu|cuda", help="where networks run (default cpu)")
+    add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
+    add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
+    add("--dry-run", action="store_true", help="say what would be done; run nothing, write nothing")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        options = make_parser().parse_args(words)
+        if options.list:
+            from .listing import listing
+
+            print(listing())
+            return 0
+        plan = make_plan(options, words)
+    except ValueError as error:  # also the readers' own errors: each is one line with file and remedy
+        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    if options.dry_run:
+        print(describe(plan))
+        return 0
+    # One thread for everything: times are comparable, and two workers do not fight over two cores.
+    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    from .stages import execute
+
+    try:
+        return execute(plan)
+    except KeyboardInterrupt:
+        print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
+        return 130
+
+
+def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
+    """Check every word of the request. Raises ValueError with one line for the first wrong one."""
+    preset = find_preset(options.preset)
+    suites = choose_suites(split(options.suite))
+    seeds = parse_seeds(options.seeds)
+    check_device(options.device)
+    folder = choose_folder(options.out)
+    motions = choose_motions(options.motions, split(options.test_motions), preset)
+    cells, checks, cases = choose_cells(
+        suites,
+        full=bool(options.suite),
+        preset=preset,
+        motions=motions,
+        scenes=split(options.scenes),
+        methods=split(options.methods),
+        seeds=seeds,
+    )
+    kept = [s for s in suites if s in MEETINGS and any(s in cell.suites for cell in cells)]
+    kept += ["validation"] * bool(checks) + ["extremes"] * bool(cases)
+    return Plan(
+        preset=preset,
+        suites=tuple(kept),
+        cells=cells,
+        checks=checks,
+        cases=cases,
+        train=motions.train,
+        test=motions.test,
+        files=motions.files,
+        seeds=seeds,
+        device=options.device,
+        folder=folder,
+        command=shlex.join(["python", "-m", PROGRAM, *words]),
+    )
+
+
+def split(values: Sequence[str]) -> list[str]:
+    """Repeated and comma-separated words in one list."""
+    return [word.strip() for value in values for word in value.split(",") if word.strip()]
+
+
+def parse_seeds(text: str) -> tuple[int, ...]:
+    """Whole numbers from 0 on, each once. Raises PlanError."""
+    try:
+        seeds = tuple(dict.fromkeys(int(word) for word in split([text])))
+    except ValueError:
+        raise PlanError(f"--seeds '{text}': give whole numbers separated by commas") from None
+    if not seeds or min(seeds) < 0:
+        raise PlanError(f"--seeds '{text}': give at least one whole number, none below 0")
+    return seeds
+
+
+def check_device(device: str) -> None:
+    """Raises PlanError where the device is unknown, absent or of no use."""
+    if device not in ("cpu", "cuda"):
+        raise PlanError(f"--device '{device}': choose cpu or cuda")
+    if device == "cuda":
+        raise PlanError("--device cuda: networks train and run on the CPU alone in this version")
+
+
+def choose_folder(out: str | None) -> Path:
+    """The folder of the run, not created yet. Raises PlanError where it cannot be made or holds a run."""
+    if out is None:
+        root = Path("reports") / "runs"
+        stamp = datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
+        taken = [root / stamp, *(root / f"{stamp}-{n}" for n in range(2, 100))]
+        folder = next(path for path in taken if not path.exists())
+    else:
+        folder = Path(out)
+        if folder.exists() and not folder.is_dir():
+            raise PlanError(f"--out {out}: is a file; name a folder")
+        if folder.is_dir() and any(folder.iterdir()):
+            raise PlanError(f"--out {out}: is not empty; name a new folder")
+    parent = folder
+    while not parent.exists():
+        parent = parent.parent
+    if not (parent.is_dir() and os.access(parent, os.W_OK | os.X_OK)):
+        raise PlanError(f"--out {folder}: {parent} cannot be written to; name another folder")
+    return folder
+
+
+def describe(plan: Plan) -> str:
+    """What a run of the plan would do, in a few lines and one line a cell."""
+    skipped = sum(not runs(cell) for cell in plan.cells)
+    lines = [
+        f"preset {plan.preset.name}: {plan.preset.description}",
+        f"folder {plan.folder}",
+        f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}",
+    ]
+    if plan.needs_wardrobe:
+        lines.append(f"T-shirt of about {plan.preset.garment_vertices} vertices")
+        lines.append(f"test motions {', '.join(plan.test)}")
+    if plan.needs_training_motions:
+        targets = "simulated for the supervised network" if plan.needs_targets else "not simulated"
+        lines.append(f"training motions {', '.join(plan.train)} ({targets})")
+        for kind, seed in plan.models:
+            steps = plan.preset.steps.get(kind or "", 0)
+            lines.append(f"train {kind}, seed {seed}: {steps} steps")
+    lines.append(f"{len(plan.cells) - skipped} cells, {skipped} skipped, {len(plan.checks)} checks, "
+                 f"{len(plan.cases)} extreme cases")  # fmt: skip
+    lines += [f"  {cell.label} [{', '.join(cell.suites)}]" + ("" if runs(cell) else ": skip") for cell in plan.cells]
+    lines += [f"  {check.name} [validation]" for check in plan.checks]
+    lines += [f"  {case.name} [extremes]" for case in plan.cases]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,327 @@
+"""The stages of a run, in order, each timed: wardrobe, ground truth, training, cells, metrics, checks, report.
+
+What is written is written whole. A cell that fails is a row with its reason and the rest goes on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from . import provenance
+from .cell import Outcome, run_cell
+from .methods import find_method
+from .plan import Cell, Plan, runs
+from .results import Row, RunFolder, with_provenance
+
+if TYPE_CHECKING:
+    from .jobs import Simulated, Trained
+    from .scene import BuiltScene
+    from .wardrobe import Wardrobe
+
+
+def execute(plan: Plan) -> int:
+    """Run the plan. Returns 0 when every cell ended well, 1 when one failed or the report could not be made."""
+    run = RunInProgress(plan)
+    try:
+        run.all_stages()
+    except KeyboardInterrupt:
+        run.note("interrupted", True)
+        run.write_rows()
+        raise
+    made = run.make_report()
+    from .closing import summary
+
+    print(summary(run.rows, run.stages), flush=True)
+    failed = [row for row in run.rows if not accepted(row)]
+    for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
+        print(line, file=sys.stderr)
+    if made:
+        print(run.folder.report_path.resolve(), flush=True)
+    return 0 if made and not failed else 1
+
+
+def accepted(row: Row) -> bool:
+    """Whether a row lets the run end with status 0; an extreme case may fail honestly, never silently."""
+    return row.passed or (row.suite == "extremes" and row.status != "failed" and bool(row.reason))
+
+
+class RunInProgress:
+    """The folder, the configuration and the rows of a run while it is going on."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.folder = RunFolder(plan.folder)
+        self.hardware = provenance.hardware(plan.device)
+        self.commit = provenance.commit()
+        self.rows: list[Row] = []
+        self.stages: list[dict[str, Any]] = []
+        self.trained: dict[tuple[str, int], Trained] = {}
+        self.untrained: dict[tuple[str, int], str] = {}  # why a network could not be trained
+        self.data_seconds = 0.0
+        self.wardrobe: Wardrobe | None = None
+        self.config: dict[str, Any] = {
+            "command": plan.command,
+            "preset": plan.preset.name,
+            "suites": list(plan.suites),
+            "scenes": [scene.name for scene in plan.scenes],
+            "methods": list(dict.fromkeys(cell.method for cell in plan.cells)),
+            "motions": {"train": list(plan.train), "test": list(plan.test)} if plan.needs_wardrobe else {},
+            "seeds": list(plan.seeds),
+            "commit": self.commit,
+            "started": now(),
+            "finished": None,
+            "hardware": self.hardware,
+            "versions": provenance.versions(),
+            "preset_values": dataclasses.asdict(plan.preset),
+            "stages": self.stages,
+        }
+        plan.folder.mkdir(parents=True, exist_ok=True)
+        self.folder.write_config(self.config)
+
+    def note(self, name: str, value: Any) -> None:
+        """Set an entry of run.json and write it."""
+        self.config[name] = value
+        self.folder.write_config(self.config)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Announce a stage and keep its wall time, also when it is interrupted."""
+        print(f"== {name}", file=sys.stderr, flush=True)
+        clock = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.stages.append({"name": name, "seconds": round(time.perf_counter() - clock, 3)})
+            self.folder.write_config(self.config)
+
+    def all_stages(self) -> None:
+        """Everything but the report."""
+        plan = self.plan
+        if plan.needs_wardrobe:
+            with self.stage("body, T-shirt and motions"):
+                self.open_wardrobe()
+            with self.stage("ground truth"):
+                self.ground_truth()
+        if plan.models:
+            with self.stage("training"):
+                self.train()
+        if plan.cells:
+            outcomes = self.cells_and_metrics()
+            failed = sum(outcome.status == "failed" for outcome in outcomes)
+            self.note("cells", {"run": sum(map(runs, plan.cells)), "failed": failed})
+        if plan.checks:
+            with self.stage("validation"):
+                from .suites.validation import run_check
+
+                self.rows += [run_check(check) for check in _bar(plan.checks, "validation", "check")]
+        if plan.cases:
+            with self.stage("extremes"):
+                from .suites.extremes import run_case
+
+                self.rows += [run_case(case) for case in _bar(plan.cases, "extremes", "case")]
+        self.write_rows()
+
+    def open_wardrobe(self) -> None:
+        from .wardrobe import embedded_motions, open_wardrobe
+
+        plan = self.plan
+        names = [*plan.test, *(plan.train if plan.needs_training_motions else ())]
+        motions = [plan.files[name] for name in names if name in plan.files]
+        motions += embedded_motions(name for name in names if name not in plan.files)
+        self.wardrobe = open_wardrobe(plan.preset, motions)
+        garment = self.wardrobe.garment
+        self.note("garment", {
+            "name": garment.name, "vertices": len(garment.rest_positions), "triangles": len(garment.faces),
+            "parameters": {name: float(value) for name, value in garment.parameters.items()},
+        })  # fmt: skip
+        motions_of = self.wardrobe.motions
+        self.config["motions"]["frames"] = {name: motions_of[name].frames for name in names}
+        self.note("motion_sources", {name: motions_of[name].source or "embedded library" for name in names})
+
+    def ground_truth(self) -> None:
+        """Settle every dressed scene, simulate the training motions; two at a time, off every clock but its own."""
+        from . import jobs
+        from .workers import Failure, Job, run_jobs, worker_count
+
+        plan, preset = self.plan, self.plan.preset
+        assert self.wardrobe is not None
+        needs_start = {c.scene.name for c in plan.cells if c.scene.dressed and not find_method(c.method).needs_body}
+        todo = [
+            Job(name, jobs.settle, (name, preset, plan.folder), preset.settle_frames) for name in sorted(needs_start)
+        ]
+        for motion in plan.train if plan.needs_targets else ():
+            units = preset.settle_frames + self.wardrobe.motions[motion].frames
+            todo.append(Job(motion, jobs.simulate_motion, (motion, preset, plan.folder), units))
+        results = run_jobs(todo, self.wardrobe, title="simulating", unit="frame")
+        self.targets: list[str] = []
+        unused = {}
+        for job, result in zip(todo, results):
+            if isinstance(result, jobs.Simulated):
+                self.data_seconds += result.seconds
+                if result.whole:
+                    self.targets.append(result.motion)
+                else:
+                    unused[result.motion] = f"{result.status}: {result.reason}"
+            elif isinstance(result, Failure):
+                unused[job.label] = result.reason
+        simulated = [result for result in results if isinstance(result, jobs.Simulated)]
+        self.note("data", {
+            "workers": worker_count(),
+            "seconds": self.data_seconds,
+            "frames": sum(result.frames for result in simulated),
+            "not_converged": {r.motion: f"{r.status}: {r.reason}" for r in simulated if r.status != "converged"},
+            "unused": unused,
+        })  # fmt: skip
+
+    def train(self) -> None:
+        """Train the networks, two at a time, one thread each."""
+        from . import jobs
+        from .workers import Failure, Job, run_jobs, worker_count
+
+        plan = self.plan
+        assert self.wardrobe is not None
+        todo = []
+        for kind, seed in plan.models:
+            motions = self.targets if kind == "supervised" else list(plan.train)
+            steps = plan.preset.steps.get(kind, 0)
+            arguments = (kind, seed, steps, motions, plan.folder, plan.device)
+            todo.append(Job(f"{kind} seed {seed}", jobs.train_network, arguments, steps))
+        results = run_jobs(todo, self.wardrobe, title="training", unit="step")
+        summary: dict[str, Any] = {"workers": worker_count()}
+        for (kind, seed), job, result in zip(plan.models, todo, results):
+            if isinstance(result, Failure):
+                self.untrained[kind, seed] = result.reason
+                summary[job.label] = {"failed": result.reason}
+            else:
+                self.trained[kind, seed] = result
+                summary[job.label] = {"seconds": result.seconds, "steps": result.steps, "last": result.final}
+        self.note("training", summary)
+
+    def cells_and_metrics(self) -> list[Outcome]:
+        """Cells one after another on an otherwise idle machine; then metrics from their files, scene by scene."""
+        outcomes: list[Outcome] = []
+        built: dict[str, BuiltScene] = {}
+        with self.stage("cells"):
+            for cell in _bar(self.plan.cells, "cells", "cell"):
+                outcomes.append(self.one_cell(cell, built))
+        with self.stage("metrics"):
+            with _total([outcome for outcome in outcomes if outcome.recorded], "metrics", "cell") as bar:
+                for scene in self.plan.scenes:
+                    of_scene = [outcome for outcome in outcomes if outcome.cell.scene is scene]
+                    self.rows += self.measured(of_scene, built.get(scene.name), bar)
+            self.write_rows()
+        return outcomes
+
+    def one_cell(self, cell: Cell, built: dict[str, BuiltScene]) -> Outcome:
+        entry = find_method(cell.method)
+        if reason := entry.skip(cell.scene):
+            return Outcome(cell, "skipped", reason)
+        if entry.trained and (reason := self.untrained.get((entry.trained, cell.seed))):
+            return Outcome(cell, "failed", f"its network could not be trained: {reason}")
+        try:
+            if cell.scene.name not in built:
+                built[cell.scene.name] = self.build(cell)
+        except Exception as error:
+            return Outcome(cell, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
+        return run_cell(cell, built[cell.scene.name], self.folder, device=self.plan.device)
+
+    def build(self, cell: Cell) -> BuiltScene:
+        """The scene; a dressed one starts where the workers settled it, and its body is written as a mesh."""
+        scene = cell.scene.build(self.plan.preset, self.wardrobe)
+        if not cell.scene.dressed:
+            return scene
+        import numpy as np
+
+        from .jobs import start_path
+
+        path = start_path(self.folder, scene.name)
+        if path.is_file():
+            start = np.load(path)
+            scene = dataclasses.replace(scene, settle=lambda: start)
+        self.write_body(scene)
+        return scene
+
+    def write_body(self, scene: BuiltScene) -> None:
+        """trajectories/<scene>/body.vtkhdf, to look at the garments upon."""
+        import numpy as np
+        from reference_sim import Trajectory
+
+        assert scene.obstacle is not None
+        path = self.folder.trajectory_path(scene.name, "body")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Trajectory(
+            positions=scene.obstacle.positions,
+            faces=scene.obstacle.faces,
+            times=np.arange(scene.frames) * scene.dt,
+            frame_seconds=np.full(scene.frames, np.nan),
+            provenance={"what": "the body of this scene"},
+        ).save(path)
+
+    def measured(self, outcomes: list[Outcome], scene: BuiltScene | None, bar: Any) -> list[Row]:
+        """The rows of all cells of one scene."""
+        from .evaluate import load_reference, measure, model_costs, rows_of
+
+        rows: list[Row] = []
+        reference = load_reference(self.folder, outcomes, scene) if scene is not None else None
+        for outcome in outcomes:
+            metrics: dict[str, float] = {}
+            if outcome.recorded and scene is not None:
+                trained = self.trained.get((find_method(outcome.cell.method).trained or "", outcome.cell.seed))
+                costs = model_costs(trained, self.data_seconds) if trained else {}
+                try:
+                    metrics = measure(outcome, scene, self.folder, reference, costs)
+                except Exception as error:
+                    reason = " ".join(f"metrics: {type(error).__name__}: {error}".split())
+                    outcome = dataclasses.replace(outcome, status="failed", reason=reason)
+                bar.update()
+            rows += rows_of(outcome, metrics, scene)
+        return rows
+
+    def write_rows(self) -> None:
+        """results.csv with the rows so far."""
+        self.rows = with_provenance(
+            self.rows,
+            preset=self.plan.preset.name,
+            commit=self.commit,
+            hardware=provenance.hardware_line(self.hardware),
+        )
+        self.folder.write_rows(self.rows)
+
+    def make_report(self) -> bool:
+        """tables/, figures/ and report.pdf from the files; a failure is said and leaves the results."""
+        self.note("finished", now())
+        try:
+            with self.stage("report"):
+                from reports.build import build_report
+
+                _, problems = build_report(self.folder.path)
+        except Exception as error:
+            line = " ".join(f"{type(error).__name__}: {error}".split())
+            print(f"the report could not be made ({line}); results are in {self.folder.path}", file=sys.stderr)
+            return False
+        for problem in problems:
+            print(f"report: left out: {problem}", file=sys.stderr)
+        return True
+
+
+def now() -> str:
+    """The time as ISO text with its zone."""
+    return datetime.now().astimezone().isoformat(timespec="seconds")
+
+
+def _total(items: list[Any], title: str, unit: str) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(total=len(items), desc=title, unit=unit)
+
+
+def _bar(items: Any, title: str, unit: str) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(items, desc=title, unit=unit)
