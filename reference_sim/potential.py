@@ -57,6 +57,10 @@ class Potential:
             gradient += part
         return total, gradient
 
+    def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
+        """Largest share of `direction` (V, 3) [m] that every term allows from x (V, 3)."""
+        return min(energy.largest_step(x, direction) for energy in self.energies)
+
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
         """Second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
         pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))

@@ -55,7 +55,7 @@ class BendHinge(Energy):
                 raise ValueError(f"BendHinge rest_angles {rest_angles!r}: give an array, a number or 'rest'")
             rest_angles = dihedral_angles(cloth.rest_positions, self.stencils)
         angles = np.broadcast_to(np.asarray(rest_angles, dtype=np.float64), (len(self.stencils),))
-        self.rest_angles = np.ascontiguousarray(angles)
+        self.rest_angles = np.array(angles)  # its own: a broadcast view is read-only
 
     def parameters(self) -> dict[str, Any]:
         return {"scaling": self.scaling, "mean_stiffness_J": float(self.stiffness.mean())}

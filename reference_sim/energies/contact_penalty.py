@@ -72,9 +72,9 @@ class ContactPenalty(Energy):
             shape=(len(self.stencils), cloth.vertex_count),
         )
         self.rest_samples = self.sample_matrix @ cloth.rest_positions
-        # Until a step is prepared every plane lies infinitely far below its sample: no contact.
-        self.points = np.full((len(self.stencils), 3), -np.inf)
-        self.normals = np.zeros((len(self.stencils), 3))
+        # Until a step is prepared every plane lies far below its sample: no contact. Finite also as float32.
+        self.points = np.tile([0.0, -1e30, 0.0], (len(self.stencils), 1))
+        self.normals = np.tile([0.0, 1.0, 0.0], (len(self.stencils), 1))
 
     def parameters(self) -> dict[str, Any]:
         return {
@@ -153,14 +153,11 @@ def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 @njit(cache=True, inline="always")
 def _depth(x, stencil, weight, margin, c, n):
-    """eps - n.(x_s - c), or 0 out of reach (a plane at infinity gives -inf)."""
+    """max(eps - n.(x_s - c), 0)."""
     distance = 0.0
     for i in range(3):
         sample = weight[0] * x[stencil[0], i] + weight[1] * x[stencil[1], i] + weight[2] * x[stencil[2], i]
-        if n[i] != 0.0:
-            distance += n[i] * (sample - c[i])
-    if n[0] == 0.0 and n[1] == 0.0 and n[2] == 0.0:
-        return 0.0
+        distance += n[i] * (sample - c[i])
     return max(margin - distance, 0.0)
 
 

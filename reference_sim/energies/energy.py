@@ -102,3 +102,10 @@ class Energy:
     def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Elements with a non-zero Hessian (n,) and their blocks (n, 3k, 3k): all of them unless overridden."""
         return np.arange(len(self.stencils)), self.hessian_blocks(x)
+
+    def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
+        """Largest share of `direction` (V, 3) [m] that may be walked from x (V, 3); 1 unless the term forbids.
+
+        For terms that are infinite beyond a first touch.
+        """
+        return 1.0

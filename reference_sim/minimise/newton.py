@@ -155,12 +155,12 @@ class _Run:
 
     def line_search(self, p: np.ndarray, slope: float) -> bool:
         """Backtrack until the energy falls enough; True once a step was taken."""
-        step = p.reshape(-1, 3)
+        step = np.zeros_like(self.x)
+        step[self.n._free] = p.reshape(-1, 3)
         noise = 1e-13 * abs(self.value)
-        alpha = 1.0
+        alpha = self.n.potential.largest_step(self.x, step)
         for _ in range(24):
-            trial = self.x.copy()
-            trial[self.n._free] += alpha * step
+            trial = self.x + alpha * step
             value, gradient = self.evaluate(trial)
             if np.isfinite(value) and np.isfinite(gradient).all():
                 enough = value <= self.value + SUFFICIENT_DECREASE * alpha * slope
