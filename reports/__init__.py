@@ -1,0 +1,1 @@
+"""Tables, figures and the PDF of a run, made from its result files alone."""

@@ -1,0 +1,159 @@
+"""One look for all plots, and files that come out the same every time they are made."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.results import replacing
+from reports import palette
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import XAxis, YAxis
+    from matplotlib.figure import Figure
+
+PAGE_WIDTH = 6.7  # inches of text width on the report's page
+GRID = "#E3E3E3"
+_LOOK: dict[Any, Any] = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#666666",
+    "axes.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "axes.labelcolor": "#222222",
+    "text.color": "#222222",
+    "lines.linewidth": 1.3,
+    "svg.hashsalt": "report",
+    "svg.fonttype": "path",
+    "figure.dpi": 100,
+}
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [inches] in the look of the report, without pyplot and its global state."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    matplotlib.rcParams.update(_LOOK)
+    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.get_layout_engine().set(h_pad=0.04, w_pad=0.03)  # type: ignore[union-attr,call-arg]
+    return figure
+
+
+def log_axis(axes: Axes, which: str) -> None:
+    """Make the x or y axis logarithmic with plain numbers: 0.01, 0.1, 1; and 2, 5 where it is short.
+
+    Call it when the limits are set.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis: XAxis | YAxis = axes.xaxis if which == "x" else axes.yaxis
+    if which == "x":
+        axes.set_xscale("log")
+    else:
+        axes.set_yscale("log")
+    low, high = axis.get_view_interval()
+    decades = math.log10(high / low)
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,), numticks=7))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: power_text(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def power_text(value: float) -> str:
+    """"$2{\\times}10^{-7}$" for matplotlib, which has no raised digits in its serif font."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
+    mantissa, _, power = f"{value:.0e}".partition("e")
+    times = "" if mantissa == "1" else rf"{mantissa}{{\times}}"
+    return f"${times}10^{{{int(power)}}}$"
+
+
+def wrapped(name: str, width: int = 44) -> str:
+    """A long name on several lines, broken after a separator where there is one."""
+    lines = [""]
+    for piece in re.findall(r"[^_/ :-]*[_/ :-]?", name):
+        if lines[-1] and len(lines[-1]) + len(piece) > width:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(line.strip() for line in lines)
+
+
+def grid(axes: Axes, which: str = "both") -> None:
+    axes.grid(True, axis=which, color=GRID, linewidth=0.6)  # type: ignore[arg-type]
+
+
+def file_name(text: str) -> str:
+    """A scene's or method's name as part of a file name."""
+    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in text)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A finished figure: its file for the PDF, caption, section, kind and share of the page's width."""
+
+    path: Path
+    caption: str
+    section: str
+    kind: str
+    width: float
+
+
+def save(
+    figure: Figure, folder: Path, name: str, *, caption: str, section: str, kind: str, vector: bool = True
+) -> Picture:
+    """Write <name>.png and, unless it is a photograph, <name>.svg, which the PDF then takes."""
+    path = folder / f"{name}.png"
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=200, metadata={"Software": None})
+    if vector:
+        path = folder / f"{name}.svg"
+        with replacing(path) as temporary:
+            figure.savefig(temporary, metadata={"Date": None})
+    return Picture(path, caption, section, kind, min(1.0, float(figure.get_figwidth()) / PAGE_WIDTH))
+
+
+def legend_above(figure: Figure, methods: Sequence[str], *, lines: bool) -> None:
+    """One legend for all panels, above them."""
+    from matplotlib.lines import Line2D
+
+    handles = []
+    for method in methods:
+        look = palette.style(method)
+        dotted = not lines and method == palette.REFERENCE  # drawn as a line at its run time
+        line: Any = ":" if dotted else look.line if lines else "none"
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=look.colour,
+                linestyle=line,
+                marker="" if lines or dotted else look.marker,
+                markersize=9 if look.marker == "*" else 6,
+                label=look.label,
+            )
+        )
+    letters = sum(len(palette.label(method)) + 8 for method in methods)
+    figure.legend(
+        handles=handles,
+        loc="outside upper center",
+        ncols=len(handles) if letters <= 115 else -(-len(handles) // 2),
+        frameon=False,
+        handlelength=1.6 if lines else 0.8,
+        handletextpad=0.5,
+        columnspacing=1.4,
+    )

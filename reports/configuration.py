@@ -1,0 +1,87 @@
+"""The configuration of a run as groups of names and values, for the last pages of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from typing import Any
+
+from benchmarks.results import Row
+from reports.numbers import duration, number
+
+_FIRST = (
+    "command", "preset", "commit", "started", "finished", "suites", "scenes", "methods", "motions", "seeds",
+)  # fmt: skip
+
+
+def configuration(config: dict[str, Any], rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Groups {"title", "pairs": [[name, value], ...]}, all of run.json, whatever it holds."""
+    run = [[_title(name), _text(config[name])] for name in _FIRST if config.get(name) not in (None, [], "")]
+    wall = _wall_seconds(config)
+    run += [["Wall time", duration(wall)]] if wall is not None else []
+    for name in ("dtype", "threads", "hardware"):
+        values = sorted({str(getattr(row, name)) for row in rows if getattr(row, name) not in ("", None)})
+        if values and not (name == "hardware" and config.get("hardware")):
+            run.append([f"{_title(name)} of the rows", ", ".join(values)])
+    groups: list[dict[str, Any]] = [{"title": "Run", "pairs": run}]
+    for name, value in config.items():
+        if name == "stages":
+            groups.append({"title": "Time of each stage", "pairs": _stages(value)})
+        elif isinstance(value, dict):
+            groups.append({"title": _title(name), "pairs": [[_title(k), v] for k, v in _flat(value)]})
+        elif name not in _FIRST and value not in (None, "", []):
+            run.append([_title(name), _text(value)])
+    return [group for group in groups if group["pairs"]]
+
+
+def _stages(stages: Any) -> list[list[str]]:
+    if not isinstance(stages, list):
+        return []
+    kept = [stage for stage in stages if isinstance(stage, dict)]
+    return [[str(stage.get("name", "?")), duration(stage.get("seconds"))] for stage in kept]
+
+
+def _flat(value: dict[str, Any], above: str = "") -> Iterable[tuple[str, str]]:
+    for name, item in value.items():
+        if isinstance(item, dict):
+            yield from _flat(item, f"{above}{name} ")
+        else:
+            yield f"{above}{name}", _text(item)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return number(value, 4)
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(item) for item in value) or "–"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {text}" for name, text in _flat(value)) or "–"
+    return "–" if value is None else str(value)
+
+
+def _title(name: str) -> str:
+    """ "memory_gb" -> "Memory [GB]"."""
+    words = name.replace("_", " ")
+    for ending, unit in ((" gb", "GB"), (" mb", "MB"), (" seconds", "s")):
+        if words.endswith(ending):
+            words = f"{words.removesuffix(ending)} [{unit}]"
+    return words[:1].upper() + words[1:]
+
+
+def moment(text: Any) -> datetime | None:
+    """An ISO date and time, or None where it is absent or none."""
+    try:
+        return datetime.fromisoformat(str(text))
+    except ValueError:
+        return None
+
+
+def _wall_seconds(config: dict[str, Any]) -> float | None:
+    start, end = moment(config.get("started")), moment(config.get("finished"))
+    if start is None or end is None or (start.tzinfo is None) != (end.tzinfo is None):
+        return None
+    return (end - start).total_seconds()

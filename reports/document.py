@@ -1,0 +1,197 @@
+"""What the PDF says, in the order it says it: a plain structure that the template lays out.
+
+A section exists only where the run holds something for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from benchmarks.results import Row
+from reports.canvas import Picture
+from reports.configuration import configuration
+from reports.layout import Block, figure_block, list_block, table_block
+from reports.numbers import DASH
+from reports.summary import Measurements
+from reports.table import Cell, Table
+from reports.words import findings
+
+QUESTION = (
+    "A network can be trained on the physics of cloth alone, without one simulated frame. How close do its "
+    "garments come to those of a converged solver, how do they compare with networks trained otherwise and "
+    "with no network at all, and what does each cost?"
+)
+
+CAPTIONS = {
+    "energies": "Energy by term on unseen motions, J per frame: mean over frames, then over test scenes.",
+    "curvature": "Mean-curvature error against the simulation, and the mean curvature itself.",
+    "cost": "What each method costs; run time is measured one frame at a time.",
+    "penetration": "Penetration into the body, distance to the simulation, and response to motion.",
+    "energies_by_scene": "Energy by term, scene by scene, J per frame.",
+    "speed": "The points of the plots: run time of one frame and errors against the simulation.",
+    "validation": "Measured and expected value of every check.",
+    "extremes": "Every extreme case and how it ended.",
+    "unfinished": "Cells that failed or were skipped, with the reason each gave.",
+}
+
+# Tables 1 to 3 of the paper, as it prints them, by column. A column that it does not report is a dash.
+PAPER = {
+    "energies": {
+        "PBNS, in the paper": {
+            "strain": "0.111", "bending": "0.007", "gravity": "0.044", "inertia": "0.0035",
+        },
+        "SNUG, in the paper": {
+            "strain": "0.064", "bending": "0.004", "gravity": "0.028", "inertia": "0.0034",
+        },
+    },
+    "curvature": {"SNUG, in the paper": {"error": "2.7"}},
+    "cost": {
+        "TailorNet, in the paper": {
+            "data_generation": "29 h", "training": "6.5 h", "run_time": "10.1", "memory": "2114",
+        },
+        "Santesteban 2019, in the paper": {
+            "data_generation": "180 h", "training": "17 h", "run_time": "2.5", "memory": "109",
+        },
+        "SNUG, in the paper": {
+            "data_generation": "0 h", "training": "2 h", "run_time": "2.2", "memory": "19",
+        },
+    },
+}  # fmt: skip
+
+GROUPED = {"energies_by_scene": ("suite", "scene"), "speed": ("scene",)}
+NOTES = {
+    "energies": "In grey the values printed by the paper, for its own garment, motions, contact and zero of "
+    "gravity: for orientation only, they enter no mean of ours.",
+    "curvature": "In grey the paper's value, whose operator and unit it does not state.",
+    "cost": "In grey the values printed by the paper, on its own machine with a GPU.",
+}
+
+
+def document(
+    config: dict[str, Any],
+    rows: Sequence[Row],
+    tables: dict[str, Table],
+    pictures: Sequence[Picture],
+    problems: Sequence[str],
+) -> dict[str, Any]:
+    """Everything the template needs, as JSON-ready values."""
+    lead = _lead_picture(pictures)
+    rest = [picture for picture in pictures if picture is not lead]
+    sections = [
+        {"title": "Garments on moving bodies", "blocks": _garments(tables, rest)},
+        {
+            "title": "Speed: error against run time",
+            "blocks": _figures(rest, "speed", "speed") + _tables(tables, "speed"),
+        },
+        {
+            "title": "Validation: known answers",
+            "blocks": _figures(rest, "validation", "dots") + _tables(tables, "validation"),
+        },
+        {
+            "title": "Extremes: where it breaks",
+            "blocks": _figures(rest, "extremes", "outcomes") + _tables(tables, "extremes"),
+        },
+        {"title": "What did not run to its end", "blocks": _trouble(tables, problems)},
+    ]
+    return {
+        "title": "Neural garments beside a converged solver",
+        "subtitle": _subtitle(config),
+        "question": QUESTION,
+        "findings": [list(finding) for finding in findings(rows)],
+        "lead": figure_block(lead) if lead else None,
+        "sections": [section for section in sections if section["blocks"]],
+        "definitions": _definitions(rows),
+        "configuration": configuration(config, rows),
+    }
+
+
+def _subtitle(config: dict[str, Any]) -> str:
+    parts = [f"preset {config['preset']}"] if config.get("preset") else []
+    parts += [f"commit {config['commit']}"] if config.get("commit") else []
+    parts += [str(config["started"])[:10]] if config.get("started") else []
+    return " · ".join(parts)
+
+
+def _lead_picture(pictures: Sequence[Picture]) -> Picture | None:
+    """The plot for the first page: error against run time, dressed first, then with cut solvers."""
+    plots = [picture for picture in pictures if picture.kind == "speed"]
+    plots.sort(key=lambda p: (not p.caption.startswith("dressed/"), "iterations" not in p.caption))
+    return next(iter(plots), None)
+
+
+def _figures(pictures: Sequence[Picture], section: str, kind: str) -> list[Block]:
+    return [figure_block(p) for p in pictures if p.section == section and p.kind == kind]
+
+
+def _tables(tables: dict[str, Table], *names: str) -> list[Block]:
+    return [
+        table_block(tables[name], CAPTIONS[name], grouped_by=GROUPED.get(name, ()))
+        for name in names
+        if name in tables
+    ]
+
+
+def _with_paper(tables: dict[str, Table], name: str) -> list[Block]:
+    """One of the paper's tables, with the paper's own rows set apart below ours."""
+    if name not in tables:
+        return []
+    table = tables[name]
+    references = [
+        (label, [values.get(column.name, DASH) for column in table.columns[1:]])
+        for label, values in PAPER[name].items()
+    ]
+    return [table_block(table, CAPTIONS[name], references=references, note=NOTES[name])]
+
+
+def _garments(tables: dict[str, Table], pictures: Sequence[Picture]) -> list[Block]:
+    return [
+        *_with_paper(tables, "energies"),
+        *_figures(pictures, "garments", "frames"),
+        *_figures(pictures, "garments", "series"),
+        *_with_paper(tables, "curvature"),
+        *_tables(tables, "penetration"),
+        *_with_paper(tables, "cost"),
+        *_figures(pictures, "garments", "speed"),
+        *_figures(pictures, "garments", "training"),
+        *_tables(tables, "energies_by_scene"),
+    ]
+
+
+def _trouble(tables: dict[str, Table], problems: Sequence[str]) -> list[Block]:
+    blocks: list[Block] = []
+    if "unfinished" in tables:
+        blocks.append(table_block(merged_by_scene(tables["unfinished"]), CAPTIONS["unfinished"]))
+    if problems:
+        blocks.append(list_block("Files of this run that could not be read, missing above:", problems))
+    return blocks
+
+
+def merged_by_scene(table: Table) -> Table:
+    """Lines that differ in their scene alone, as one line that names them all."""
+    place = [column.name for column in table.columns].index("scene")
+    scenes: dict[tuple[Cell, ...], list[str]] = {}
+    for row in table.rows:
+        scenes.setdefault((*row[:place], *row[place + 1 :]), []).append(str(row[place]))
+    rows = tuple((*key[:place], ", ".join(names), *key[place:]) for key, names in scenes.items())
+    return Table(table.name, table.columns, rows)
+
+
+def _definitions(rows: Sequence[Row]) -> list[str]:
+    """Which definitions to print: those of what was measured."""
+    metrics = set(Measurements(rows).metrics)
+    wanted = {
+        "strain": "energy/strain",
+        "bending": "energy/bending",
+        "gravity": "energy/gravity",
+        "inertia": "energy/inertia",
+        "collision": "energy/collision",
+        "total": "energy/total",
+        "curvature": "curvature/mean",
+        "distance": "distance/rms",
+        "penetration": "penetration/vertices",
+        "gap": "gap/relative",
+        "held": "dynamics/held_difference",
+        "cost": "cost/frame",
+    }
+    return [name for name, metric in wanted.items() if metric in metrics]

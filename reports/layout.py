@@ -1,0 +1,128 @@
+"""Tables and figures as the template takes them: every number already a text, every dash in place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from reports import palette
+from reports.canvas import Picture
+from reports.numbers import DASH, aligned, duration, number
+from reports.summary import Mean
+from reports.table import Cell, Table
+
+Block = dict[str, Any]
+LONG = 24  # rows from which a table may run over pages
+
+# Texts that need room get a share of the page's width; every other column is as wide as its content.
+WIDTHS = {"reason": "2fr", "check": "1fr", "case": "1fr", "scene": "1fr"}
+FEW = 5  # up to so many columns, the columns of a table share its width evenly
+TEXTS = ("method", "scene", "suite", "check", "case", "outcome", "status", "reason", "unit")
+COSTS = ("data_generation", "training", "run_time", "memory")
+SPARE = "* A mean over fewer scenes than in the other rows, for want of the rest."
+_WORDS: dict[str, Callable[[str], str]] = {
+    "method": palette.label,
+    "outcome": lambda text: "converged" if text == "ok" else text,
+    "status": lambda text: "pass" if text == "ok" else text,
+}
+_DIGITS = {"measured": 7, "expected": 7, "tolerance": 2, "gradient": 2}
+_TIMES = ("data_generation", "training")
+
+
+def table_block(
+    table: Table,
+    caption: str,
+    *,
+    references: Sequence[tuple[str, Sequence[str]]] = (),
+    note: str = "",
+    grouped_by: Sequence[str] = (),
+) -> Block:
+    """A table for the page.
+
+    `references` are rows of others' numbers as they print them, set apart below and never mixed in.
+    Columns in `grouped_by` become headings over the rows that share their values.
+    """
+    places = [place for place, column in enumerate(table.columns) if column.name not in grouped_by]
+    columns = [table.columns[place] for place in places]
+    lines = [[row[place] for place in places] for row in table.rows]
+    texts = [
+        _column_texts(column.name, [line[place] for line in lines], [r[1][place - 1] for r in references])
+        if place
+        else _column_texts(column.name, [line[0] for line in lines], [r[0] for r in references])
+        for place, column in enumerate(columns)
+    ]
+    cells = [list(line) for line in zip(*texts)]
+    groups: dict[str, list[list[dict[str, str]]]] = {}
+    heads = [place for place, column in enumerate(table.columns) if column.name in grouped_by]
+    for row, line in zip(table.rows, cells):
+        groups.setdefault(" · ".join(str(row[place]) for place in heads), []).append(line)
+    remarks = [note]
+    if any(cell["spread"] for line in cells for cell in line):
+        seeds = max(cell.seeds for row in table.rows for cell in row if isinstance(cell, Mean))
+        remarks.append(f"±: standard deviation over {seeds} seeds.")
+    if any(cell["mark"] for line in cells for cell in line):
+        remarks.append(SPARE)
+    return {
+        "kind": "table",
+        "caption": caption,
+        "note": " ".join(remark for remark in remarks if remark),
+        "columns": [
+            {
+                "title": column.title,
+                "unit": column.unit,
+                "left": column.name in TEXTS,
+                "width": width,
+            }
+            for column, width in zip(columns, _widths([column.name for column in columns]))
+        ],
+        "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
+        "references": cells[len(table.rows) :],
+        "breakable": len(table.rows) > LONG,
+    }
+
+
+def _widths(names: Sequence[str]) -> list[str]:
+    if any(name in WIDTHS for name in names):
+        return [WIDTHS.get(name, "auto") for name in names]
+    rest = "1fr" if len(names) <= FEW else "auto"
+    return ["1.4fr" if len(names) <= FEW else "1fr", *[rest] * (len(names) - 1)]
+
+
+def _column_texts(name: str, cells: Sequence[Cell], references: Sequence[str]) -> list[dict[str, str]]:
+    """Text, spread over seeds and mark of an incomplete mean, for each cell of a column."""
+    texts = [*(_text(name, cell) for cell in cells), *references]
+    texts = texts if name in TEXTS else aligned(texts)
+    found = []
+    for text, cell in zip(texts, [*cells, *[None] * len(references)]):
+        mean = cell if isinstance(cell, Mean) else None
+        spread = f"± {number(mean.spread, 1)}" if mean and mean.spread else ""
+        # A cost is measured where it arises: a training has no scene, so none is missing from its mean.
+        mark = "*" if mean and not mean.complete and name not in COSTS else ""
+        found.append({"text": text, "spread": spread, "mark": mark})
+    return found
+
+
+def _text(name: str, cell: Cell) -> str:
+    value = cell.value if isinstance(cell, Mean) else cell
+    if isinstance(value, str):
+        return _WORDS.get(name, str)(value) or DASH
+    if name in _TIMES:
+        return duration(value)
+    if isinstance(value, int):
+        return str(value)
+    return number(value, _DIGITS[name], trim=True) if name in _DIGITS else number(value)
+
+
+def figure_block(picture: Picture) -> Block:
+    """A figure for the page."""
+    return {
+        "kind": "figure",
+        "path": f"figures/{picture.path.name}",
+        "caption": picture.caption,
+        "width": picture.width,
+    }
+
+
+def list_block(intro: str, items: Sequence[str]) -> Block:
+    """A sentence and a list under it."""
+    return {"kind": "list", "intro": intro, "items": list(items)}

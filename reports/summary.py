@@ -1,0 +1,109 @@
+"""Means over scenes and seeds of the rows of a run.
+
+Only rows that ended ok with a finite value enter a mean: nothing is filled in for a cell that failed.
+The mean is first taken over the scenes of one seed, then over seeds; the spread is the standard
+deviation over seeds (n - 1), absent for a single seed.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from benchmarks.results import Row
+from reports import palette
+from reports.numbers import finite
+
+TERMS = ("strain", "bending", "gravity", "inertia", "collision", "total")
+EXTRA_TERMS = ("spring", "area", "friction", "barrier")
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean of a metric, its spread over seeds, and what went into it.
+
+    `complete` says that every seed has every scene asked for; otherwise the mean is over fewer cells
+    than its neighbours in a table, and the table must say so.
+    """
+
+    value: float
+    spread: float | None
+    scenes: int
+    seeds: int
+    complete: bool
+
+
+class Measurements:
+    """The usable numbers of some rows, asked for by scene, method and metric."""
+
+    def __init__(self, rows: Iterable[Row]) -> None:
+        self.rows = tuple(rows)
+        self._values: dict[tuple[str, str, str], dict[int, float]] = {}
+        self.units: dict[str, str] = {}
+        for row in self.rows:
+            if row.status == "ok" and row.value is not None and finite(row.value):
+                key = (row.scene, row.method, row.metric)
+                self._values.setdefault(key, {})[row.seed] = row.value
+                self.units.setdefault(row.metric, row.unit)
+        self.scenes = tuple(dict.fromkeys(row.scene for row in self.rows))
+        self.methods = tuple(palette.ordered(row.method for row in self.rows if row.method))
+        self.metrics = tuple(dict.fromkeys(key[2] for key in self._values))
+
+    def only(self, scenes: Iterable[str]) -> Measurements:
+        """The measurements of the scenes given."""
+        kept = set(scenes)
+        return Measurements(row for row in self.rows if row.scene in kept)
+
+    def seeds(self, scene: str, method: str, metric: str) -> dict[int, float]:
+        """Value by seed, empty where nothing usable was measured."""
+        return self._values.get((scene, method, metric), {})
+
+    def mean(self, method: str, metric: str, scenes: Sequence[str] | None = None) -> Mean | None:
+        """Mean over the scenes (all by default) and seeds that have the metric, None if there are none."""
+        by_seed: dict[int, list[float]] = {}
+        used = set()
+        asked = self.scenes if scenes is None else scenes
+        for scene in asked:
+            for seed, value in self.seeds(scene, method, metric).items():
+                by_seed.setdefault(seed, []).append(value)
+                used.add(scene)
+        if not by_seed:
+            return None
+        means = [statistics.fmean(values) for values in by_seed.values()]
+        spread = statistics.stdev(means) if len(means) > 1 else None
+        complete = all(len(values) == len(asked) for values in by_seed.values())
+        return Mean(statistics.fmean(means), spread, len(used), len(means), complete)
+
+    def value(self, method: str, metric: str, scenes: Sequence[str] | None = None) -> float | None:
+        """The mean alone, or None."""
+        mean = self.mean(method, metric, scenes)
+        return None if mean is None else mean.value
+
+
+def dressed_scenes(measurements: Measurements) -> tuple[str, ...]:
+    """The scenes with a garment on a moving body, over which the paper's tables take their means."""
+    return tuple(scene for scene in measurements.scenes if scene.startswith("dressed/"))
+
+
+def suite_rows(rows: Iterable[Row], suite: str) -> list[Row]:
+    return [row for row in rows if row.suite == suite]
+
+
+def speed_measurements(rows: Sequence[Row]) -> Measurements:
+    """What an error-against-run-time plot may use: the speed suite, and the garments where it has no row."""
+    speed = suite_rows(rows, "speed")
+    taken = {(row.scene, row.method, row.metric) for row in speed}
+    others = [
+        row for row in suite_rows(rows, "garments") if (row.scene, row.method, row.metric) not in taken
+    ]
+    return Measurements([*speed, *others])
+
+
+def excess_energy(measurements: Measurements, scene: str, method: str) -> float | None:
+    """Mean total energy of a method above that of the simulation in the same scene [J per frame]."""
+    own = measurements.value(method, "energy/total", [scene])
+    reference = measurements.value(palette.REFERENCE, "energy/total", [scene])
+    if own is None or reference is None or method == palette.REFERENCE:
+        return None
+    return own - reference

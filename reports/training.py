@@ -1,0 +1,91 @@
+"""Training curves, from the histories that the models carry in the header of their files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reports import palette
+from reports.canvas import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
+
+LARGEST_HEADER = 64_000_000  # bytes; a longer one is a broken file
+
+
+class ModelHeaderError(ValueError):
+    """A model file whose header cannot be read; the message names it."""
+
+
+@dataclass(frozen=True)
+class History:
+    """How one model's loss fell: its kind and, for every few steps, step, seconds, loss and terms."""
+
+    kind: str
+    rows: list[dict[str, float]]
+
+    @property
+    def by_vertices(self) -> bool:
+        """Whether the loss is a distance to simulated vertices [cm^2], not an energy [J]."""
+        return bool(self.rows) and "vertices" in self.rows[0]
+
+    def column(self, name: str) -> np.ndarray:
+        return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
+
+
+def read_history(path: Path) -> History | None:
+    """The history in a model file, None where it has none. Raises ModelHeaderError for a broken file.
+
+    A safetensors file starts with the length of its JSON header, eight bytes, little-endian.
+    """
+    try:
+        with path.open("rb") as stream:
+            length = int.from_bytes(stream.read(8), "little")
+            if not 2 <= length <= LARGEST_HEADER:
+                raise ValueError("its first bytes are no header length")
+            header: dict[str, Any] = json.loads(stream.read(length))
+        data = json.loads(header.get("__metadata__", {}).get("snug", "{}"))
+    except (OSError, ValueError, AttributeError) as error:
+        raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
+    rows = data.get("history") or []
+    return History(str(data.get("kind", path.stem)), rows) if len(rows) > 1 else None
+
+
+def training_curves(folder: Path, models: Path, problems: list[str]) -> list[Picture]:
+    """Loss against training time: energies in one panel, vertex distances in another."""
+    histories = []
+    for path in sorted(models.glob("*.safetensors")):
+        try:
+            history = read_history(path)
+        except ModelHeaderError as error:
+            problems.append(str(error).replace(f"{models.parent}/", ""))
+            continue
+        if history:
+            histories.append(history)
+    panels = [
+        (title, kept)
+        for title, kept in (
+            ("physics loss [J per frame]", [h for h in histories if not h.by_vertices]),
+            ("vertex loss [cm²]", [h for h in histories if h.by_vertices]),
+        )
+        if kept
+    ]
+    return [_draw(folder, panels)] if panels else []
+
+
+def _draw(folder: Path, panels: Sequence[tuple[str, list[History]]]) -> Picture:
+    figure = new_figure(PAGE_WIDTH if len(panels) > 1 else PAGE_WIDTH * 0.6, 2.2)
+    for axes, (title, histories) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels):
+        for history in histories:
+            look = palette.style(history.kind)
+            axes.plot(history.column("seconds"), history.column("loss"), color=look.colour, linewidth=1.1)
+        axes.set(xlabel="training time [s]", title=title)
+        log_axis(axes, "y")
+        grid(axes)
+    kinds = palette.ordered(history.kind for _, histories in panels for history in histories)
+    legend_above(figure, kinds, lines=True)
+    caption = "Training loss against wall time; one curve per model and seed."
+    return save(figure, folder, "training", caption=caption, section="garments", kind="training")

@@ -1,0 +1,226 @@
+"""The findings of a run in sentences, computed from its numbers and printed as they come out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from benchmarks.results import Row
+from reports import palette
+from reports.numbers import number, with_spread
+from reports.palette import NETWORKS, REFERENCE
+from reports.summary import (
+    TERMS,
+    Measurements,
+    dressed_scenes,
+    excess_energy,
+    speed_measurements,
+    suite_rows,
+)
+
+TIE = 0.01  # two values closer than this, relative to the larger, are called equal
+PAPER_TERMS = ("strain", "bending", "gravity", "inertia")
+_NAMES = {
+    "simulation": "the converged simulation",
+    "skinning": "skinning alone",
+    "untrained": "untrained SNUG",
+    "supervised": "the supervised network",
+}
+
+
+def findings(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """(topic, sentences): energies, SNUG against each rival, curvature, speed, checks, failures."""
+    measured = Measurements(suite_rows(rows, "garments"))
+    dressed = measured.only(dressed_scenes(measured))
+    found = [
+        ("Total energy", lowest_network(dressed)),
+        ("Against skinning", against(dressed, "skinning")),
+        ("Against PBNS", against(dressed, "pbns")),
+        ("Against supervised", against(dressed, "supervised")),
+        ("Wrinkles", curvature(dressed)),
+        ("Run time", run_time(rows)),
+        ("Validation", checks(rows)),
+        ("Extremes", outcomes(rows)),
+        ("Not finished", trouble(rows)),
+    ]
+    return [(topic, words) for topic, words in found if words]
+
+
+def name(method: str) -> str:
+    """A method within a sentence."""
+    return _NAMES.get(method, palette.label(method))
+
+
+def lowest_network(measured: Measurements) -> str:
+    """Which trained network ends lowest in total energy, beside simulation, skinning and no training."""
+    totals = {m: t for m in NETWORKS if (t := measured.mean(m, "energy/total")) is not None}
+    if not totals:
+        return ""
+    order = sorted(totals, key=lambda method: totals[method].value)
+    best = totals[order[0]]
+    text = f"Of the trained networks, {name(order[0])} has the lowest mean total on unseen motions: "
+    text += f"{with_spread(best.value, best.spread)} J per frame"
+    rest = [f"{name(method)} {number(totals[method].value)} J" for method in order[1:]]
+    text += f" ({', '.join(rest)})." if rest else " (no other one ran)."
+    others = [
+        f"{name(method)} {number(total)} J"
+        for method in (REFERENCE, "skinning", "untrained")
+        if (total := measured.value(method, "energy/total")) is not None
+    ]
+    return text + (f" For comparison: {', '.join(others)}." if others else "")
+
+
+def against(measured: Measurements, rival: str) -> str:
+    """SNUG beside another method, term by term, whichever way it comes out."""
+    groups: dict[str, list[str]] = {"lower in": [], "higher in": [], "equal in": []}
+    below = set()
+    for term in TERMS:
+        own, other = measured.mean("snug", f"energy/{term}"), measured.mean(rival, f"energy/{term}")
+        if own is None or other is None:
+            continue
+        a, b = own.value, other.value
+        if abs(a - b) <= max(TIE * max(abs(a), abs(b)), own.spread or 0.0, other.spread or 0.0):
+            groups["equal in"].append(term)
+        else:
+            groups["lower in" if a < b else "higher in"].append(f"{term} ({change(a, b)})")
+            below |= {term} if a < b else set()
+    parts = [f"{word} {_listed(terms)}" for word, terms in groups.items() if terms]
+    if not parts:
+        return ""
+    text = f"SNUG is {'; '.join(parts)}{_equal_within(measured, rival) if groups['equal in'] else ''}."
+    if rival == "pbns":
+        held = len(below & set(PAPER_TERMS))
+        verdict = "is reproduced" if held == len(PAPER_TERMS) else f"is reproduced in {held} of the 4"
+        text += f" The paper's finding, SNUG lower in strain, bending, gravity and inertia, {verdict}."
+    return text
+
+
+def _equal_within(measured: Measurements, rival: str) -> str:
+    means = (measured.mean("snug", "energy/total"), measured.mean(rival, "energy/total"))
+    several = any(mean is not None and mean.spread is not None for mean in means)
+    return " within 1 % or the spread over seeds" if several else " within 1 %"
+
+
+def change(value: float, other: float) -> str:
+    """From other to value: "−23 %", "3.1 times" beyond a factor of two, or joules where a sign differs."""
+    if value <= 0.0 or other <= 0.0:
+        return f"{'+' if value > other else ''}{number(value - other)} J"
+    if value > 2.0 * other:
+        return f"{number(value / other, 2)} times as much"
+    if other > 2.0 * value:
+        return f"{number(other / value, 2)} times less"
+    return f"{'+' if value > other else '−'}{abs(value / other - 1.0) * 100.0:.0f} %"
+
+
+def curvature(measured: Measurements) -> str:
+    """Who is closest to the simulation's wrinkles, and how wrinkled each is by itself."""
+    errors = {
+        method: error
+        for method in measured.methods
+        if method != REFERENCE and (error := measured.value(method, "curvature/error")) is not None
+    }
+    if not errors:
+        return ""
+    order = sorted(errors, key=lambda method: errors[method])
+    text = f"Smallest mean-curvature error: {name(order[0])}, {number(errors[order[0]])} 1/m"
+    rest = [f"{name(method)} {number(errors[method])}" for method in order[1:]]
+    text += f" ({', '.join(rest)})." if rest else "."
+    own = measured.value(REFERENCE, "curvature/mean")
+    snug = measured.value("snug", "curvature/mean")
+    if own is None or snug is None:
+        return text
+    return f"{text} Mean curvature itself: the simulation {number(own)} 1/m, SNUG {number(snug)} 1/m."
+
+
+def run_time(rows: Sequence[Row]) -> str:
+    """SNUG's time against the simulation's, and whether a cut solver is both faster and closer."""
+    measured = speed_measurements(rows)
+    scenes = dressed_scenes(measured)
+    sentences = []
+    own, reference = (measured.value(m, "cost/frame", scenes) for m in ("snug", REFERENCE))
+    if own and reference:
+        ratio = (
+            f"{number(reference / own, 2)} times faster"
+            if reference > own
+            else f"{number(own / reference, 2)} times slower"
+        )
+        sentences.append(
+            f"SNUG takes {number(own)} ms per frame, the converged simulation {number(reference)}: {ratio}."
+        )
+    sentences += [words for scene in scenes if (words := _cut_solver(measured, scene))]
+    return " ".join(sentences)
+
+
+def _cut_solver(measured: Measurements, scene: str) -> str:
+    """In one scene: the fastest cut solver with a smaller error than SNUG, and how much longer it takes."""
+    errors_of = {
+        "mean-curvature error": lambda method: measured.value(method, "curvature/error", [scene]),
+        "total energy": lambda method: excess_energy(measured, scene, method),
+    }
+    for words, error_of in errors_of.items():
+        own, own_time = error_of("snug"), measured.value("snug", "cost/frame", [scene])
+        timed = [
+            (time, method, error)
+            for method in measured.methods
+            if palette.family_of(method)
+            and (error := error_of(method)) is not None
+            and (time := measured.value(method, "cost/frame", [scene]))
+        ]
+        if own is None or not own_time or not timed:
+            continue
+        better = sorted(entry for entry in timed if entry[2] < own)
+        if not better:
+            return f"On {scene} no cut solver reached SNUG's {words}."
+        time, method, _ = better[0]
+        pace = f"{number(time / own_time, 2)} times SNUG's time" if time > own_time else "less time than SNUG"
+        return (
+            f"On {scene} the fastest cut solver with a smaller {words} than SNUG is "
+            f"{name(method)}: {number(time)} ms per frame, {pace}."
+        )
+    return ""
+
+
+def checks(rows: Sequence[Row]) -> str:
+    """How many validation checks passed, and which did not."""
+    found = suite_rows(rows, "validation")
+    ran = [row for row in found if row.metric.startswith("check") and row.status != "skipped"]
+    if not ran:
+        return ""
+    bad = [row.scene for row in ran if row.status != "ok"]
+    text = f"{len(ran) - len(bad)} of {len(ran)} checks against known answers pass"
+    return text + (f"; failed: {_listed(dict.fromkeys(bad))}." if bad else ".")
+
+
+def outcomes(rows: Sequence[Row]) -> str:
+    """How many extreme cases converged; the rest by status."""
+    ran = [r for r in suite_rows(rows, "extremes") if r.metric == "outcome" and r.status != "skipped"]
+    if not ran:
+        return ""
+    counts: dict[str, int] = {}
+    for row in ran:
+        counts[row.status] = counts.get(row.status, 0) + 1
+    text = f"{counts.pop('ok', 0)} of {len(ran)} cases converged"
+    rest = [f"{count} {status}" for status, count in counts.items()]
+    return text + (f"; {_listed(rest)}." if rest else ".")
+
+
+def trouble(rows: Sequence[Row]) -> str:
+    """How many cells of garments and speed failed or were skipped."""
+    parts = []
+    kinds = ((False, "failed, stalled or ran out of time"), (True, "skipped for a stated reason"))
+    for skipped, words in kinds:
+        cells = {
+            (row.suite, row.scene, row.method, row.seed)
+            for row in rows
+            if row.suite in ("garments", "speed")
+            and row.status != "ok"
+            and (row.status == "skipped") == skipped
+        }
+        if cells:
+            parts.append(f"{len(cells)} {words}")
+    return f"{', '.join(parts)}; the table near the end says which cells and why." if parts else ""
+
+
+def _listed(items: Iterable[str]) -> str:
+    """"a", "a and b", "a, b and c"."""
+    words = list(items)
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
