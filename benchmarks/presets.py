@@ -31,7 +31,7 @@ PRESETS = (
     Preset(
         name="smoke",
         description="everything once, tiny: under 2 minutes on 2 cores; its numbers mean nothing",
-        garment_vertices=300,
+        garment_vertices=350,
         train_motions=1,
         test_motions=1,
         frames=20,

@@ -64,7 +64,9 @@ class RunInProgress:
         self.trained: dict[tuple[str, int], Trained] = {}
         self.untrained: dict[tuple[str, int], str] = {}  # why a network could not be trained
         self.data_seconds = 0.0
+        self.targets: list[str] = []  # training motions with a whole simulation
         self.wardrobe: Wardrobe | None = None
+        self.naked = ""  # why there is no wardrobe
         self.config: dict[str, Any] = {
             "command": plan.command,
             "preset": plan.preset.name,
@@ -106,9 +108,9 @@ class RunInProgress:
         if plan.needs_wardrobe:
             with self.stage("body, T-shirt and motions"):
                 self.open_wardrobe()
+        if self.wardrobe is not None:
             with self.stage("ground truth"):
                 self.ground_truth()
-        if plan.models:
             with self.stage("training"):
                 self.train()
         if plan.cells:
@@ -134,7 +136,11 @@ class RunInProgress:
         names = [*plan.test, *(plan.train if plan.needs_training_motions else ())]
         motions = [plan.files[name] for name in names if name in plan.files]
         motions += embedded_motions(name for name in names if name not in plan.files)
-        self.wardrobe = open_wardrobe(plan.preset, motions)
+        try:
+            self.wardrobe = open_wardrobe(plan.preset, motions)
+        except ValueError as error:  # of all cells only the dressed ones fail
+            self.naked = one_line(error)
+            return
         garment = self.wardrobe.garment
         self.note("garment", {
             "name": garment.name, "vertices": len(garment.rest_positions), "triangles": len(garment.faces),
@@ -159,7 +165,6 @@ class RunInProgress:
             units = preset.settle_frames + self.wardrobe.motions[motion].frames
             todo.append(Job(motion, jobs.simulate_motion, (motion, preset, plan.folder), units))
         results = run_jobs(todo, self.wardrobe, title="simulating", unit="frame")
-        self.targets: list[str] = []
         unused = {}
         for job, result in zip(todo, results):
             if isinstance(result, jobs.Simulated):
@@ -222,13 +227,15 @@ class RunInProgress:
         entry = find_method(cell.method)
         if reason := entry.skip(cell.scene):
             return Outcome(cell, "skipped", reason)
+        if cell.scene.dressed and self.naked:
+            return Outcome(cell, "failed", self.naked)
         if entry.trained and (reason := self.untrained.get((entry.trained, cell.seed))):
             return Outcome(cell, "failed", f"its network could not be trained: {reason}")
         try:
             if cell.scene.name not in built:
                 built[cell.scene.name] = self.build(cell)
         except Exception as error:
-            return Outcome(cell, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
+            return Outcome(cell, "failed", one_line(error))
         return run_cell(cell, built[cell.scene.name], self.folder, device=self.plan.device)
 
     def build(self, cell: Cell) -> BuiltScene:
@@ -256,7 +263,7 @@ class RunInProgress:
         path = self.folder.trajectory_path(scene.name, "body")
         path.parent.mkdir(parents=True, exist_ok=True)
         Trajectory(
-            positions=scene.obstacle.positions,
+            positions=scene.obstacle.positions.astype(np.float32),  # for the eye: half the size
             faces=scene.obstacle.faces,
             times=np.arange(scene.frames) * scene.dt,
             frame_seconds=np.full(scene.frames, np.nan),
@@ -277,7 +284,7 @@ class RunInProgress:
                 try:
                     metrics = measure(outcome, scene, self.folder, reference, costs)
                 except Exception as error:
-                    reason = " ".join(f"metrics: {type(error).__name__}: {error}".split())
+                    reason = f"metrics: {one_line(error)}"
                     outcome = dataclasses.replace(outcome, status="failed", reason=reason)
                 bar.update()
             rows += rows_of(outcome, metrics, scene)
@@ -302,12 +309,17 @@ class RunInProgress:
 
                 _, problems = build_report(self.folder.path)
         except Exception as error:
-            line = " ".join(f"{type(error).__name__}: {error}".split())
+            line = one_line(error)
             print(f"the report could not be made ({line}); results are in {self.folder.path}", file=sys.stderr)
             return False
         for problem in problems:
             print(f"report: left out: {problem}", file=sys.stderr)
         return True
+
+
+def one_line(error: Exception) -> str:
+    """What was raised, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def now() -> str:
