@@ -59,7 +59,8 @@ def read_amass(path: Path) -> Motion:
 
 def _load(path: Path) -> dict[str, np.ndarray]:
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        # Opened here, not by numpy, which leaves a damaged file open.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             names = [n for n in stored.files if n in ("poses", "trans", *_RATE_NAMES)]
             return {name: stored[name] for name in names}
     except FileNotFoundError:
