@@ -44,7 +44,8 @@ class Cloth:
         faces = np.ascontiguousarray(faces, dtype=np.int64)
         pins = np.unique(np.asarray(self.pins, dtype=np.int64))
         if pins.size and (pins[0] < 0 or pins[-1] >= len(positions)):
-            raise MeshError(f"pin {pins[0] if pins[0] < 0 else pins[-1]} is no vertex of 0..{len(positions) - 1}")
+            bad = pins[0] if pins[0] < 0 else pins[-1]
+            raise MeshError(f"pin {bad} is no vertex of 0..{len(positions) - 1}")
         uv = self.rest_uv
         if uv is not None:
             uv = np.ascontiguousarray(uv, dtype=np.float64)
@@ -186,7 +187,8 @@ def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:
         raise MeshError(f"vertex {bad[0]} is not finite: {positions[bad[0]].tolist()}")
     bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
     if bad.size:
-        raise MeshError(f"face {bad[0]} = {faces[bad[0]].tolist()} names a vertex outside 0..{len(positions) - 1}")
+        face = faces[bad[0]].tolist()
+        raise MeshError(f"face {bad[0]} = {face} names a vertex outside 0..{len(positions) - 1}")
     repeated = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
     if repeated.any():
         bad_face = int(np.argmax(repeated))

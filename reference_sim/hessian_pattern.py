@@ -3,27 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
 from .energies.energy import Energy
+from .linear_solver import nested_dissection
 
 
 class HessianPattern:
     """Pattern of the sum of `energies` over the vertices that `free` marks, built once per scene.
 
-    The matrix is stored as the lower triangle of 3 x 3 vertex blocks (diagonal blocks whole), in CSC order:
-    what a Cholesky factorisation reads.
+    The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order: what a
+    Cholesky factorisation reads. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that all three
+    coordinates share.
 
     Attributes:
         free: (n,) indices of the free vertices, in the order of the matrix.
-        indptr, indices: CSC structure of the (3n, 3n) lower matrix.
-        adjacency: (n, n) symmetric vertex graph, for the ordering.
+        block: 3 or 1.
+        indptr, indices: CSC structure of the (block n, block n) lower matrix.
+        order: fill-reducing order of its rows and columns.
+        diagonal: places of the diagonal entries in the values.
     """
 
-    def __init__(self, energies: Sequence[Energy], vertex_count: int, free: np.ndarray) -> None:
+    def __init__(
+        self, energies: Sequence[Energy], vertex_count: int, free: np.ndarray, *, block: int = 3
+    ) -> None:
+        self.block = block
+        self.energies = tuple(energies)
         self.free = np.flatnonzero(free)
         number = np.full(vertex_count, -1, dtype=np.int64)
         number[self.free] = np.arange(len(self.free))
@@ -37,36 +46,46 @@ class HessianPattern:
         start = np.searchsorted(column, np.arange(n + 1))
         height = np.diff(start)
         within = np.arange(len(key)) - start[column]
-        self._base = 9 * start[column] + 3 * within
-        self._stride = 3 * height[column]
+        self._base = block**2 * start[column] + block * within
+        self._stride = block * height[column]
         self._slots = [
             np.searchsorted(key, block_key) if len(key) else block_key
             for block_key in (_block_keys(number[e.stencils], n) for e in energies)
         ]
         for slots, energy in zip(self._slots, energies):
             slots[_block_keys(number[energy.stencils], n) < 0] = -1
-        self.indptr = np.concatenate([[0], np.cumsum(np.repeat(3 * height, 3))])
-        self.indices = _row_indices(start, row)
+        self.indptr = np.concatenate([[0], np.cumsum(np.repeat(block * height, block))])
+        self.indices = np.empty(block**2 * len(row), dtype=np.int64)
+        _fill_rows(start, row, block, self.indices)
         off = row != column
         ones = np.ones(off.sum())
         lower = sp.csr_matrix((ones, (row[off], column[off])), shape=(n, n))
-        self.adjacency = (lower + lower.T).tocsr()
+        self._adjacency = (lower + lower.T).tocsr()
         self.diagonal = self._diagonal_places(start)
 
     @property
     def size(self) -> int:
-        return 3 * len(self.free)
+        return self.block * len(self.free)
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        vertices = nested_dissection(self._adjacency)
+        return (self.block * vertices[:, None] + np.arange(self.block)).ravel()
 
     def _diagonal_places(self, start: np.ndarray) -> np.ndarray:
         first = start[:-1]  # a diagonal block is the first of its column
-        return (self._base[first][:, None] + np.arange(3) * (self._stride[first][:, None] + 1)).ravel()
+        step = self._stride[first][:, None] + 1
+        return (self._base[first][:, None] + np.arange(self.block) * step).ravel()
 
-    def assemble(self, energies: Sequence[Energy], x: np.ndarray) -> np.ndarray:
-        """Values (nnz,) of the lower matrix at x (V, 3) [N/m]."""
+    def assemble(self, x: np.ndarray) -> np.ndarray:
+        """Values (nnz,) of the lower matrix at x (V, 3) [N/m]: Hessian, or scalar stiffness for block 1."""
         data = np.zeros(len(self.indices))
-        for energy, slots in zip(energies, self._slots):
-            elements, blocks = energy.active_hessian_blocks(x)
-            _scatter(elements, blocks, slots, energy.stencils.shape[1], self._base, self._stride, data)
+        for energy, slots in zip(self.energies, self._slots):
+            elements, blocks = (
+                energy.active_hessian_blocks(x) if self.block == 3 else energy.scalar_stiffness(x)
+            )
+            k = energy.stencils.shape[1]
+            _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
         return data
 
     def lower(self, data: np.ndarray) -> sp.csc_matrix:
@@ -87,32 +106,26 @@ def _block_keys(stencils: np.ndarray, n: int) -> np.ndarray:
     return key.reshape(len(stencils), -1)
 
 
-def _row_indices(start: np.ndarray, row: np.ndarray) -> np.ndarray:
-    indices = np.empty(9 * len(row), dtype=np.int64)
-    _fill_rows(start, row, indices)
-    return indices
-
-
 @njit(cache=True)
-def _fill_rows(start, row, indices):
+def _fill_rows(start, row, block, indices):
     at = 0
     for column in range(start.shape[0] - 1):
-        for _ in range(3):
+        for _ in range(block):
             for p in range(start[column], start[column + 1]):
-                for r in range(3):
-                    indices[at] = 3 * row[p] + r
+                for r in range(block):
+                    indices[at] = block * row[p] + r
                     at += 1
 
 
 @njit(cache=True)
-def _scatter(elements, blocks, slots, k, base, stride, data):
+def _scatter(elements, blocks, slots, k, block, base, stride, data):
     for n in range(elements.shape[0]):
         e = elements[n]
         for a in range(k):
             for b in range(k):
                 slot = slots[e, a * k + b]
                 if slot >= 0:
-                    for j in range(3):
+                    for j in range(block):
                         at = base[slot] + j * stride[slot]
-                        for i in range(3):
-                            data[at + i] += blocks[n, 3 * a + i, 3 * b + j]
+                        for i in range(block):
+                            data[at + i] += blocks[n, block * a + i, block * b + j]

@@ -12,43 +12,43 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from .hessian_pattern import HessianPattern
-
 
 class LinearSolver(Protocol):
     """Factorisations on one fixed pattern."""
 
     def factorise(self, data: np.ndarray) -> bool:
-        """Factorise the lower matrix with these values (nnz,); False if it is not positive definite."""
+        """Factorise the matrix with these values (nnz,) of its pattern; False if not positive definite."""
         ...
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the last successful factorisation: b (3n,) [N] -> (3n,) [m]."""
+        """Solve with the last successful factorisation: b (n,) or (n, k), same shape back."""
         ...
 
 
-def analyse(pattern: HessianPattern) -> LinearSolver:
-    """Symbolic analysis of a pattern, with the best package that is installed."""
+def analyse(indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> LinearSolver:
+    """Symbolic analysis of a lower-triangular CSC pattern, with the best package that is installed.
+
+    Args:
+        indptr, indices: the pattern; entries above the diagonal may be stored and are ignored.
+        order: (n,) fill-reducing order of rows and columns.
+    """
     try:
-        return CholmodSolver(pattern)
+        return CholmodSolver(indptr, indices, order)
     except ImportError:
-        return SuperLUSolver(pattern)
+        return SuperLUSolver(indptr, indices, order)
 
 
 class CholmodSolver:
     """Supernodal CHOLMOD through cvxopt."""
 
-    def __init__(self, pattern: HessianPattern) -> None:
+    def __init__(self, indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> None:
         from cvxopt import cholmod, matrix, spmatrix
 
         self._cholmod, self._matrix = cholmod, matrix
-        columns = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
-        self._A = spmatrix(
-            matrix(np.ones(len(columns))), matrix(pattern.indices), matrix(columns), (pattern.size, pattern.size)
-        )
-        order = nested_dissection(pattern.adjacency)
-        scalar = (3 * order[:, None] + np.arange(3)).ravel()
-        self._symbolic = cholmod.symbolic(self._A, p=matrix(scalar.tolist()), uplo="L")
+        size = len(indptr) - 1
+        columns = np.repeat(np.arange(size), np.diff(indptr))
+        self._A = spmatrix(matrix(np.ones(len(columns))), matrix(indices), matrix(columns), (size, size))
+        self._symbolic = cholmod.symbolic(self._A, p=matrix(order.tolist()), uplo="L")
 
     def factorise(self, data: np.ndarray) -> bool:
         self._A.V = self._matrix(data)
@@ -61,20 +61,20 @@ class CholmodSolver:
     def solve(self, b: np.ndarray) -> np.ndarray:
         x = self._matrix(b)
         self._cholmod.solve(self._symbolic, x)
-        return np.array(x).ravel()
+        return np.array(x).reshape(b.shape)
 
 
 class SuperLUSolver:
     """scipy's SuperLU kept symmetric: no pivoting, and a negative pivot means not positive definite."""
 
-    def __init__(self, pattern: HessianPattern) -> None:
-        self._pattern = pattern
-        order = nested_dissection(pattern.adjacency)
-        self._order = (3 * order[:, None] + np.arange(3)).ravel()
+    def __init__(self, indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> None:
+        self._indptr, self._indices, self._order = indptr, indices, order
         self._lu: spla.SuperLU | None = None
 
     def factorise(self, data: np.ndarray) -> bool:
-        A = self._pattern.symmetric(data)[self._order][:, self._order]
+        size = len(self._order)
+        lower = sp.tril(sp.csc_matrix((data, self._indices, self._indptr), shape=(size, size)), format="csc")
+        A = sp.csc_matrix(lower + sp.tril(lower, -1).T)[self._order][:, self._order]
         try:
             lu = spla.splu(
                 sp.csc_matrix(A),

@@ -42,7 +42,7 @@ class Material:
             raise ValueError(f"Material.poisson_ratio = {self.poisson_ratio!r}: must lie in (-1, 0.5]")
         if not (math.isfinite(self.bending_stiffness) and self.bending_stiffness >= 0):
             raise ValueError(
-                f"Material.bending_stiffness = {self.bending_stiffness!r}: must be finite and not negative [J]"
+                f"Material.bending_stiffness = {self.bending_stiffness!r}: must be finite, at least 0 [J]"
             )
 
     @property

@@ -76,9 +76,7 @@ class Obstacle:
         """Vertices (B, 3) at `frame`; the last frame holds on for ever."""
         return self.positions[min(frame, self.frames - 1)]
 
-    def _closest(
-        self, points: np.ndarray, frame: int, *, reachable: bool
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _closest(self, points: np.ndarray, frame: int, *, reachable: bool) -> tuple[np.ndarray, np.ndarray]:
         """Nearest face and point, on the whole mesh or on the reachable faces; the last tree is kept."""
         frame = min(frame, self.frames - 1)
         if reachable not in self._trees or self._trees[reachable][0] != frame:
@@ -114,20 +112,19 @@ class Obstacle:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Face (S,), closest point (S, 3) and its barycentric place (S, 3), under the rule of regions."""
         vertices = self.at(frame)
-        local = self.rest_centroids is not None and rest_points is not None
-        if local:
+        if self.rest_centroids is None or rest_points is None:
+            face, nearest = self._closest(points, frame, reachable=False)
+        else:
             self._reach(rest_points)
-        face, nearest = self._closest(points, frame, reachable=local)
-        if local:
+            face, nearest = self._closest(points, frame, reachable=True)
             offset = self.rest_centroids[face] - rest_points
             far = np.flatnonzero(np.einsum("si,si->s", offset, offset) > self.region**2)
-            _closest_allowed(
-                points, far, rest_points, vertices, self.faces, self.rest_centroids, self.region, face, nearest
-            )
+            rest = (rest_points, self.rest_centroids, self.region)
+            _closest_allowed(points, far, *rest, vertices, self.faces, face, nearest)
         return face, nearest, _barycentric(nearest, vertices[self.faces[face]])
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
-        """Contact planes at `frame` for samples at points (S, 3), whose rest positions are rest_points (S, 3).
+        """Contact planes at `frame` for samples at points (S, 3) with rest positions rest_points (S, 3).
 
         The plane goes through the closest allowed point of the surface; its normal points from there to the
         sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
@@ -171,7 +168,7 @@ class Obstacle:
 
 def _check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
     if positions.ndim != 3 or positions.shape[2] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
-        raise MeshError(f"obstacle positions {positions.shape}, faces {faces.shape}: expected (T, B, 3), (F, 3)")
+        raise MeshError(f"obstacle positions {positions.shape}, faces {faces.shape}: want (T, B, 3), (F, 3)")
     if faces.min() < 0 or faces.max() >= positions.shape[1]:
         raise MeshError(f"obstacle faces name a vertex outside 0..{positions.shape[1] - 1}")
     bad = np.argwhere(~np.isfinite(positions))
@@ -211,7 +208,7 @@ def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _closest_allowed(points, which, rest_points, vertices, faces, rest_centroids, region, face, nearest):
+def _closest_allowed(points, which, rest_points, rest_centroids, region, vertices, faces, face, nearest):
     """For the samples `which`, replace face and nearest by the closest among allowed faces.
 
     A sample with no allowed face at all keeps its global answer.

@@ -27,8 +27,8 @@ class Potential:
         self.cloth = self.energies[0].cloth
         for energy in self.energies:
             if energy.cloth is not self.cloth:
-                raise ValueError(f"energy {energy.name!r} was built on another cloth: use one Cloth for all terms")
-        self._patterns: dict[bytes, HessianPattern] = {}
+                raise ValueError(f"energy {energy.name!r} was built on another cloth: use one for all")
+        self._patterns: dict[tuple[bytes, int], HessianPattern] = {}
 
     def prepare(self, step: Step) -> None:
         """Freeze in every term what it needs for one step."""
@@ -64,11 +64,12 @@ class Potential:
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
         """Second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
         pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
-        return pattern.symmetric(pattern.assemble(self.energies, np.ascontiguousarray(x, dtype=np.float64)))
+        return pattern.symmetric(pattern.assemble(np.ascontiguousarray(x, dtype=np.float64)))
 
-    def pattern(self, free: np.ndarray) -> HessianPattern:
-        """The Hessian's pattern over the vertices marked free (V,); built once and kept."""
-        key = np.packbits(free).tobytes()
+    def pattern(self, free: np.ndarray, *, block: int = 3) -> HessianPattern:
+        """Pattern over the vertices marked free (V,), of the Hessian or (block=1) of a scalar stiffness."""
+        key = (np.packbits(free).tobytes(), block)
         if key not in self._patterns:
-            self._patterns[key] = HessianPattern(self.energies, self.cloth.vertex_count, free)
+            terms = [e for e in self.energies if block == 3 or e.has_scalar_stiffness]
+            self._patterns[key] = HessianPattern(terms, self.cloth.vertex_count, free, block=block)
         return self._patterns[key]

@@ -60,7 +60,8 @@ class Trajectory:
         """Write the whole file under a temporary name, then put it in place."""
         path = Path(path)
         part = path.with_name(path.name + ".part")
-        with TrajectoryWriter(part, self.faces, self.provenance, vertex_count=self.positions.shape[1]) as writer:
+        count = self.positions.shape[1]
+        with TrajectoryWriter(part, self.faces, self.provenance, vertex_count=count) as writer:
             for k in range(self.frames):
                 fields = {name: values[k] for name, values in self.frame_fields.items()}
                 writer.append(self.positions[k], self.times[k], self.frame_seconds[k], fields, flush=False)

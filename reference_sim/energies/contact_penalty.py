@@ -85,13 +85,11 @@ class ContactPenalty(Energy):
 
     def prepare(self, step: Step) -> None:
         if step.obstacle is None:
-            raise ValueError("ContactPenalty needs an obstacle: pass one to simulate(), or leave the term out")
+            raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
         planes = step.obstacle.planes(self.sample_matrix @ step.guess, step.frame, self.rest_samples)
         self.points, self.normals = planes.points, planes.normals
 
-    def energy(
-        self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None
-    ) -> Tensor:
+    def energy(self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None) -> Tensor:
         """x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S) [J]; default: the prepared planes."""
         import torch
 
@@ -128,6 +126,13 @@ class ContactPenalty(Energy):
         return _hessian(
             x, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals
         )
+
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The curvature along the normal, taken in every direction; for samples in contact at x."""
+        elements, blocks = self.active_hessian_blocks(x)
+        normals = self.normals[elements]
+        along = np.einsum("naibj,ni,nj->nab", blocks.reshape(-1, 3, 3, 3, 3), normals, normals)
+        return elements, along
 
 
 def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

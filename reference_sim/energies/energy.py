@@ -100,12 +100,24 @@ class Energy:
         return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()
 
     def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Elements with a non-zero Hessian (n,) and their blocks (n, 3k, 3k): all of them unless overridden."""
+        """Elements with a non-zero Hessian (n,), their blocks (n, 3k, 3k): all of them unless overridden."""
         return np.arange(len(self.stencils)), self.hessian_blocks(x)
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
-        """Largest share of `direction` (V, 3) [m] that may be walked from x (V, 3); 1 unless the term forbids.
+        """Largest share of `direction` (V, 3) [m] that may be walked from x (V, 3); 1 if nothing forbids.
 
         For terms that are infinite beyond a first touch.
         """
         return 1.0
+
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A positive semi-definite stand-in for the Hessian that treats x, y and z alike.
+
+        Elements (n,) and matrices (n, k, k) [N/m] over their vertices, for preconditioning. Terms without one
+        are left out of a preconditioner.
+        """
+        raise NotImplementedError
+
+    @property
+    def has_scalar_stiffness(self) -> bool:
+        return type(self).scalar_stiffness is not Energy.scalar_stiffness

@@ -47,12 +47,13 @@ class Inertia(Energy):
     def element_energy(self, u: Tensor) -> Tensor:
         return self.energy(u[..., 0, :])
 
-    def value_and_gradient(
-        self, x: np.ndarray, x_hat: np.ndarray | None = None
-    ) -> tuple[float, np.ndarray]:
+    def value_and_gradient(self, x: np.ndarray, x_hat: np.ndarray | None = None) -> tuple[float, np.ndarray]:
         offset = x - (self.x_hat if x_hat is None else x_hat)
         gradient = (self.masses / self.dt**2)[:, None] * offset
         return 0.5 * float(np.vdot(gradient, offset)), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
         return (self.masses / self.dt**2)[:, None, None] * np.eye(3)
+
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.arange(len(self.masses)), (self.masses / self.dt**2)[:, None, None]

@@ -48,6 +48,10 @@ class StretchSpring(Energy):
         block = 2 * self.stiffness * (outer + slack * (np.eye(3) - outer))
         return np.block([[block, -block], [-block, block]])
 
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        block = 2 * self.stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return np.arange(len(self.stencils)), np.broadcast_to(block, (len(self.stencils), 2, 2))
+
 
 @njit(cache=True)
 def _gradient(x, edges, rest_lengths, stiffness, gradient):

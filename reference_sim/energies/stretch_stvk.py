@@ -59,6 +59,12 @@ class StretchStVK(Energy):
         _hessian(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, blocks)
         return blocks
 
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(mu + lambda/2) times the cotangent Laplacian: the mean over directions of the Hessian at rest."""
+        b = np.concatenate([-self.Dm_inverse.sum(axis=1, keepdims=True), self.Dm_inverse], axis=1)
+        scale = (self.mu + 0.5 * self.lam) * self.areas
+        return np.arange(len(self.areas)), scale[:, None, None] * (b @ b.transpose(0, 2, 1))
+
 
 @njit(cache=True, inline="always")
 def _deformation(x, face, D):
@@ -114,9 +120,7 @@ def _hessian(x, faces, Dm_inverse, areas, lam, mu, blocks):
                 Fb[a, i] = fa[i] * b[a, 0] + fb[i] * b[a, 1]
         for a in range(3):
             for c in range(a + 1):
-                bSb = (
-                    b[a, 0] * (S00 * b[c, 0] + S01 * b[c, 1]) + b[a, 1] * (S01 * b[c, 0] + S11 * b[c, 1])
-                )
+                bSb = b[a, 0] * (S00 * b[c, 0] + S01 * b[c, 1]) + b[a, 1] * (S01 * b[c, 0] + S11 * b[c, 1])
                 bb = b[a, 0] * b[c, 0] + b[a, 1] * b[c, 1]
                 for i in range(3):
                     for j in range(3):

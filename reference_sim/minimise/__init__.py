@@ -1,6 +1,37 @@
 """Minimisers of a Potential: same call, same result type, one file each."""
 
-from .newton import Newton, minimise
-from .result import Result
+from typing import Protocol
 
-__all__ = ["Newton", "Result", "minimise"]
+import numpy as np
+
+from ..potential import Potential
+from .lbfgs import LBFGS
+from .newton import Newton
+from .result import STATUSES, Result
+
+METHODS = {"newton": Newton, "lbfgs": LBFGS}
+
+__all__ = ["LBFGS", "METHODS", "STATUSES", "Minimiser", "Newton", "Result", "make_minimiser", "minimise"]
+
+
+class Minimiser(Protocol):
+    """Bound to one potential, so that symbolic analysis is done once for all steps."""
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        """Run from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
+        ...
+
+
+def make_minimiser(potential: Potential, method: str = "newton", **options: float) -> Minimiser:
+    """A minimiser by name ("newton" or "lbfgs") with its options; raises ValueError for an unknown name."""
+    if method not in METHODS:
+        raise ValueError(f"unknown minimiser {method!r}: choose one of {', '.join(METHODS)}")
+    return METHODS[method](potential, **options)  # type: ignore[arg-type]
+
+
+def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **options: float) -> Result:
+    """Minimise `potential` from x0 (V, 3) [m]; pinned vertices stay where x0 has them.
+
+    Options are those of the method's class. Failure is a status in the result, not an exception.
+    """
+    return make_minimiser(potential, method, **options).minimise(x0)

@@ -14,6 +14,7 @@ import time
 
 import numpy as np
 
+from ..energies.inertia import Inertia
 from ..linear_solver import analyse
 from ..material import GRAVITY
 from ..potential import Potential
@@ -22,14 +23,6 @@ from .result import Result
 SUFFICIENT_DECREASE = 1e-4
 MAX_SHIFT = 1e12  # in units of M/dt^2; beyond it a step is shorter than round-off
 STEP_TOLERANCE = 1e-3  # of a mean edge length
-
-
-def minimise(potential: Potential, x0: np.ndarray, **options: float) -> Result:
-    """Minimise `potential` from x0 (V, 3) [m]; pinned vertices stay where x0 has them.
-
-    Options are those of `Newton`. Failure is a status in the result.
-    """
-    return Newton(potential, **options).minimise(x0)
 
 
 class Newton:
@@ -58,8 +51,8 @@ class Newton:
         free[cloth.pins] = False
         self._pattern = potential.pattern(free)
         self._free = self._pattern.free
-        self._solver = analyse(self._pattern)
-        dt = next((e.dt for e in potential.energies if e.name == "inertia"), reference_dt)
+        self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
+        dt = next((e.dt for e in potential.energies if isinstance(e, Inertia)), reference_dt)
         self._metric = np.repeat(cloth.masses[self._free] / dt**2, 3)
         self._weight = float(cloth.masses.mean() * GRAVITY)
         self._step_tolerance = STEP_TOLERANCE * float(cloth.edge_lengths.mean())
@@ -120,7 +113,7 @@ class _Run:
     def assemble(self) -> np.ndarray:
         start = time.perf_counter()
         with np.errstate(all="ignore"):
-            data = self.n._pattern.assemble(self.n.potential.energies, self.x)
+            data = self.n._pattern.assemble(self.x)
         self.seconds["assemble"] += time.perf_counter() - start
         return data
 
