@@ -1,4 +1,4 @@
-"""Runs one cell: the only place that holds a clock. The raw trajectory is written before anything is measured."""
+"""Runs one cell: the only place that holds a clock. The raw trajectory is written before it is measured."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,52 +43,52 @@ class Reference:
     curvature: CurvatureSeries
 
 
-def load_reference(run: RunFolder, outcomes: list[Outcome], scene: BuiltScene) -> Reference | None:
-    """The reference of a scene, where it was run and came to its end."""
+def measure_scene(
+    outcomes: Sequence[Outcome], scene: BuiltScene, run: RunFolder, costs: Sequence[Mapping[str, float]]
+) -> list[dict[str, float]]:
+    """Every metric of the recorded cells of one scene, in their order.
+
+    The energies of each frame are added to the trajectory files.
+    """
     from reference_sim import Trajectory
 
-    for outcome in outcomes:
-        if outcome.cell.method == REFERENCE and outcome.recorded and outcome.status in ("ok", "stalled"):
-            path = run.trajectory_path(scene.name, REFERENCE, outcome.cell.seed)
-            positions = Trajectory.load(path).positions
-            return Reference(positions, curvature_series(positions, scene.cloth.faces))
+    paths = [run.trajectory_path(scene.name, o.cell.method, o.cell.seed) for o in outcomes]
+    trajectories = [Trajectory.load(path) for path in paths]
+    positions = [trajectory.positions for trajectory in trajectories]
+    energies = energy_series(scene, positions)
+    curvatures = [curvature_series(x, scene.cloth.faces) for x in positions]
+    inside = penetration(positions, scene.obstacle) if scene.obstacle is not None else []
+    reference = find_reference(outcomes, positions, curvatures)
+    found: list[dict[str, float]] = []
+    for k, (outcome, trajectory) in enumerate(zip(outcomes, trajectories)):
+        _add_fields(trajectory, paths[k], energies[k], curvatures[k])
+        metrics = {f"energy/{term}": mean_energy(series) for term, series in energies[k].items()}
+        metrics["curvature/mean"] = float(curvatures[k].means().mean())
+        if reference is not None and outcome.cell.method != REFERENCE:
+            metrics |= _against(positions[k], curvatures[k], reference)
+        if inside:
+            metrics["penetration/vertices"] = 100.0 * float(inside[k].share.mean())
+            metrics["penetration/depth_p99"] = MM * float(np.percentile(inside[k].depth, 99))
+        if scene.exact is not None:
+            exact = scene.exact[: trajectory.frames]
+            metrics["exact/distance"] = float(np.linalg.norm(positions[k] - exact, axis=2).max())
+        held = run.trajectory_path(scene.name, f"{outcome.cell.method}-held", outcome.cell.seed)
+        if held.is_file():
+            difference = distance_rms(positions[k], Trajectory.load(held).positions)
+            metrics["dynamics/held_difference"] = MM * float(np.sqrt((difference**2).mean()))
+        metrics["cost/frame"] = MM * seconds_per_frame(trajectory)
+        found.append(metrics | dict(costs[k]))
+    return found
+
+
+def find_reference(
+    outcomes: Sequence[Outcome], positions: Sequence[np.ndarray], curvatures: Sequence[CurvatureSeries]
+) -> Reference | None:
+    """The simulation among the cells of a scene, where it came to its end."""
+    for outcome, x, curvature in zip(outcomes, positions, curvatures):
+        if outcome.cell.method == REFERENCE and outcome.status in ("ok", "stalled"):
+            return Reference(x, curvature)
     return None
-
-
-def measure(
-    outcome: Outcome,
-    scene: BuiltScene,
-    run: RunFolder,
-    reference: Reference | None,
-    costs: Mapping[str, float],
-) -> dict[str, float]:
-    """Every metric of a recorded cell. The energies of each frame are added to its trajectory file."""
-    from reference_sim import Trajectory
-
-    cell = outcome.cell
-    path = run.trajectory_path(scene.name, cell.method, cell.seed)
-    trajectory = Trajectory.load(path)
-    energies = energy_series(scene, trajectory.positions)
-    curvature = curvature_series(trajectory.positions, scene.cloth.faces)
-    _add_fields(trajectory, path, energies, curvature)
-
-    found = {f"energy/{term}": mean_energy(series) for term, series in energies.items()}
-    found["curvature/mean"] = float(curvature.means().mean())
-    if reference is not None and cell.method != REFERENCE:
-        found |= _against(trajectory, curvature, reference)
-    if scene.obstacle is not None:
-        inside = penetration(trajectory.positions, scene.obstacle)
-        found["penetration/vertices"] = 100.0 * float(inside.share.mean())
-        found["penetration/depth_p99"] = MM * float(np.percentile(inside.depth, 99))
-    if scene.exact is not None:
-        exact = scene.exact[: trajectory.frames]
-        found["exact/distance"] = float(np.linalg.norm(trajectory.positions - exact, axis=2).max())
-    held = run.trajectory_path(scene.name, f"{cell.method}-held", cell.seed)
-    if held.is_file():
-        difference = distance_rms(trajectory.positions, Trajectory.load(held).positions)
-        found["dynamics/held_difference"] = MM * float(np.sqrt((difference**2).mean()))
-    found["cost/frame"] = MM * seconds_per_frame(trajectory)
-    return found | dict(costs)
 
 
 def seconds_per_frame(trajectory: Trajectory) -> float:
@@ -97,8 +97,10 @@ def seconds_per_frame(trajectory: Trajectory) -> float:
     return float(seconds.mean())
 
 
-def model_costs(trained: Trained, data_seconds: float) -> dict[str, float]:
-    """cost/data, cost/train and cost/memory of a method that uses this network."""
+def model_costs(trained: Trained | None, data_seconds: float) -> dict[str, float]:
+    """cost/data, cost/train and cost/memory of a method that uses this network; nothing without one."""
+    if trained is None:
+        return {}
     data = data_seconds if trained.kind == "supervised" else 0.0
     return {"cost/data": data, "cost/train": trained.seconds, "cost/memory": trained.megabytes}
 
@@ -129,11 +131,11 @@ def rows_of(outcome: Outcome, metrics: Mapping[str, float], scene: BuiltScene | 
     return rows
 
 
-def _against(trajectory: Trajectory, curvature: CurvatureSeries, reference: Reference) -> dict[str, float]:
-    frames = min(trajectory.frames, len(reference.positions))
+def _against(x: np.ndarray, curvature: CurvatureSeries, reference: Reference) -> dict[str, float]:
+    frames = min(len(x), len(reference.positions))
     theirs = CurvatureSeries(reference.curvature.curvature[:frames], reference.curvature.area[:frames])
     ours = CurvatureSeries(curvature.curvature[:frames], curvature.area[:frames])
-    distance = distance_rms(trajectory.positions[:frames], reference.positions[:frames])
+    distance = distance_rms(x[:frames], reference.positions[:frames])
     return {
         "curvature/error": float(curvature_error(ours, theirs).mean()),
         "curvature/mean_difference": float((ours.means() - theirs.means()).mean()),

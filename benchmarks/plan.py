@@ -114,7 +114,7 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     for path in paths:
         for motion in load_motions(path) if path != "library" else ():
             if motion.name in files or motion.name in (*TRAIN, *TEST):
-                raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename one of the files")
+                raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             files[motion.name] = motion
     with_library = not paths or "library" in paths
     names = [*sorted(files), *((*TRAIN, *TEST) if with_library else ())]
@@ -168,7 +168,7 @@ def choose_cells(
     checks = _matching(CHECKS, scenes, "validation" in suites and _named(VALIDATION_METHOD, methods))
     cases = _matching(CASES, scenes, "extremes" in suites and _named(EXTREMES_METHOD, methods))
     if not (found or checks or cases):
-        raise PlanError("nothing to run: no suite asked for has these scenes and methods together; see --list")
+        raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
     # The reference first: an error against it can be said as soon as another cell is done.
     order = {entry.name: place for place, entry in enumerate(METHODS)}
     places = {name: place for place, name in enumerate(declared)}
@@ -181,7 +181,8 @@ def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
     words = list(words)
     for word in words:
         if word not in (*SUITE_NAMES, "all"):
-            raise PlanError(f"--suite: unknown suite '{word}'; choose from {', '.join((*SUITE_NAMES, 'all'))}")
+            known = ", ".join((*SUITE_NAMES, "all"))
+            raise PlanError(f"--suite: unknown suite '{word}'; choose from {known}")
     return tuple(name for name in SUITE_NAMES if not words or "all" in words or name in words)
 
 

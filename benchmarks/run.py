@@ -64,7 +64,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--scenes", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
     add("--methods", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
     add("--motions", action="append", default=[], metavar="PATH",
-        help="motion file or folder (.amc with its .asf, .npz), or the word library; may be repeated")  # fmt: skip
+        help="motion file or folder (.amc with its .asf, .npz), or the word library; repeatable")  # fmt: skip
     add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks run (default cpu)")
@@ -202,7 +202,8 @@ def describe(plan: Plan) -> str:
             lines.append(f"train {kind}, seed {seed}: {steps} steps")
     lines.append(f"{len(plan.cells) - skipped} cells, {skipped} skipped, {len(plan.checks)} checks, "
                  f"{len(plan.cases)} extreme cases")  # fmt: skip
-    lines += [f"  {cell.label} [{', '.join(cell.suites)}]" + ("" if runs(cell) else ": skip") for cell in plan.cells]
+    for cell in plan.cells:
+        lines.append(f"  {cell.label} [{', '.join(cell.suites)}]" + ("" if runs(cell) else ": skip"))
     lines += [f"  {check.name} [validation]" for check in plan.checks]
     lines += [f"  {case.name} [extremes]" for case in plan.cases]
     return "\n".join(lines)

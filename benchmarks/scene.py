@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import numpy as np
+
     from reference_sim import Cloth, Obstacle
     from reference_sim.energies import Energy
     from snug.body import Body

@@ -1,4 +1,4 @@
-"""The stages of a run, in order, each timed: wardrobe, ground truth, training, cells, metrics, checks, report.
+"""The stages of a run, in order, each timed: wardrobe, ground truth, training, cells, metrics, report.
 
 What is written is written whole. A cell that fails is a row with its reason and the rest goes on.
 """
@@ -20,13 +20,13 @@ from .plan import Cell, Plan, runs
 from .results import Row, RunFolder, with_provenance
 
 if TYPE_CHECKING:
-    from .jobs import Simulated, Trained
+    from .jobs import Trained
     from .scene import BuiltScene
     from .wardrobe import Wardrobe
 
 
 def execute(plan: Plan) -> int:
-    """Run the plan. Returns 0 when every cell ended well, 1 when one failed or the report could not be made."""
+    """Run the plan. Returns 0 when every cell ended well, 1 when one failed or there is no report."""
     run = RunInProgress(plan)
     try:
         run.all_stages()
@@ -151,16 +151,16 @@ class RunInProgress:
         self.note("motion_sources", {name: motions_of[name].source or "embedded library" for name in names})
 
     def ground_truth(self) -> None:
-        """Settle every dressed scene, simulate the training motions; two at a time, off every clock but its own."""
+        """Settle every dressed scene and simulate the training motions, two at a time."""
         from . import jobs
         from .workers import Failure, Job, run_jobs, worker_count
 
         plan, preset = self.plan, self.plan.preset
         assert self.wardrobe is not None
-        needs_start = {c.scene.name for c in plan.cells if c.scene.dressed and not find_method(c.method).needs_body}
-        todo = [
-            Job(name, jobs.settle, (name, preset, plan.folder), preset.settle_frames) for name in sorted(needs_start)
-        ]
+        simulated = [cell for cell in plan.cells if not find_method(cell.method).needs_body]
+        todo = []
+        for name in dict.fromkeys(cell.scene.name for cell in simulated if cell.scene.dressed):
+            todo.append(Job(name, jobs.settle, (name, preset, plan.folder), preset.settle_frames))
         for motion in plan.train if plan.needs_targets else ():
             units = preset.settle_frames + self.wardrobe.motions[motion].frames
             todo.append(Job(motion, jobs.simulate_motion, (motion, preset, plan.folder), units))
@@ -175,12 +175,13 @@ class RunInProgress:
                     unused[result.motion] = f"{result.status}: {result.reason}"
             elif isinstance(result, Failure):
                 unused[job.label] = result.reason
-        simulated = [result for result in results if isinstance(result, jobs.Simulated)]
+        done = [result for result in results if isinstance(result, jobs.Simulated)]
+        rough = {r.motion: f"{r.status}: {r.reason}" for r in done if r.status != "converged"}
         self.note("data", {
             "workers": worker_count(),
             "seconds": self.data_seconds,
-            "frames": sum(result.frames for result in simulated),
-            "not_converged": {r.motion: f"{r.status}: {r.reason}" for r in simulated if r.status != "converged"},
+            "frames": sum(result.frames for result in done),
+            "not_converged": rough,
             "unused": unused,
         })  # fmt: skip
 
@@ -209,17 +210,16 @@ class RunInProgress:
         self.note("training", summary)
 
     def cells_and_metrics(self) -> list[Outcome]:
-        """Cells one after another on an otherwise idle machine; then metrics from their files, scene by scene."""
+        """Cells one after another, nothing beside them; then metrics from their files, scene by scene."""
         outcomes: list[Outcome] = []
         built: dict[str, BuiltScene] = {}
         with self.stage("cells"):
             for cell in _bar(self.plan.cells, "cells", "cell"):
                 outcomes.append(self.one_cell(cell, built))
         with self.stage("metrics"):
-            with _total([outcome for outcome in outcomes if outcome.recorded], "metrics", "cell") as bar:
-                for scene in self.plan.scenes:
-                    of_scene = [outcome for outcome in outcomes if outcome.cell.scene is scene]
-                    self.rows += self.measured(of_scene, built.get(scene.name), bar)
+            for scene in _bar(self.plan.scenes, "metrics", "scene"):
+                of_scene = [outcome for outcome in outcomes if outcome.cell.scene == scene]
+                self.rows += self.measured(of_scene, built.get(scene.name))
             self.write_rows()
         return outcomes
 
@@ -257,6 +257,7 @@ class RunInProgress:
     def write_body(self, scene: BuiltScene) -> None:
         """trajectories/<scene>/body.vtkhdf, to look at the garments upon."""
         import numpy as np
+
         from reference_sim import Trajectory
 
         assert scene.obstacle is not None
@@ -270,25 +271,23 @@ class RunInProgress:
             provenance={"what": "the body of this scene"},
         ).save(path)
 
-    def measured(self, outcomes: list[Outcome], scene: BuiltScene | None, bar: Any) -> list[Row]:
+    def measured(self, outcomes: list[Outcome], scene: BuiltScene | None) -> list[Row]:
         """The rows of all cells of one scene."""
-        from .evaluate import load_reference, measure, model_costs, rows_of
+        from .evaluate import measure_scene, model_costs, rows_of
 
-        rows: list[Row] = []
-        reference = load_reference(self.folder, outcomes, scene) if scene is not None else None
-        for outcome in outcomes:
-            metrics: dict[str, float] = {}
-            if outcome.recorded and scene is not None:
-                trained = self.trained.get((find_method(outcome.cell.method).trained or "", outcome.cell.seed))
-                costs = model_costs(trained, self.data_seconds) if trained else {}
-                try:
-                    metrics = measure(outcome, scene, self.folder, reference, costs)
-                except Exception as error:
-                    reason = f"metrics: {one_line(error)}"
-                    outcome = dataclasses.replace(outcome, status="failed", reason=reason)
-                bar.update()
-            rows += rows_of(outcome, metrics, scene)
-        return rows
+        recorded = [outcome for outcome in outcomes if outcome.recorded]
+        networks = [(find_method(o.cell.method).trained or "", o.cell.seed) for o in recorded]
+        costs = [model_costs(self.trained.get(network), self.data_seconds) for network in networks]
+        metrics: list[dict[str, float]] = []
+        try:
+            if scene is not None and recorded:
+                metrics = measure_scene(recorded, scene, self.folder, costs)
+        except Exception as error:
+            reason = f"metrics: {one_line(error)}"
+            failed = {o.cell: dataclasses.replace(o, status="failed", reason=reason) for o in recorded}
+            outcomes = [failed.get(outcome.cell, outcome) for outcome in outcomes]
+        by_cell = {outcome.cell: found for outcome, found in zip(recorded, metrics)}
+        return [row for outcome in outcomes for row in rows_of(outcome, by_cell.get(outcome.cell, {}), scene)]
 
     def write_rows(self) -> None:
         """results.csv with the rows so far."""
@@ -310,7 +309,7 @@ class RunInProgress:
                 _, problems = build_report(self.folder.path)
         except Exception as error:
             line = one_line(error)
-            print(f"the report could not be made ({line}); results are in {self.folder.path}", file=sys.stderr)
+            print(f"no report ({line}); the results are in {self.folder.path}", file=sys.stderr)
             return False
         for problem in problems:
             print(f"report: left out: {problem}", file=sys.stderr)
@@ -325,12 +324,6 @@ def one_line(error: Exception) -> str:
 def now() -> str:
     """The time as ISO text with its zone."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
-
-
-def _total(items: list[Any], title: str, unit: str) -> Any:
-    from tqdm import tqdm
-
-    return tqdm(total=len(items), desc=title, unit=unit)
 
 
 def _bar(items: Any, title: str, unit: str) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from reference_sim import Cloth, Material, Obstacle, Potential, minimise
 from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
 from reference_sim.material import GRAVITY
@@ -15,7 +16,7 @@ def penalty_depth() -> float:
 
     A vertex of area a carries rho_a a g and is pushed by 3 k a depth^2: the area cancels.
     """
-    potential, contact, x, areal_density = _sheet_at_rest("vertices")
+    contact, x, areal_density = _sheet_at_rest("vertices")
     stiffness = contact.stiffness / contact.sample_areas  # k [J/m^5]
     exact = np.sqrt(areal_density * GRAVITY / (3 * stiffness))
     return float(((contact.margin - x[:, 1]) / exact).mean())
@@ -23,25 +24,26 @@ def penalty_depth() -> float:
 
 def contact_force() -> float:
     """Total upward contact force over the weight of the sheet, all contact samples on."""
-    potential, contact, x, areal_density = _sheet_at_rest("all")
+    contact, x, areal_density = _sheet_at_rest("all")
     upward = -contact.value_and_gradient(x)[1][:, 1].sum()
     return float(upward / (areal_density * GRAVITY))  # the sheet has unit area
 
 
-def _sheet_at_rest(samples: str) -> tuple[Potential, ContactPenalty, np.ndarray, float]:
+def _sheet_at_rest(samples: str) -> tuple[ContactPenalty, np.ndarray, float]:
     points, faces = jittered_patch(8)
     material = Material()
     rest = in_space(points)[:, [0, 2, 1]] - [0.5, 0.0, 0.5]
     cloth = Cloth(rest, faces[:, ::-1], material)
     floor = Obstacle(*box(half=2.0, height=1.0))
     contact = ContactPenalty(cloth, samples=samples)
-    start = rest + [0.0, 0.002, 0.0]
-    contact.prepare(Step(previous=start, velocity=np.zeros_like(start), guess=start, dt=1 / 30, obstacle=floor))
+    start = rest + np.array([0.0, 0.002, 0.0])
+    still = np.zeros_like(start)
+    contact.prepare(Step(previous=start, velocity=still, guess=start, dt=1 / 30, obstacle=floor))
     potential = Potential([StretchStVK(cloth), Gravity(cloth), contact])
     result = minimise(potential, start)
     if result.status != "converged":
         raise RuntimeError(f"the sheet did not come to rest: {result.reason}")
-    return potential, contact, result.positions, material.areal_density
+    return contact, result.positions, material.areal_density
 
 
 def box(*, half: float, height: float) -> tuple[np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from reference_sim import Cloth, Material, Potential, Trajectory, simulate
 from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
 
@@ -74,7 +75,7 @@ def momentum_balance() -> float:
 
 
 def energy_inequality() -> float:
-    """Largest excess of Phi' + |v' - v|_M^2/2 over Phi + |v|_M^2/2 of a step, over the largest kinetic energy.
+    """Largest excess of Phi' + |v' - v|_M^2/2 over Phi + |v|_M^2/2, over the largest kinetic energy.
 
     Both sides are the step's objective, at its end and at the previous positions: a step that ends above the
     place it came from is wrong. Measured on the hanging sheet.

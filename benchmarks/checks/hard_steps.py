@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+
 from reference_sim import Cloth, Material, Obstacle, Potential
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Inertia, Step, StretchStVK
 from reference_sim.material import GRAVITY
@@ -60,7 +61,7 @@ def teleport() -> HardStep:
     """A sphere of 8 cm stands at once where the sheet rests: vertices start up to 8 cm deep."""
     cloth = _cloth()
     points, faces = sphere(0.08, 12)
-    obstacle = Obstacle(points + [0.003, -0.02, 0.002], faces)
+    obstacle = Obstacle(points + np.array([0.003, -0.02, 0.002]), faces)
     return _step(cloth, _noisy, obstacle=obstacle)
 
 

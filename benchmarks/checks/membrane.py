@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import BendHinge, StretchStVK
 

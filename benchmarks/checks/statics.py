@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import Gravity, StretchStVK
 

@@ -59,7 +59,7 @@ METHODS = (
     *(
         MethodEntry(
             name=f"newton-{cut}",
-            description=f"the reference's Newton method, stopped after {cut} iteration{'s' * (cut > 1)} a step",
+            description=f"the reference's Newton method, cut after {cut} iteration{'s' * (cut > 1)} a step",
             module=_TRUNCATED,
             options={"iterations": cut},
         )

@@ -58,7 +58,7 @@ def mean_curvature(positions: Floats, faces: NDArray[np.int64]) -> tuple[Floats,
     areas_of_corners = np.where(obtuse.any(1)[:, None], share, voronoi)
 
     count = len(positions)
-    area = np.bincount(faces.ravel(), areas_of_corners.ravel(), count)
+    area = np.asarray(np.bincount(faces.ravel(), areas_of_corners.ravel(), count), dtype=float)
     laplacian = np.zeros((count, 3))
     for k in range(3):
         j, m = (k + 1) % 3, (k + 2) % 3

@@ -7,45 +7,68 @@ two before it; it counts as moving freely, hence inertia 0 there, and means star
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_sim.energies.gravity import Gravity
+
 if TYPE_CHECKING:
+    from reference_sim.energies import Energy
+
     from ..scene import BuiltScene
 
 FIRST_FULL_FRAME = 2
 
 
-def energy_series(scene: BuiltScene, positions: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Term -> (T,) [J] for positions (T,V,3) [m], plus "total". Terms not declared have no entry."""
-    from reference_sim.energies import Inertia, Step
+def energy_series(
+    scene: BuiltScene, trajectories: Sequence[NDArray[np.float64]]
+) -> list[dict[str, NDArray[np.float64]]]:
+    """Of each trajectory (T,V,3) [m]: term -> (T,) [J], plus "total". Terms not declared have no entry.
+
+    Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
+    """
+    from reference_sim.energies import Inertia
 
     terms = [*scene.energies, *([Inertia(scene.cloth, scene.dt)] if scene.dynamic else [])]
-    series = {term.name: np.zeros(len(positions)) for term in terms}
-    for frame, x in enumerate(positions):
-        previous = positions[max(frame - 1, 0)]
-        before = positions[max(frame - 2, 0)]
-        step = Step(
-            previous=previous,
-            velocity=(previous - before) / scene.dt,
-            guess=x,
-            dt=scene.dt,
-            obstacle=scene.obstacle,
-            frame=frame,
-        )
-        for term in terms:
-            if term.name == "inertia" and frame < FIRST_FULL_FRAME:
-                continue
-            term.prepare(step)
-            series[term.name][frame] = term.value_and_gradient(np.ascontiguousarray(x))[0]
-    if scene.origin_heights is not None:
-        for term in scene.energies:
-            if term.name == "gravity":
-                series["gravity"] -= term.weights.sum() * (scene.origin_heights - term.origin_height)
-    series["total"] = np.sum(list(series.values()), axis=0)
-    return series
+    found = [{term.name: np.zeros(len(positions)) for term in terms} for positions in trajectories]
+    for frame in range(max(map(len, trajectories), default=0)):
+        for positions, series in zip(trajectories, found):
+            if frame < len(positions):
+                for name, value in _terms_at(scene, terms, positions, frame).items():
+                    series[name][frame] = value
+    for series in found:
+        series["total"] = np.sum(list(series.values()), axis=0)
+    return found
+
+
+def _terms_at(
+    scene: BuiltScene, terms: Sequence[Energy], positions: NDArray[np.float64], frame: int
+) -> dict[str, float]:
+    from reference_sim.energies import Step
+
+    x = np.ascontiguousarray(positions[frame])
+    previous, before = positions[max(frame - 1, 0)], positions[max(frame - 2, 0)]
+    step = Step(
+        previous=previous,
+        velocity=(previous - before) / scene.dt,
+        guess=x,
+        dt=scene.dt,
+        obstacle=scene.obstacle,
+        frame=frame,
+    )
+    values = {}
+    for term in terms:
+        if term.name == "inertia" and frame < FIRST_FULL_FRAME:
+            continue
+        term.prepare(step)
+        values[term.name] = term.value_and_gradient(x)[0]
+        if term.name == "gravity" and scene.origin_heights is not None:
+            assert isinstance(term, Gravity)
+            values["gravity"] -= term.weights.sum() * (scene.origin_heights[frame] - term.origin_height)
+    return values
 
 
 def mean_energy(series: NDArray[np.float64]) -> float:

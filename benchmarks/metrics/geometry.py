@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,9 +32,17 @@ class Penetration:
     depth: Floats  # (T,V)
 
 
-def penetration(positions: Floats, obstacle: Obstacle) -> Penetration:
-    """How deep the vertices (T,V,3) [m] lie in the obstacle, by its true signed distance at that frame."""
-    depth = np.empty(positions.shape[:2])
-    for frame, x in enumerate(positions):
-        depth[frame] = np.maximum(0.0, -np.asarray(obstacle.signed_distance(x, frame)))
-    return Penetration(share=(depth > 0.0).mean(1), depth=depth)
+def penetration(trajectories: Sequence[Floats], obstacle: Obstacle) -> list[Penetration]:
+    """How deep the vertices of each trajectory (T,V,3) [m] lie in the obstacle, by its true signed distance.
+
+    All trajectories are asked about together at each frame: the obstacle's search tree is made once.
+    """
+    depths = [np.empty(positions.shape[:2]) for positions in trajectories]
+    for frame in range(max(map(len, trajectories), default=0)):
+        present = [k for k, positions in enumerate(trajectories) if frame < len(positions)]
+        points = np.concatenate([trajectories[k][frame] for k in present])
+        inside = np.maximum(0.0, -np.asarray(obstacle.signed_distance(points, frame)))
+        ends = np.cumsum([trajectories[k].shape[1] for k in present])
+        for k, part in zip(present, np.split(inside, ends[:-1])):
+            depths[k][frame] = part
+    return [Penetration(share=(depth > 0.0).mean(1), depth=depth) for depth in depths]

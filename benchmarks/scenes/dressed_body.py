@@ -7,6 +7,7 @@ moves its limbs from the T-pose into the first pose, then holds still for a whil
 from __future__ import annotations
 
 import numpy as np
+
 from reference_sim import Cloth, Material, Obstacle, Trajectory, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
 

@@ -10,6 +10,7 @@ are not declared.
 from __future__ import annotations
 
 import numpy as np
+
 from reference_sim import Cloth, Material
 from reference_sim.energies import Gravity
 from reference_sim.material import GRAVITY

@@ -16,6 +16,7 @@ from ..results import Row
 
 if TYPE_CHECKING:
     import numpy as np
+
     from reference_sim import Potential, Result
 
 METHOD = "simulation"
@@ -33,12 +34,12 @@ class Case:
 
 
 CASES = (
-    Case(name="stiffness_x1000", function="stiffness_up", description="Young's modulus 70 MPa, noisy start"),
-    Case(name="stiffness_x0.001", function="stiffness_down", description="Young's modulus 70 Pa, noisy start"),
+    Case(name="stiffness_x1000", function="stiffness_up", description="Young's modulus 70 MPa, noisy"),
+    Case(name="stiffness_x0.001", function="stiffness_down", description="Young's modulus 70 Pa, noisy"),
     Case(name="time_step_1s", function="long_step", description="one step of a second, thrown at 1 m/s"),
     Case(name="gravity_x1000", function="heavy", description="weight a thousand times the Earth's"),
-    Case(name="random_start", function="random_start", description="every vertex anywhere in a box of 0.4 m"),
-    Case(name="compression_70", function="compressed", description="pushed to 30 % of its width, nearly flat"),
+    Case(name="random_start", function="random_start", description="every vertex anywhere in 0.4 m"),
+    Case(name="compression_70", function="compressed", description="pushed to 30 % of its width, flat"),
     Case(name="all_at_one_point", function="one_point", description="all vertices at one point: a saddle"),
     Case(name="body_teleport", function="teleport", description="a sphere appears inside the resting sheet"),
 )
@@ -54,52 +55,65 @@ class HardStep:
     weight: float
 
 
+@dataclass(frozen=True)
+class Verdict:
+    """What is true of the end of a hard step: independent gradient norm, status and reason of the row."""
+
+    value: float | None
+    status: str
+    reason: str
+
+
 def run_case(case: Case) -> Row:
     """The row of one case: value = independent gradient norm in vertex weights."""
-    row = {
-        "suite": "extremes", "scene": case.name, "method": METHOD, "seed": 0, "metric": "outcome",
-        "unit": "vertex weights", "expected": 0.0, "tolerance": TOLERANCE,
-    }  # fmt: skip
+    terms = ""
     try:
         step: HardStep = getattr(importlib.import_module("benchmarks.checks.hard_steps"), case.function)()
-        row["terms"] = "+".join(energy.name for energy in step.potential.energies)
+        terms = "+".join(energy.name for energy in step.potential.energies)
         from reference_sim import minimise
 
-        result = minimise(step.potential, step.guess, tolerance=TOLERANCE, timeout=TIMEOUT)
-        return Row(**row, **judge(step, result))
+        verdict = judge(step, minimise(step.potential, step.guess, tolerance=TOLERANCE, timeout=TIMEOUT))
     except Exception as error:
-        return Row(**row, status="failed", reason=f"{type(error).__name__}: {error}")
+        verdict = Verdict(None, "failed", f"{type(error).__name__}: {error}")
+    return Row(
+        suite="extremes",
+        scene=case.name,
+        method=METHOD,
+        seed=0,
+        metric="outcome",
+        unit="vertex weights",
+        value=verdict.value,
+        status=verdict.status,
+        reason=verdict.reason,
+        expected=0.0,
+        tolerance=TOLERANCE,
+        terms=terms,
+    )
 
 
-def judge(step: HardStep, result: Result) -> dict[str, object]:
-    """value, status and reason of a row, from what the solver claims and what is found independently."""
+def judge(step: HardStep, result: Result) -> Verdict:
+    """The claim of the solver, held against what is found independently."""
     import numpy as np
 
     if not np.isfinite(result.positions).all():
-        return {"status": "failed", "reason": "the positions are not finite"}
+        return Verdict(None, "failed", "the positions are not finite")
     truth = _independent(step, result.positions)
+    norm = truth.gradient_norm
+    if not np.isfinite(norm):
+        return Verdict(None, "failed", "the gradient at the end is not finite")
     before = step.potential.value(step.guess)
     after = step.potential.value(result.positions)
-    verdict: dict[str, object] = {"value": truth.gradient_norm}
-    if not np.isfinite(truth.gradient_norm):
-        return {"status": "failed", "reason": "the gradient at the end is not finite"}
     if after > before + 1e-12 * abs(before):
-        return verdict | {"status": "failed", "reason": f"the energy rose from {before:.6g} to {after:.6g} J"}
+        return Verdict(norm, "failed", f"the energy rose from {before:.6g} to {after:.6g} J")
     if result.status != "converged":
         status = {"max_iterations": "stalled"}.get(result.status, result.status)
-        return verdict | {"status": status, "reason": f"{result.iterations} iterations: {result.reason}"}
+        return Verdict(norm, status, f"{result.iterations} iterations: {result.reason}")
     # Round-off of positions times stiffness bounds what any solver can reach.
-    if truth.gradient_norm > max(TOLERANCE, truth.floor):
-        return verdict | {
-            "status": "failed",
-            "reason": f"claims convergence at a gradient of {truth.gradient_norm:.3g} vertex weights",
-        }
+    if norm > max(TOLERANCE, truth.floor):
+        return Verdict(norm, "failed", f"claims convergence at a gradient of {norm:.3g} vertex weights")
     if truth.lowest < -1e-9 * truth.highest:
-        return verdict | {
-            "status": "failed",
-            "reason": f"claims convergence on a saddle: curvature {truth.lowest:.3g} N/m",
-        }
-    return verdict | {"status": "ok", "reason": f"{result.iterations} iterations"}
+        return Verdict(norm, "failed", f"claims convergence on a saddle: curvature {truth.lowest:.3g} N/m")
+    return Verdict(norm, "ok", f"{result.iterations} iterations")
 
 
 @dataclass(frozen=True)
