@@ -75,7 +75,7 @@ def log_axis(axes: Axes, which: str) -> None:
 
 
 def power_text(value: float) -> str:
-    """"$2{\\times}10^{-7}$" for matplotlib, which has no raised digits in its serif font."""
+    """For matplotlib, whose serif font has no raised digits: "0.25", "$2{\\times}10^{-7}$"."""
     if value == 0.0 or 1e-3 <= abs(value) < 1e4:
         return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
     mantissa, _, power = f"{value:.0e}".partition("e")

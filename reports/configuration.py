@@ -16,7 +16,8 @@ _FIRST = (
 
 def configuration(config: dict[str, Any], rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Groups {"title", "pairs": [[name, value], ...]}, all of run.json, whatever it holds."""
-    run = [[_title(name), _text(config[name])] for name in _FIRST if config.get(name) not in (None, [], "")]
+    said = {name: config[name] for name in _FIRST if config.get(name) not in (None, [], "")}
+    run = [[_title(name), _text(value)] for name, value in said.items() if not isinstance(value, dict)]
     wall = _wall_seconds(config)
     run += [["Wall time", duration(wall)]] if wall is not None else []
     for name in ("dtype", "threads", "hardware"):
@@ -64,7 +65,7 @@ def _text(value: Any) -> str:
 
 
 def _title(name: str) -> str:
-    """ "memory_gb" -> "Memory [GB]"."""
+    """From "memory_gb" to "Memory [GB]"."""
     words = name.replace("_", " ")
     for ending, unit in ((" gb", "GB"), (" mb", "MB"), (" seconds", "s")):
         if words.endswith(ending):

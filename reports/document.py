@@ -59,7 +59,7 @@ PAPER = {
     },
 }  # fmt: skip
 
-GROUPED = {"energies_by_scene": ("suite", "scene"), "speed": ("scene",)}
+GROUPED = {"energies_by_scene": ("scene",), "speed": ("scene",)}
 NOTES = {
     "energies": "In grey the values printed by the paper, for its own garment, motions, contact and zero of "
     "gravity: for orientation only, they enter no mean of ours.",
@@ -161,19 +161,20 @@ def _garments(tables: dict[str, Table], pictures: Sequence[Picture]) -> list[Blo
 def _trouble(tables: dict[str, Table], problems: Sequence[str]) -> list[Block]:
     blocks: list[Block] = []
     if "unfinished" in tables:
-        blocks.append(table_block(merged_by_scene(tables["unfinished"]), CAPTIONS["unfinished"]))
+        short = merged(merged(tables["unfinished"], "suite"), "scene")
+        blocks.append(table_block(short, CAPTIONS["unfinished"]))
     if problems:
         blocks.append(list_block("Files of this run that could not be read, missing above:", problems))
     return blocks
 
 
-def merged_by_scene(table: Table) -> Table:
-    """Lines that differ in their scene alone, as one line that names them all."""
-    place = [column.name for column in table.columns].index("scene")
-    scenes: dict[tuple[Cell, ...], list[str]] = {}
+def merged(table: Table, name: str) -> Table:
+    """Lines that differ in the column `name` alone, as one line with all that stands there."""
+    place = [column.name for column in table.columns].index(name)
+    found: dict[tuple[Cell, ...], list[str]] = {}
     for row in table.rows:
-        scenes.setdefault((*row[:place], *row[place + 1 :]), []).append(str(row[place]))
-    rows = tuple((*key[:place], ", ".join(names), *key[place:]) for key, names in scenes.items())
+        found.setdefault((*row[:place], *row[place + 1 :]), []).append(str(row[place]))
+    rows = tuple((*key[:place], ", ".join(words), *key[place:]) for key, words in found.items())
     return Table(table.name, table.columns, rows)
 
 
@@ -188,6 +189,7 @@ def _definitions(rows: Sequence[Row]) -> list[str]:
         "collision": "energy/collision",
         "total": "energy/total",
         "curvature": "curvature/mean",
+        "curvature_difference": "curvature/mean_difference",
         "distance": "distance/rms",
         "penetration": "penetration/vertices",
         "gap": "gap/relative",

@@ -19,7 +19,10 @@ WIDTHS = {"reason": "2fr", "check": "1fr", "case": "1fr", "scene": "1fr"}
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
 TEXTS = ("method", "scene", "suite", "check", "case", "outcome", "status", "reason", "unit")
 COSTS = ("data_generation", "training", "run_time", "memory")
-SPARE = "* A mean over fewer scenes than in the other rows, for want of the rest."
+REMARKS = {
+    "*": "* A mean over fewer scenes than in the other rows, for want of the rest.",
+    "†": "† The solver left some frames unconverged.",
+}
 _WORDS: dict[str, Callable[[str], str]] = {
     "method": palette.label,
     "outcome": lambda text: "converged" if text == "ok" else text,
@@ -60,8 +63,8 @@ def table_block(
     if any(cell["spread"] for line in cells for cell in line):
         seeds = max(cell.seeds for row in table.rows for cell in row if isinstance(cell, Mean))
         remarks.append(f"±: standard deviation over {seeds} seeds.")
-    if any(cell["mark"] for line in cells for cell in line):
-        remarks.append(SPARE)
+    marks = {mark for line in cells for cell in line for mark in cell["mark"]}
+    remarks += [REMARKS[mark] for mark in sorted(marks)]
     return {
         "kind": "table",
         "caption": caption,
@@ -98,6 +101,7 @@ def _column_texts(name: str, cells: Sequence[Cell], references: Sequence[str]) -
         spread = f"± {number(mean.spread, 1)}" if mean and mean.spread else ""
         # A cost is measured where it arises: a training has no scene, so none is missing from its mean.
         mark = "*" if mean and not mean.complete and name not in COSTS else ""
+        mark += "†" if mean and mean.stalled else ""
         found.append({"text": text, "spread": spread, "mark": mark})
     return found
 

@@ -38,14 +38,14 @@ def _trimmed(text: str) -> str:
 
 
 def with_spread(value: float | None, spread: float | None) -> str:
-    """"0.064 ± 0.002", the spread with two digits; the value alone where there is no spread."""
+    """As "0.064 ± 0.002", the spread with two digits; the value alone where there is no spread."""
     if spread is None or not math.isfinite(spread) or not finite(value):
         return number(value)
     return f"{number(value)} ± {number(spread, 2)}"
 
 
 def duration(seconds: float | None) -> str:
-    """"0.4 s", "75 s", "12.5 min", "3.1 h"; a dash if absent."""
+    """As "0.4 s", "75 s", "12.5 min" or "3.1 h"; a dash if absent."""
     if seconds is None or not math.isfinite(seconds):
         return DASH
     if seconds == 0.0:

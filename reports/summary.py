@@ -1,6 +1,7 @@
 """Means over scenes and seeds of the rows of a run.
 
-Only rows that ended ok with a finite value enter a mean: nothing is filled in for a cell that failed.
+Only finite values of cells that ended ok, or stalled at some frames, enter a mean; a mean says when one
+of its cells stalled. Nothing is filled in for a cell that failed.
 The mean is first taken over the scenes of one seed, then over seeds; the spread is the standard
 deviation over seeds (n - 1), absent for a single seed.
 """
@@ -16,6 +17,7 @@ from reports import palette
 from reports.numbers import finite
 
 TERMS = ("strain", "bending", "gravity", "inertia", "collision", "total")
+USABLE = ("ok", "stalled")
 EXTRA_TERMS = ("spring", "area", "friction", "barrier")
 
 
@@ -24,7 +26,8 @@ class Mean:
     """The mean of a metric, its spread over seeds, and what went into it.
 
     `complete` says that every seed has every scene asked for; otherwise the mean is over fewer cells
-    than its neighbours in a table, and the table must say so.
+    than its neighbours in a table, and the table must say so. `stalled` says that a solver left some
+    frames of some cell unconverged.
     """
 
     value: float
@@ -32,6 +35,7 @@ class Mean:
     scenes: int
     seeds: int
     complete: bool
+    stalled: bool = False
 
 
 class Measurements:
@@ -40,11 +44,14 @@ class Measurements:
     def __init__(self, rows: Iterable[Row]) -> None:
         self.rows = tuple(rows)
         self._values: dict[tuple[str, str, str], dict[int, float]] = {}
+        self._stalled: set[tuple[str, str]] = set()
         self.units: dict[str, str] = {}
         for row in self.rows:
-            if row.status == "ok" and row.value is not None and finite(row.value):
+            if row.status in USABLE and row.value is not None and finite(row.value):
                 key = (row.scene, row.method, row.metric)
                 self._values.setdefault(key, {})[row.seed] = row.value
+                if row.status == "stalled":
+                    self._stalled.add((row.scene, row.method))
                 self.units.setdefault(row.metric, row.unit)
         self.scenes = tuple(dict.fromkeys(row.scene for row in self.rows))
         self.methods = tuple(palette.ordered(row.method for row in self.rows if row.method))
@@ -73,7 +80,8 @@ class Measurements:
         means = [statistics.fmean(values) for values in by_seed.values()]
         spread = statistics.stdev(means) if len(means) > 1 else None
         complete = all(len(values) == len(asked) for values in by_seed.values())
-        return Mean(statistics.fmean(means), spread, len(used), len(means), complete)
+        stalled = any((scene, method) in self._stalled for scene in used)
+        return Mean(statistics.fmean(means), spread, len(used), len(means), complete, stalled)
 
     def value(self, method: str, metric: str, scenes: Sequence[str] | None = None) -> float | None:
         """The mean alone, or None."""
@@ -90,14 +98,20 @@ def suite_rows(rows: Iterable[Row], suite: str) -> list[Row]:
     return [row for row in rows if row.suite == suite]
 
 
+def benchmark_cells(rows: Iterable[Row], first: str) -> list[Row]:
+    """The rows of garments and speed, each cell once: a cell that both report is taken from `first`."""
+    kept = [row for row in rows if row.suite in ("garments", "speed")]
+    taken = {_cell(row) for row in kept if row.suite == first}
+    return [row for row in kept if row.suite == first or _cell(row) not in taken]
+
+
+def _cell(row: Row) -> tuple[str, str, int, str]:
+    return (row.scene, row.method, row.seed, row.metric)
+
+
 def speed_measurements(rows: Sequence[Row]) -> Measurements:
-    """What an error-against-run-time plot may use: the speed suite, and the garments where it has no row."""
-    speed = suite_rows(rows, "speed")
-    taken = {(row.scene, row.method, row.metric) for row in speed}
-    others = [
-        row for row in suite_rows(rows, "garments") if (row.scene, row.method, row.metric) not in taken
-    ]
-    return Measurements([*speed, *others])
+    """What an error-against-run-time plot may use: everything that has a scene and a method."""
+    return Measurements(benchmark_cells(rows, "speed"))
 
 
 def excess_energy(measurements: Measurements, scene: str, method: str) -> float | None:

@@ -13,6 +13,7 @@ from reports.summary import (
     EXTRA_TERMS,
     TERMS,
     Measurements,
+    benchmark_cells,
     dressed_scenes,
     excess_energy,
     speed_measurements,
@@ -52,21 +53,18 @@ def energies(rows: Sequence[Row]) -> Table | None:
 
 
 def energies_by_scene(rows: Sequence[Row]) -> Table | None:
-    """The same scene by scene, for every suite that measured energies."""
-    kept = [row for row in rows if row.suite in ("garments", "speed")]
-    measured = Measurements(kept)
+    """The same scene by scene, small scenes and cut solvers included."""
+    measured = Measurements(benchmark_cells(rows, "garments"))
     columns = energy_columns(measured)
     lines: list[tuple[Cell, ...]] = []
-    for suite in ("garments", "speed"):
-        own = Measurements(suite_rows(kept, suite))
-        for scene in own.scenes:
-            for method in own.methods:
-                means = [own.mean(method, metric, [scene]) for metric, _ in columns]
-                if any(mean is not None for mean in means):
-                    lines.append((suite, scene, method, *means))
+    for scene in measured.scenes:
+        for method in measured.methods:
+            means = [measured.mean(method, metric, [scene]) for metric, _ in columns]
+            if any(mean is not None for mean in means):
+                lines.append((scene, method, *means))
     if not lines:
         return None
-    head = (Column("suite", "Suite"), Column("scene", "Scene"), Column("method", "Method"))
+    head = (Column("scene", "Scene"), Column("method", "Method"))
     return Table("energies_by_scene", (*head, *(column for _, column in columns)), tuple(lines))
 
 
@@ -84,6 +82,7 @@ def curvature(rows: Sequence[Row]) -> Table | None:
         [
             ("curvature/error", Column("error", "Mean-curvature error", "1/m")),
             ("curvature/mean", Column("mean", "Mean curvature", "1/m")),
+            ("curvature/mean_difference", Column("mean_difference", "Difference of means", "1/m")),
         ],
     )
 
@@ -181,7 +180,7 @@ def extremes(rows: Sequence[Row]) -> Table | None:
         Column("method", "Method"),
         Column("outcome", "Outcome"),
         Column("gradient", "Largest gradient", "vertex weights"),
-        Column("reason", "Reason"),
+        Column("reason", "In words"),
     )
     return Table("extremes", columns, tuple(lines))
 

@@ -209,7 +209,7 @@ def trouble(rows: Sequence[Row]) -> str:
     kinds = ((False, "failed, stalled or ran out of time"), (True, "skipped for a stated reason"))
     for skipped, words in kinds:
         cells = {
-            (row.suite, row.scene, row.method, row.seed)
+            (row.scene, row.method, row.seed)
             for row in rows
             if row.suite in ("garments", "speed")
             and row.status != "ok"
@@ -221,6 +221,6 @@ def trouble(rows: Sequence[Row]) -> str:
 
 
 def _listed(items: Iterable[str]) -> str:
-    """"a", "a and b", "a, b and c"."""
+    """As "a", "a and b" or "a, b and c"."""
     words = list(items)
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
