@@ -206,6 +206,7 @@ def test_place_faces_forward_on_the_floor():
     motion.poses[:, 0] = [0.0, 2.1, 0.0]
     start = np.array([3.0, -0.7, 1.0])
     motion.translations[:] = start + np.cumsum(rng.normal(0, 0.01, (30, 3)), axis=0)
+    motion.translations[:10, 1] += 0.3  # it starts in the air: the floor is not where the first frame is
     placed = place(motion)
     np.testing.assert_allclose(placed.translations[0, [0, 2]], 0.0, atol=1e-12)
     np.testing.assert_allclose(placed.poses[:, 0], 0.0, atol=1e-12)
