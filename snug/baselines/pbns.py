@@ -1,0 +1,49 @@
+"""PBNS: a pose goes through a small perceptron into a pose-space deformation (Bertiche et al. 2021).
+
+    offsets(theta) = sum_i a_i(theta) D_i,   a: four layers of 32 with ReLU,   D: (32, V, 3)
+
+It sees one pose and no motion, one body shape, and learns from the static energies alone. With StVK for
+membrane strain it is what the SNUG paper calls the extended PBNS.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import torch
+from torch import Tensor, nn
+
+from snug.regressor import Regressor
+
+WIDTH, DEPTH = 32, 4
+
+
+class PoseSpaceDeformation(nn.Module):
+    """features (N, T, D) -> offsets (N, T, V, 3) [m]; the state is always None. Called as a Regressor is."""
+
+    def __init__(
+        self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
+    ) -> None:
+        super().__init__()
+        self.vertices, self.output_scale = vertices, output_scale
+        self.input_mean: Tensor
+        self.input_std: Tensor
+        self.register_buffer("input_mean", torch.zeros(inputs))
+        self.register_buffer("input_std", torch.ones(inputs))
+        widths = [inputs, *[WIDTH] * DEPTH]
+        layers = [layer for a, b in pairwise(widths) for layer in (nn.Linear(a, b), nn.ReLU())]
+        self.activations = nn.Sequential(*layers)
+        # The deformation matrix, (32, V, 3) flattened.
+        self.offsets = nn.Linear(WIDTH, 3 * vertices, bias=False)
+        if zero_last_layer:
+            nn.init.zeros_(self.offsets.weight)
+
+    normalise_by = Regressor.normalise_by
+
+    def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
+        normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
+        flat = self.offsets(self.activations(normalised)) * self.output_scale  # (N, T, 3V)
+        return flat.unflatten(-1, (self.vertices, 3)), None
+
+    def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> None:
+        """A static network has no state."""

@@ -1,0 +1,48 @@
+"""The supervised baseline: SNUG's own network, taught by the vertices of a simulation instead of by physics.
+
+loss = mean over frames and vertices of |x - x_simulated|^2     [cm^2]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from torch import Tensor
+
+CM2_PER_M2 = 1e4
+
+
+class TargetError(ValueError):
+    """Simulated vertices that do not fit the motions: the message names the motion and what differs."""
+
+
+def vertex_loss(x: Tensor, target: Tensor) -> Tensor:
+    """x, target (N, T, V, 3) [m] -> (N, T) [cm^2]."""
+    return CM2_PER_M2 * (x - target).square().sum(-1).mean(-1)
+
+
+def matched_targets(
+    motions: Sequence[Any], trajectories: Mapping[str, np.ndarray] | None, vertices: int
+) -> list[np.ndarray]:
+    """One (T, V, 3) array [m, world] for each motion. Raises TargetError for a missing or unfit one."""
+    if not trajectories:
+        raise TargetError("supervised training needs trajectories: a simulation of each training motion")
+    found = []
+    for motion in motions:
+        if motion.name not in trajectories:
+            raise TargetError(
+                f"no simulated trajectory for motion {motion.name!r}: simulate it, or leave it out"
+            )
+        positions = np.asarray(trajectories[motion.name])
+        expected = (motion.frames, vertices, 3)
+        if positions.shape != expected:
+            raise TargetError(
+                f"trajectory of motion {motion.name!r} has shape {positions.shape}, expected {expected}"
+            )
+        if not np.isfinite(positions).all():
+            frame = int(np.argwhere(~np.isfinite(positions).all(axis=(1, 2)))[0, 0])
+            raise TargetError(f"trajectory of motion {motion.name!r} is not finite at frame {frame}")
+        found.append(positions)
+    return found

@@ -1,0 +1,122 @@
+"""A body and the garment it wears, as tensors a network works on: inputs, joint transforms, skinned vertices.
+
+Everything a network or its loss sees is relative to the pelvis (the posed joint 0) of its own frame: the
+static energies do not depend on where a person stands, float32 keeps its digits, and the zero of gravity is
+the pelvis. World positions come back by adding the pelvis, in float64.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from reference_sim.cloth import Cloth
+from reference_sim.material import Material
+from snug.recipe import Recipe
+from snug.skinning import axis_angle_to_matrix, joint_transforms, matrix_to_6d, skin
+
+FEATURE_SETS = ("motion", "pose")
+
+
+class DressedBody:
+    """What is fixed when a garment is put on a body; every motion is given to its methods.
+
+    body: snug.body.Body; garment: snug.garments.Garment. The rest state of all energies is the garment's
+    template, for every body shape: the same shirt on a larger body is a stretched shirt.
+    """
+
+    def __init__(self, body: Any, garment: Any, *, material: Material | None = None) -> None:
+        self.body, self.garment = body, garment
+        self.cloth = Cloth(garment.rest_positions, garment.faces, material or Material())
+        self.vertices = len(garment.rest_positions)
+        self.parents = [int(parent) for parent in body.parents]
+        self._weights: dict[int, Tensor] = {}
+        self._rest_directions: Tensor | None = None
+
+    def weights(self, smoothing: int) -> Tensor:
+        """Skinning weights (V, 24), borrowed from the nearest body vertex and averaged `smoothing` times."""
+        if smoothing not in self._weights:
+            weights = self.garment.skinning_weights
+            if smoothing:
+                from snug.garments import smooth_weights
+
+                weights = smooth_weights(weights, self.garment.faces, smoothing)
+            self._weights[smoothing] = torch.as_tensor(np.asarray(weights), dtype=torch.float32)
+        return self._weights[smoothing]
+
+    def rest(self, betas: np.ndarray | None = None) -> Tensor:
+        """The unposed garment (V, 3) [m] on the body of that shape, before any offset; (N, 10) -> (N, V,
+        3).
+        """
+        mean = torch.as_tensor(self.garment.rest_positions, dtype=torch.float32)
+        if betas is None:
+            return mean
+        if self._rest_directions is None:
+            # The garment follows the body linearly, so one call for each direction tells all shapes.
+            units = np.eye(self.body.shape_count)
+            moved = [self.garment.rest_for(self.body, unit) - self.garment.rest_positions for unit in units]
+            self._rest_directions = torch.as_tensor(np.stack(moved), dtype=torch.float32)
+        shapes = torch.as_tensor(np.asarray(betas), dtype=torch.float32)
+        return mean + torch.einsum("...s,svi->...vi", shapes, self._rest_directions)
+
+    def pelvis(self, motion: Any, betas: np.ndarray | None = None) -> np.ndarray:
+        """World position of the pelvis in each frame, (T, 3) [m] float64."""
+        return self.body.joints(betas)[0] + motion.translations
+
+    def transforms(self, poses: np.ndarray, betas: np.ndarray | None = None) -> Tensor:
+        """Rest-to-posed transforms of the joints relative to the pelvis: (T, 24, 3) [rad] -> (T, 24, 3,
+        4).
+        """
+        joints = torch.as_tensor(self.body.joints(betas))  # float64 until the chain is done
+        rotations = axis_angle_to_matrix(torch.as_tensor(poses, dtype=torch.float64))
+        home = (-joints[0]).expand(len(poses), 3)
+        return joint_transforms(rotations, joints, self.parents, home).float()
+
+    def features(
+        self, motion: Any, recipe: Recipe, betas: np.ndarray | None = None, *, kind: str = "motion"
+    ) -> Tensor:
+        """Inputs of a network, (T, D) float32: the pose, and for `motion` the root velocity and the shape
+        too.
+        """
+        if kind not in FEATURE_SETS:
+            raise ValueError(f"unknown features {kind!r}: use one of {FEATURE_SETS}")
+        rotations = axis_angle_to_matrix(torch.as_tensor(motion.poses, dtype=torch.float64))
+        parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
+        if kind == "motion":
+            parts.append(_root_velocity(motion, rotations[:, 0], recipe.velocity_frame))
+            shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
+            parts.append(torch.as_tensor(shape).expand(len(motion.poses), -1))
+        return torch.cat(parts, dim=-1).float()
+
+    def skinned(
+        self,
+        motion: Any,
+        betas: np.ndarray | None = None,
+        *,
+        smoothing: int = 0,
+        offsets: Tensor | None = None,
+    ) -> np.ndarray:
+        """World vertices (T, V, 3) [m] float64 of the unposed garment plus offsets (T, V, 3), skinned."""
+        unposed = self.rest(betas) if offsets is None else self.rest(betas) + offsets
+        posed = skin(unposed, self.weights(smoothing), self.transforms(motion.poses, betas))
+        return posed.double().numpy() + self.pelvis(motion, betas)[:, None]
+
+
+def _pose_numbers(poses: np.ndarray, rotations: Tensor, pose_input: str) -> Tensor:
+    """(T, 72) axis-angle numbers, or (T, 141): up direction in the root's axes and 6 numbers a joint."""
+    if pose_input == "axis_angle":
+        return torch.as_tensor(poses, dtype=torch.float64).flatten(1)
+    up = rotations[:, 0, 1, :]  # R^T e_y: a walk to the east and a walk to the north give the same input
+    return torch.cat([up, matrix_to_6d(rotations[:, 1:]).flatten(1)], dim=-1)
+
+
+def _root_velocity(motion: Any, root: Tensor, frame: str) -> Tensor:
+    """Velocity of the root joint, (T, 3) [m/s]; zero in the first frame, which has no past."""
+    steps = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * motion.fps
+    velocity = torch.as_tensor(steps, dtype=torch.float64)
+    if frame == "world":
+        return velocity
+    return torch.einsum("tji,tj->ti", root, velocity)

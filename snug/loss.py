@@ -1,0 +1,99 @@
+"""The loss: the very energies that the simulator minimises, summed without weights (paper, eq. 5 to 7).
+
+For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
+
+    [ sum_t  strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)  +  sum_{t >= 3} inertia(x_t) ] / T
+
+in joules a frame: a frame without two frames before it in the window has no inertia term, so a window of
+three holds three static terms and one inertia. Its gradient reaches all three frames.
+
+Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU the closed-form
+kernels beside it give the same values and gradients in a tenth of the time, so autograd is told to use those.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from reference_sim.cloth import Cloth
+from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
+from snug.recipe import Recipe
+
+
+def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
+    """The recipe's contact term; options it leaves open are the simulator's own."""
+    options: dict[str, Any] = {"samples": recipe.contact_samples}
+    if recipe.contact_margin is not None:
+        options["margin"] = recipe.contact_margin
+    if recipe.contact_stiffness is not None:
+        options["per_sample_stiffness"] = recipe.contact_stiffness
+    return ContactPenalty(cloth, **options)
+
+
+class ClosedForm(torch.autograd.Function):
+    """energy summed over its elements, for each configuration of a batch, by its numba kernel.
+
+    apply(x (..., V, 3), energy, *frame data (..., S, 3) numpy) -> (...) [J]. Differentiable once, by x alone.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, energy: Any, *frame_data: np.ndarray) -> Tensor:
+        flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
+        rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
+        values = np.empty(len(flat), flat.dtype)
+        gradients = np.empty_like(flat)
+        for n in range(len(flat)):
+            values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
+        ctx.gradients = torch.from_numpy(gradients).reshape(x.shape)
+        ctx.extra = len(frame_data)
+        return torch.from_numpy(values).reshape(x.shape[:-2])
+
+    @staticmethod
+    def backward(ctx: Any, *above: Tensor) -> Any:
+        return above[0][..., None, None] * ctx.gradients, None, *([None] * ctx.extra)
+
+
+def summed(energy: Any, x: Tensor, *frame_data: np.ndarray) -> Tensor:
+    """Energy of each configuration, (..., V, 3) -> (...) [J]: by kernel on a CPU, by its definition
+    elsewhere.
+    """
+    if x.device.type == "cpu":
+        return ClosedForm.apply(x, energy, *frame_data)
+    data = (torch.as_tensor(part).to(x) for part in frame_data)
+    return energy.energy(x, *data).sum(-1)
+
+
+class PhysicsLoss:
+    """Energies of sub-sequences, by term. dt: seconds between frames [s]."""
+
+    def __init__(
+        self, cloth: Cloth, recipe: Recipe, *, dt: float, contact: ContactPenalty | None = None
+    ) -> None:
+        self.terms = recipe.terms
+        self.static = [
+            E for E in (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)) if E.name in self.terms
+        ]
+        self.inertia = Inertia(cloth, dt)
+        self.contact = contact or make_contact(cloth, recipe)
+
+    def __call__(
+        self, x: Tensor, ahead: Tensor, planes: tuple[np.ndarray, np.ndarray] | None
+    ) -> dict[str, Tensor]:
+        """Joules of each window and frame, term -> (N, T).
+
+        x: (N, T, V, 3) [m], each frame relative to its own pelvis p. ahead: (N, T, 3) [m],
+        2 p_{t-1} - p_{t-2} - p_t: where the pelvis would be if it kept its velocity, seen from where it is.
+        planes: points and normals (N, T, S, 3) of the contact samples.
+        """
+        terms = {energy.name: summed(energy, x) for energy in self.static}
+        if "inertia" in self.terms and x.shape[1] >= 3:
+            x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
+            inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
+            terms["inertia"] = torch.nn.functional.pad(inertia, (2, 0))
+        if "collision" in self.terms and planes is not None:
+            terms["collision"] = summed(self.contact, x, *planes)
+        return terms

@@ -1,0 +1,126 @@
+"""Recipe: every choice of a training run in one frozen place, each deviation from the paper by name.
+
+Two recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text to the
+letter. Neither holds a balancing weight between the energies: there is none. Imports nothing heavy, so that a
+command can list recipes without loading torch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+TERMS = ("strain", "bending", "gravity", "inertia", "collision")
+
+
+class RecipeError(ValueError):
+    """A recipe that cannot be trained: the message names the option, its value and what it may be."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """Options of the network and of its training. Lengths in metres, energies in joules.
+
+    name: shown in tables.
+    pose_input: `six` (two columns of each joint's rotation matrix, the root by its up direction alone, so
+        that the direction a person walks in does not matter) or `axis_angle` (the 72 numbers of the pose).
+    velocity_frame: axes of the root velocity, `root` or `world`.
+    smoothing: sweeps of neighbour averaging over the borrowed skinning weights.
+    zero_last_layer: start at the skinned template instead of at centimetres of noise.
+    output_scale: factor on the predicted offsets.
+    learning_rate, drop_at, drop_factor: Adam, divided by `drop_factor` after the fraction `drop_at` of the
+    steps. drop_after_epochs: when given, divide after this many epochs instead.
+    h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
+    window, batch: frames of a sub-sequence, sub-sequences of a step.
+    window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
+    shape_range: each sub-sequence gets shape numbers from U(-r, r).
+    contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
+    contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
+    contact_refresh: share of a batch's frames whose contact anchors are searched anew after a step.
+    terms: energies in the loss; leaving one out is an ablation.
+    spike: a window above this many joules a frame is named and counted, and its step's gradient clipped.
+    gradient_limit: norm to which the gradient of such a step is clipped.
+    """
+
+    name: str = "default"
+    pose_input: str = "six"
+    velocity_frame: str = "root"
+    smoothing: int = 20
+    zero_last_layer: bool = True
+    output_scale: float = 0.1
+    learning_rate: float = 1e-3
+    drop_at: float = 0.7
+    drop_factor: float = 10.0
+    drop_after_epochs: int | None = None
+    h0_sigma: float = 0.3
+    window: int = 3
+    batch: int = 16
+    window_stride: int = 1
+    shape_range: float = 0.0
+    contact_samples: str = "all"
+    contact_stiffness: float | None = None
+    contact_margin: float | None = None
+    contact_refresh: float = 0.03
+    terms: tuple[str, ...] = TERMS
+    spike: float = 2.0
+    gradient_limit: float = 1.0
+
+    def __post_init__(self) -> None:
+        for option, allowed in (
+            ("pose_input", ("six", "axis_angle")),
+            ("velocity_frame", ("root", "world")),
+            ("contact_samples", ("all", "vertices")),
+        ):
+            if getattr(self, option) not in allowed:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
+        unknown = [term for term in self.terms if term not in TERMS]
+        if unknown:
+            raise RecipeError(f"recipe option terms: unknown energy {unknown[0]!r}; known are {TERMS}")
+        if self.window < 1 or self.batch < 1 or self.window_stride < 1:
+            raise RecipeError("recipe options window, batch and window_stride must be at least 1")
+        if "inertia" in self.terms and self.window < 3:
+            raise RecipeError(
+                "recipe option window: inertia needs two frames before the one it judges, so >= 3"
+            )
+        for option in ("learning_rate", "output_scale", "drop_factor", "gradient_limit", "spike"):
+            if not getattr(self, option) > 0:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for a model file or run.json."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Recipe:
+        """The inverse of `as_dict`. Raises RecipeError for an option that this version does not know."""
+        known = {field.name for field in fields(cls)}
+        unknown = sorted(set(values) - known)
+        if unknown:
+            raise RecipeError(f"unknown recipe option {unknown[0]!r}")
+        return cls(**{**values, "terms": tuple(values.get("terms", TERMS))})
+
+
+DEFAULT = Recipe()
+PAPER = Recipe(
+    name="paper",
+    pose_input="axis_angle",
+    velocity_frame="world",
+    smoothing=0,
+    zero_last_layer=False,
+    output_scale=1.0,
+    drop_after_epochs=10,
+    h0_sigma=0.1,
+    window_stride=3,
+    shape_range=3.0,
+    contact_samples="vertices",
+    contact_stiffness=250.0,
+    contact_margin=0.002,
+)
+RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER)}
+
+
+def find_recipe(name: str) -> Recipe:
+    """The recipe of that name. Raises RecipeError naming the known ones."""
+    if name not in RECIPES:
+        raise RecipeError(f"unknown recipe {name!r}: use one of {', '.join(RECIPES)}")
+    return RECIPES[name]

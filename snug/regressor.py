@@ -1,0 +1,68 @@
+"""The garment regressor R: body motion to offsets of an unposed garment.
+
+    M(beta, phi) = W(T + R(beta, phi), J(beta), theta, W_G)                      (paper, eq. 1 and 2)
+
+Four gated recurrent units of 256 with tanh and one linear layer to 3V offsets (paper, section 3.5). The state
+at the start is zero at run time and N(0, sigma) in training, sigma being a recipe's choice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+HIDDEN, LAYERS = 256, 4
+
+
+class Regressor(nn.Module):
+    """features (N, T, D) -> offsets (N, T, V, 3) [m] in the unposed space, and the state to go on with.
+
+    The features are normalised inside, by the mean and spread of the training frames, which are saved with
+    the weights: a caller passes plain features and cannot forget it.
+    """
+
+    def __init__(
+        self,
+        inputs: int,
+        vertices: int,
+        *,
+        output_scale: float = 1.0,
+        zero_last_layer: bool = False,
+        hidden: int = HIDDEN,
+        layers: int = LAYERS,
+    ) -> None:
+        super().__init__()
+        self.vertices, self.output_scale = vertices, output_scale
+        self.input_mean: Tensor
+        self.input_std: Tensor
+        self.register_buffer("input_mean", torch.zeros(inputs))
+        self.register_buffer("input_std", torch.ones(inputs))
+        self.gru = nn.GRU(inputs, hidden, layers, batch_first=True)
+        self.offsets = nn.Linear(hidden, 3 * vertices)
+        if zero_last_layer:
+            nn.init.zeros_(self.offsets.weight)
+            nn.init.zeros_(self.offsets.bias)
+
+    def normalise_by(self, mean: np.ndarray, std: np.ndarray) -> None:
+        """Set the input mean (D,) and spread (D,)."""
+        self.input_mean.copy_(torch.as_tensor(mean))
+        self.input_std.copy_(torch.as_tensor(std))
+
+    def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
+        hidden, state = self.gru(normalised, state)  # (N, T, 256), (4, N, 256)
+        flat = self.offsets(hidden) * self.output_scale  # (N, T, 3V)
+        return flat.unflatten(-1, (self.vertices, 3)), state
+
+    def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
+        """(layers, batch, hidden) drawn from N(0, sigma): the noise that makes long roll-outs hold."""
+        shape = (self.gru.num_layers, batch, self.gru.hidden_size)
+        device = self.input_mean.device
+        return sigma * torch.randn(shape, generator=generator, device=generator.device).to(device)
+
+
+def parameter_megabytes(network: nn.Module) -> float:
+    """Memory of the weights and of the input normalisation [MB]."""
+    tensors = [*network.parameters(), *network.buffers()]
+    return sum(t.numel() * t.element_size() for t in tensors) / 1e6

@@ -1,0 +1,100 @@
+"""Run a trained network over a motion, one frame at a time, as an application would."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from reference_sim.trajectory import Trajectory
+from snug.dresser import DressedBody
+from snug.skinning import skin
+from snug.trained_model import TrainedModel, find_kind
+
+WARM_UP = 10  # frames run and thrown away before the clock starts
+HELD_FRAMES = 30  # frames for which a pose is held before its output counts as static
+
+
+class RollOutError(ValueError):
+    """A model that does not fit the garment or the motion; the message names both numbers."""
+
+
+def roll_out(
+    model: TrainedModel,
+    dressed: DressedBody,
+    motion: Any,
+    betas: np.ndarray | None = None,
+    *,
+    held_pose: bool = False,
+) -> Trajectory:
+    """Positions (T, V, 3) [m], world, float64; the state starts at zero and is carried from frame to frame.
+
+    frame_seconds holds the wall time of each frame: network and skinning, nothing else (inputs and joint
+    transforms are ready before; every method needs those). held_pose gives instead, for each frame, the
+    output after that pose was held still for a second: what the network thinks is static. It is not timed
+    (NaN). Raises RollOutError.
+    """
+    if model.vertices != dressed.vertices:
+        raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
+    moving = replace(motion, translations=np.zeros_like(motion.translations)) if held_pose else motion
+    features = dressed.features(moving, model.recipe, betas, kind=find_kind(model.kind).features)
+    inputs = model.network.input_mean.shape[0]
+    if features.shape[1] != inputs:
+        raise RollOutError(
+            f"the model reads {inputs} numbers a frame, this body and motion give {features.shape[1]}"
+        )
+    rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
+    transforms = dressed.transforms(motion.poses, betas)
+    run = _held if held_pose else _frame_by_frame
+    with torch.inference_mode():
+        posed, seconds = run(model, features, rest, weights, transforms)
+    positions = posed.astype(np.float64) + dressed.pelvis(motion, betas)[:, None]
+    return Trajectory(
+        positions=positions,
+        faces=np.asarray(dressed.garment.faces),
+        times=np.arange(len(positions)) / motion.fps,
+        frame_seconds=seconds,
+        status="ok" if np.isfinite(positions).all() else "diverged",
+        reason="" if np.isfinite(positions).all() else "the network gave a position that is not finite",
+        provenance={
+            "method": model.kind,
+            "recipe": model.recipe.name,
+            "seed": model.seed,
+            "motion": motion.name,
+        },
+        frame_fields={},
+    )
+
+
+def _frame_by_frame(
+    model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
+) -> tuple[np.ndarray, np.ndarray]:
+    frames = len(features)
+    posed = np.empty((frames, *rest.shape), np.float32)
+    seconds = np.empty(frames)
+    for frame in range(min(WARM_UP, frames)):
+        offsets, _ = model.network(features[frame][None, None])
+        skin(rest + offsets[0, 0], weights, transforms[frame])
+    state = None
+    for frame in range(frames):
+        start = time.perf_counter()
+        offsets, state = model.network(features[frame][None, None], state)
+        vertices = skin(rest + offsets[0, 0], weights, transforms[frame])
+        seconds[frame] = time.perf_counter() - start
+        posed[frame] = vertices.numpy()
+    return posed, seconds
+
+
+def _held(
+    model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
+) -> tuple[np.ndarray, np.ndarray]:
+    """All frames as a batch, each pose repeated."""
+    state = None
+    for _ in range(HELD_FRAMES if find_kind(model.kind).sequences else 1):
+        offsets, state = model.network(features[:, None], state)
+    posed = skin(rest + offsets[:, 0], weights, transforms)
+    return posed.numpy(), np.full(len(features), np.nan)
