@@ -8,7 +8,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .area_barrier import AreaBarrier
     from .bend_hinge import BendHinge
+    from .contact_friction import ContactFriction
     from .contact_penalty import ContactPenalty
     from .energy import Energy, Step
     from .gravity import Gravity
@@ -23,13 +25,17 @@ HOME = {
     "Gravity": "gravity",
     "Inertia": "inertia",
     "ContactPenalty": "contact_penalty",
+    "ContactFriction": "contact_friction",
+    "AreaBarrier": "area_barrier",
     "Energy": "energy",
     "Step": "energy",
 }
 
 __all__ = [
     "HOME",
+    "AreaBarrier",
     "BendHinge",
+    "ContactFriction",
     "ContactPenalty",
     "Energy",
     "Gravity",

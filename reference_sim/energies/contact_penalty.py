@@ -26,6 +26,8 @@ from .energy import Energy, Step
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from ..obstacle import Planes
+
 DEFAULT_STIFFNESS = 3.4e6  # [J/m^5]: 2500 J/m^3 on a vertex of a T-shirt with 1000 vertices
 DEFAULT_MARGIN = 4e-3  # [m]
 
@@ -72,6 +74,7 @@ class ContactPenalty(Energy):
             shape=(len(self.stencils), cloth.vertex_count),
         )
         self.rest_samples = self.sample_matrix @ cloth.rest_positions
+        self.planes: Planes | None = None
         # Until a step is prepared every plane lies far below its sample: no contact. Finite also as float32.
         self.points = np.tile([0.0, -1e30, 0.0], (len(self.stencils), 1))
         self.normals = np.tile([0.0, 1.0, 0.0], (len(self.stencils), 1))
@@ -87,7 +90,7 @@ class ContactPenalty(Energy):
         if step.obstacle is None:
             raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
         planes = step.obstacle.planes(self.sample_matrix @ step.guess, step.frame, self.rest_samples)
-        self.points, self.normals = planes.points, planes.normals
+        self.planes, self.points, self.normals = planes, planes.points, planes.normals
 
     def energy(self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None) -> Tensor:
         """x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S) [J]; default: the prepared planes."""

@@ -1,0 +1,159 @@
+"""Coulomb friction of contact samples on a moving body, smoothed and lagged so that it is an energy.
+
+    u = (I - n n^T) ((x_s - x_s^t) - (c - c^t))    slip over the step, relative to the skin under the sample
+    E = mu N f(|u|),   f(y) = y^2/h - y^3/(3 h^2) + h/3 for y < h, else y,   h = speed dt
+
+(IPC's smoothing, Li et al. 2020.) N [N] is the normal force of the collision penalty at the end of the
+previous step. `speed` [m/s] is the slip below which friction is still growing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import njit
+
+from .contact_penalty import ContactPenalty
+from .energy import Energy, Step
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+class ContactFriction(Energy):
+    """Friction energy [J] of each sample of a ContactPenalty, which must come before it in a scene's terms.
+
+    Args:
+        contact: the collision term whose samples, planes and forces are used.
+        coefficient: mu [1].
+        speed: [m/s].
+    """
+
+    name = "friction"
+
+    def __init__(self, contact: ContactPenalty, *, coefficient: float = 0.5, speed: float = 0.02) -> None:
+        self.cloth = contact.cloth
+        self.contact = contact
+        self.stencils, self.weights = contact.stencils, contact.weights
+        self.coefficient, self.speed = float(coefficient), float(speed)
+        count = len(self.stencils)
+        self.forces = np.zeros(count)
+        self.anchors = np.zeros((count, 3))  # where each sample would be if it stuck to the skin
+        self.normals = np.zeros((count, 3))
+        self.threshold = self.speed / 30
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+
+    def parameters(self) -> dict[str, Any]:
+        return {"coefficient": self.coefficient, "speed_m_per_s": self.speed}
+
+    def prepare(self, step: Step) -> None:
+        assert step.obstacle is not None and self.contact.planes is not None
+        planes = self.contact.planes
+        samples = self.contact.sample_matrix @ step.previous
+        depth = np.zeros(len(samples))
+        if self._last is not None:
+            points, normals = self._last
+            gap = np.einsum("si,si->s", normals, samples - points)
+            depth = np.maximum(self.contact.margin - gap, 0.0)
+        self.forces = self.coefficient * 3 * self.contact.stiffness * depth**2
+        corners = step.obstacle.at(max(step.frame - 1, 0))[step.obstacle.faces[planes.faces]]
+        skin_motion = planes.points - np.einsum("sa,sai->si", planes.barycentric, corners)
+        self.anchors, self.normals = samples + skin_motion, planes.normals
+        self.threshold = self.speed * step.dt
+        self._last = (planes.points, planes.normals)
+
+    def element_energy(self, u: Tensor) -> Tensor:
+        import torch
+
+        normals = torch.as_tensor(self.normals).to(u)
+        slip = (torch.as_tensor(self.weights).to(u)[:, :, None] * u).sum(-2) - torch.as_tensor(
+            self.anchors
+        ).to(u)
+        slip = slip - (slip * normals).sum(-1, keepdim=True) * normals
+        square, h = (slip**2).sum(-1), self.threshold
+        y = torch.sqrt(torch.where(square > 0, square, torch.ones_like(square)))
+        near = square / h - torch.where(square > 0, y**3, torch.zeros_like(y)) / (3 * h * h) + h / 3
+        return torch.as_tensor(self.forces).to(u) * torch.where(square < h * h, near, y)
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        gradient = np.zeros_like(x)
+        state = (self.forces, self.anchors, self.normals, self.threshold)
+        return _gradient(x, self.stencils, self.weights, *state, gradient), gradient
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        blocks = np.zeros((len(self.stencils), 9, 9))
+        elements, active = self.active_hessian_blocks(x)
+        blocks[elements] = active
+        return blocks
+
+    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        elements = np.flatnonzero(self.forces)
+        state = (self.forces, self.anchors, self.normals, self.threshold)
+        return elements, _hessian(x, elements, self.stencils, self.weights, *state)
+
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The curvature of sticking, 2 mu N / h, in every direction."""
+        elements = np.flatnonzero(self.forces)
+        w = self.weights[elements]
+        curvature = 2 * self.forces[elements] / self.threshold
+        return elements, curvature[:, None, None] * w[:, :, None] * w[:, None, :]
+
+
+@njit(cache=True, inline="always")
+def _slip(x, stencil, w, anchor, n, u):
+    """Tangential slip vector into u; its length is returned."""
+    along = 0.0
+    for i in range(3):
+        u[i] = w[0] * x[stencil[0], i] + w[1] * x[stencil[1], i] + w[2] * x[stencil[2], i] - anchor[i]
+        along += u[i] * n[i]
+    square = 0.0
+    for i in range(3):
+        u[i] -= along * n[i]
+        square += u[i] * u[i]
+    return np.sqrt(square)
+
+
+@njit(cache=True)
+def _gradient(x, stencils, weights, forces, anchors, normals, h, gradient):
+    u = np.empty(3)
+    total = 0.0
+    for s in range(stencils.shape[0]):
+        if forces[s] == 0.0:
+            continue
+        y = _slip(x, stencils[s], weights[s], anchors[s], normals[s], u)
+        if y < h:
+            total += forces[s] * (y * y / h - y**3 / (3 * h * h) + h / 3)
+            slope = forces[s] * (2 / h - y / (h * h))  # f'(y) / y
+        else:
+            total += forces[s] * y
+            slope = forces[s] / y
+        for a in range(3):
+            for i in range(3):
+                gradient[stencils[s, a], i] += slope * weights[s, a] * u[i]
+    return total
+
+
+@njit(cache=True)
+def _hessian(x, elements, stencils, weights, forces, anchors, normals, h):
+    """w_a w_b mu N [f'/y (I - n n^T) + (f'' - f'/y) t t^T] with the slip direction t."""
+    blocks = np.empty((elements.shape[0], 9, 9))
+    u, K = np.empty(3), np.empty((3, 3))
+    for k in range(elements.shape[0]):
+        s = elements[k]
+        y = _slip(x, stencils[s], weights[s], anchors[s], normals[s], u)
+        over = 2 / h - y / (h * h) if y < h else 1 / y
+        second = 2 / h - 2 * y / (h * h) if y < h else 0.0
+        for i in range(3):
+            for j in range(3):
+                K[i, j] = -over * normals[s, i] * normals[s, j]
+                if y > 0.0:
+                    K[i, j] += (second - over) * (u[i] / y) * (u[j] / y)
+            K[i, i] += over
+        for a in range(3):
+            for b in range(3):
+                w = forces[s] * weights[s, a] * weights[s, b]
+                for i in range(3):
+                    for j in range(3):
+                        blocks[k, 3 * a + i, 3 * b + j] = w * K[i, j]
+    return blocks
