@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from .methods import METHODS, find_method
 from .presets import Preset
 from .scene import Scene
-from .scenes import PREFIX, all_scenes
+from .scenes import PREFIX, SMALL_SCENES, all_scenes
 from .suites import SUITE_NAMES
 from .suites.extremes import CASES, Case
 from .suites.extremes import METHOD as EXTREMES_METHOD
@@ -130,6 +130,12 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     if not train:
         train = tuple(name for name in TRAIN if name not in test)
     return Motions(train[: preset.train_motions], test[: preset.test_motions], files)
+
+
+def names_no_motion(scenes: Sequence[str]) -> bool:
+    """Whether a choice of scenes names small scenes, checks and cases alone; no motion is looked at then."""
+    known = {item.name for group in (SMALL_SCENES, CHECKS, CASES) for item in group}
+    return bool(scenes) and known.issuperset(scenes)
 
 
 def choose_cells(

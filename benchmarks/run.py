@@ -14,7 +14,17 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
-from .plan import MEETINGS, Plan, PlanError, choose_cells, choose_motions, choose_suites, runs
+from .plan import (
+    MEETINGS,
+    Motions,
+    Plan,
+    PlanError,
+    choose_cells,
+    choose_motions,
+    choose_suites,
+    names_no_motion,
+    runs,
+)
 from .presets import PRESETS, find_preset
 
 PROGRAM = "benchmarks.run"
@@ -110,13 +120,16 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     seeds = parse_seeds(options.seeds)
     check_device(options.device)
     folder = choose_folder(options.out)
-    motions = choose_motions(options.motions, split(options.test_motions), preset)
+    scenes = split(options.scenes)
+    motions = Motions((), (), {})
+    if options.motions or options.test_motions or not names_no_motion(scenes):
+        motions = choose_motions(options.motions, split(options.test_motions), preset)
     cells, checks, cases = choose_cells(
         suites,
         full=bool(options.suite),
         preset=preset,
         motions=motions,
-        scenes=split(options.scenes),
+        scenes=scenes,
         methods=split(options.methods),
         seeds=seeds,
     )

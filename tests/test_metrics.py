@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.checks.meshes import cylinder_patch, icosphere, right_grid, torus
 from benchmarks.metrics.curvature import (
     boundary_mask,
     curvature_error,
@@ -14,54 +15,25 @@ from benchmarks.metrics.curvature import (
 from benchmarks.metrics.geometry import distance_rms, penetration
 
 
-def icosphere(subdivisions: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    golden = (1 + 5**0.5) / 2
-    points = [(0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
-    points = np.array([np.roll(p, k) for k in range(3) for p in points], dtype=float)
-    lengths = np.linalg.norm(points[:, None] - points[None], axis=2)
-    near = np.isclose(lengths, 2.0)
-    faces = np.array(
-        [(i, j, k) for i in range(12) for j in range(12) for k in range(12)
-         if i < j and i < k and near[i, j] and near[j, k] and near[k, i]
-         and np.linalg.det(points[[i, j, k]]) > 0]
-    )  # fmt: skip
-    for _ in range(subdivisions):
-        edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-        unique, inverse = np.unique(edges, axis=0, return_inverse=True)
-        a, b, c = inverse.reshape(3, -1) + len(points)
-        points = np.concatenate([points, points[unique].mean(1)])
-        i, j, k = faces.T
-        faces = np.stack([(i, a, c), (a, j, b), (c, b, k), (a, b, c)]).transpose(0, 2, 1).reshape(-1, 3)
-    return radius * points / np.linalg.norm(points, axis=1, keepdims=True), faces
+def test_curvature_of_a_sphere_holds_at_its_five_valent_vertices_too():
+    x, faces = icosphere(3, 0.25)
+    assert not boundary_mask(faces, len(x)).any()
+    curvature, area = mean_curvature(x, faces)
+    assert area.sum() == pytest.approx(4 * np.pi * 0.25**2, rel=0.02)
+    assert np.abs(curvature * 0.25 - 1.0).max() < 1e-4
 
 
-def grid(rows: int, columns: int) -> np.ndarray:
-    i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
-    a = (i * (columns + 1) + j).ravel()
-    b, c, d = a + columns + 1, a + columns + 2, a + 1
-    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-
-
-def cylinder(cells: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    angle, height = np.meshgrid(np.linspace(0, 2, cells + 1), np.linspace(0, 1, cells + 1), indexing="ij")
-    points = np.stack([radius * np.cos(angle), height * radius, radius * np.sin(angle)], -1)
-    return points.reshape(-1, 3), grid(cells, cells)
-
-
-def test_curvature_of_a_sphere_converges_at_second_order():
+def test_curvature_of_a_torus_converges_at_second_order():
     errors = []
-    for subdivisions in (2, 3, 4):
-        x, faces = icosphere(subdivisions, 0.25)
-        assert not boundary_mask(faces, len(x)).any()
-        curvature, area = mean_curvature(x, faces)
-        assert area.sum() == pytest.approx(4 * np.pi * 0.25**2, rel=0.06)
-        errors.append(np.abs(curvature * 0.25 - 1.0).max())  # the 5-valent vertices included
+    for cells in (16, 32, 64):
+        x, faces, exact = torus(cells, 0.3, 0.1)
+        errors.append(np.abs(mean_curvature(x, faces)[0] - exact).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert orders.min() > 1.9 and errors[-1] < 2e-3
+    assert orders.min() > 1.9 and errors[-1] < 0.02
 
 
 def test_curvature_of_a_cylinder():
-    x, faces = cylinder(40, 0.1)
+    x, faces = cylinder_patch(40, 0.1)
     curvature, _ = mean_curvature(x, faces)
     inside = ~boundary_mask(faces, len(x))
     assert np.abs(curvature[inside] - 5.0).max() < 2e-3  # 1/(2 R)
@@ -72,7 +44,7 @@ def test_curvature_of_a_plane_is_zero_and_noise_gives_the_published_floor():
     cells, h = 40, 0.015
     i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
     flat = np.stack([h * i, 0.0 * i, h * j], -1).reshape(-1, 3)
-    faces = grid(cells, cells)
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
     inside = ~boundary_mask(faces, len(flat))
     assert mean_curvature(flat, faces)[0][inside].max() < 1e-10
     noisy = flat + random.normal(0, 0.5e-3, flat.shape)
@@ -89,7 +61,7 @@ def test_area_is_shared_out_whole_also_by_obtuse_triangles():
 
 
 def test_curvature_is_blind_to_rigid_motion_and_scales_as_one_over_length():
-    x, faces = cylinder(12, 0.3)
+    x, faces = cylinder_patch(12, 0.3)
     turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
     inside = ~boundary_mask(faces, len(x))
     first = mean_curvature(x, faces)[0][inside]
@@ -100,7 +72,7 @@ def test_curvature_is_blind_to_rigid_motion_and_scales_as_one_over_length():
 def test_curvature_error_sees_moved_wrinkles_where_the_difference_of_means_does_not():
     cells = 30
     i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
-    faces = grid(cells, cells)
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
 
     def waves(phase: float) -> np.ndarray:
         return np.stack([0.01 * i, 0.004 * np.sin(0.8 * i + phase), 0.01 * j], -1).reshape(1, -1, 3)
@@ -129,7 +101,8 @@ class Slab:
 def test_penetration_counts_every_vertex_and_measures_depth():
     x = np.zeros((2, 4, 3))
     x[:, :, 1] = [0.5, -0.25, 2.0, -0.5]
-    found = penetration(x, Slab())
+    shorter, found = penetration([x[:1], x], Slab())
+    assert shorter.share == pytest.approx([0.5])
     assert found.share == pytest.approx([0.5, 0.75])
     assert found.depth[0] == pytest.approx([0, 0.25, 0, 0.5])
     assert found.depth[1] == pytest.approx([0.5, 1.25, 0, 1.5])

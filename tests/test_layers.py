@@ -1,0 +1,137 @@
+"""Who may import whom, read from the syntax tree: the rules of the architecture, held by a test."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+LAYERS = ("reference_sim", "snug", "benchmarks", "reports")
+
+# What each layer may import of ours. An entry also allows what lies below it.
+ALLOWED = {
+    "reference_sim": ("reference_sim",),
+    "snug": ("snug", "reference_sim"),
+    "benchmarks": ("benchmarks", "snug", "reference_sim"),
+    "reports": ("reports", "benchmarks.results"),
+}
+# The referee's solvers are not for the contestants.
+FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate")}
+# A run ends by making the report of the run that it wrote.
+EXCEPTIONS = {("benchmarks/stages.py", "reports.build.build_report")}
+# Headline geometry must not share an error with the physics.
+PURE = ("benchmarks/metrics/curvature.py", "benchmarks/metrics/geometry.py")
+# `--help` and `--list` read these, in under a second.
+LIGHT = (
+    "benchmarks/run.py", "benchmarks/plan.py", "benchmarks/listing.py", "benchmarks/scene.py",
+    "benchmarks/method.py", "benchmarks/presets.py",
+    "benchmarks/results.py", "benchmarks/provenance.py", "benchmarks/scenes/__init__.py",
+    "benchmarks/methods/__init__.py", "benchmarks/suites/__init__.py", "benchmarks/suites/garments.py",
+    "benchmarks/suites/speed.py", "benchmarks/suites/validation.py", "benchmarks/suites/extremes.py",
+)  # fmt: skip
+HEAVY = ("torch", "vtk", "vtkmodules", "pyvista", "pandas", "igl", "numba", "matplotlib", "scipy", "skfem")
+
+
+def files_of(layer: str) -> list[Path]:
+    return sorted((ROOT / layer).rglob("*.py"))
+
+
+def imports(tree: ast.Module, package: str, *, top_level: bool = False) -> Iterator[tuple[int, str]]:
+    """(line, dotted name) of everything imported; without those for the type checker alone."""
+    for node in _walk(tree, top_level):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                parents = package.split(".")[: len(package.split(".")) - node.level + 1]
+                base = ".".join([*parents, *([base] if base else [])])
+            yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
+
+
+def _walk(node: ast.AST, top_level: bool) -> Iterator[ast.AST]:
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+            continue
+        if top_level and isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            continue
+        yield child
+        yield from _walk(child, top_level)
+
+
+def within(name: str, roots: tuple[str, ...]) -> bool:
+    return any(name == root or name.startswith(root + ".") for root in roots)
+
+
+def complaints(relative: str, source: str) -> list[str]:
+    """Every import of the file that breaks a rule."""
+    layer = relative.split("/")[0]
+    package = ".".join(Path(relative).parent.parts)
+    tree = ast.parse(source)
+    wrong = []
+    for line, name in imports(tree, package):
+        ours = name.split(".")[0] in LAYERS
+        if ours and not within(name, ALLOWED[layer]) and (relative, name) not in EXCEPTIONS:
+            wrong.append(f"{relative}:{line}: {layer} must not import {name}")
+        if within(name, FORBIDDEN.get(layer, ())):
+            wrong.append(f"{relative}:{line}: {layer} must not import {name}")
+        if relative in PURE and within(name, LAYERS):
+            wrong.append(f"{relative}:{line}: a geometry metric must not import {name}")
+    if relative in LIGHT:
+        for line, name in imports(tree, package, top_level=True):
+            if within(name, HEAVY):
+                wrong.append(f"{relative}:{line}: {name} must be imported inside a function")
+    return wrong
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_imports_follow_the_layers(layer):
+    files = files_of(layer)
+    assert files, f"no module in {layer}"
+    wrong = []
+    for path in files:
+        wrong += complaints(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_named_files_exist():
+    named = (*PURE, *LIGHT, *(path for path, _ in EXCEPTIONS))
+    assert [path for path in named if not (ROOT / path).is_file()] == []
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("reference_sim/a.py", "import snug"),
+        ("reference_sim/energies/a.py", "def f():\n    from benchmarks import run"),
+        ("snug/a.py", "from reference_sim import simulate"),
+        ("snug/a.py", "from reference_sim.minimise.newton import minimise_newton"),
+        ("snug/a.py", "from reports import build"),
+        ("benchmarks/cell.py", "from reports.build import build_report"),
+        ("reports/a.py", "from benchmarks import run"),
+        ("reports/a.py", "import reference_sim"),
+        ("reports/a.py", "from ..snug import body"),
+        ("benchmarks/metrics/geometry.py", "from reference_sim import Potential"),
+        ("benchmarks/run.py", "try:\n    import torch\nexcept ImportError:\n    pass"),
+        ("benchmarks/run.py", "from scipy import sparse"),
+    ],
+)
+def test_a_planted_import_is_found(path, source):
+    assert complaints(path, source)
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("snug/a.py", "from reference_sim import Cloth\nfrom . import body"),
+        ("snug/baselines/a.py", "from ..loss import f\nimport torch"),
+        ("benchmarks/stages.py", "def f():\n    import torch\n    from reports.build import build_report"),
+        ("reports/a.py", "from benchmarks.results import RunFolder\nfrom .tables import f"),
+        ("benchmarks/metrics/geometry.py", "if TYPE_CHECKING:\n    from reference_sim import Obstacle"),
+    ],
+)
+def test_an_allowed_import_passes(path, source):
+    assert not complaints(path, source)

@@ -1,0 +1,98 @@
+"""Scenes: each declares what it has and no more, is deterministic, and what it does not declare is not loaded."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from benchmarks.plan import choose_suites
+from benchmarks.presets import PRESETS, find_preset
+from benchmarks.scenes import SMALL_SCENES, all_scenes, dressed_scene
+from benchmarks.scenes.free_fall import exact_fall
+from benchmarks.scenes.sheet import square_sheet
+from benchmarks.scenes.sheet_on_sphere import sphere
+
+SMOKE = find_preset("smoke")
+
+
+@pytest.mark.parametrize("scene", SMALL_SCENES, ids=lambda scene: scene.name)
+def test_small_scenes_build_alike_twice_and_declare_their_terms(scene):
+    first, second = scene.build(SMOKE), scene.build(SMOKE)
+    assert np.array_equal(first.start, second.start) and first.frames == SMOKE.sheet_frames
+    assert first.terms[-1] == "inertia" and len(set(first.terms)) == len(first.terms)
+    assert (first.obstacle is not None) == ("collision" in first.terms)
+    assert first.dressed is None
+
+
+def test_the_terms_are_those_of_the_descriptions():
+    built = {scene.name: scene.build(SMOKE) for scene in SMALL_SCENES}
+    assert built["hanging_sheet"].terms == ("strain", "bending", "gravity", "inertia")
+    assert built["sheet_on_sphere"].terms == ("strain", "bending", "gravity", "collision", "inertia")
+    assert built["free_fall"].terms == ("gravity", "inertia")
+    assert built["free_fall"].exact is not None
+
+
+def test_scene_names_are_unique_and_a_dressed_scene_needs_a_wardrobe():
+    scenes = all_scenes(["walk", "run"])
+    assert len(scenes) == len(SMALL_SCENES) + 2 and scenes["dressed/walk"].dressed
+    with pytest.raises(ValueError, match="needs a wardrobe"):
+        dressed_scene("walk").build(SMOKE)
+
+
+def test_the_sheet_is_a_square_without_slivers():
+    positions, faces = square_sheet(9, 0.4)
+    corners = positions[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = normals[:, 1] / 2
+    assert areas.sum() == pytest.approx(0.16) and areas.min() > 0.2 * areas.mean()
+
+
+def test_the_sphere_is_closed_outward_and_round():
+    points, faces = sphere(0.2, 16)
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    corners = points[faces]
+    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    assert volume == pytest.approx(4 / 3 * np.pi * 0.2**3, rel=0.01)
+
+
+def test_the_exact_fall_obeys_backward_euler():
+    start, velocity, dt = np.array([[0.1, 2.0, 0.3]]), np.array([1.0, 2.0, 3.0]), 0.1
+    x = exact_fall(start, velocity, dt, 6)
+    v = np.diff(x[:, 0], axis=0) / dt
+    assert x[0] == pytest.approx(start)
+    assert np.diff(v, axis=0) == pytest.approx(np.tile([0, -9.81 * dt, 0], (4, 1)))
+    assert v[0] == pytest.approx(velocity + [0, -9.81 * dt, 0])
+
+
+def test_presets_grow():
+    sizes = [preset.garment_vertices for preset in PRESETS]
+    assert sizes == sorted(sizes) and [preset.name for preset in PRESETS] == ["smoke", "quick", "paper"]
+    assert choose_suites([]) == choose_suites(["all"])
+
+
+NOT_LOADED = """
+import sys
+from benchmarks.run import main
+code = main(["--preset", "smoke", "--scenes", "hanging_sheet", "--methods", "simulation,newton-1", "-o", sys.argv[1]])
+loaded = [name for name in sys.modules if name.split(".")[0] in ("snug", "torch", "igl", "reference_sim")]
+print("LOADED", code, *sorted(loaded))
+"""
+
+
+def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path):
+    out = tmp_path / "run"
+    answer = subprocess.run(
+        [sys.executable, "-c", NOT_LOADED, str(out)], capture_output=True, text=True, timeout=120
+    )
+    words = answer.stdout.split("LOADED")[-1].split()
+    assert words and words[0] == "0", answer.stderr[-2000:]
+    loaded = set(words[1:])
+    assert "reference_sim.energies.stretch_stvk" in loaded  # the list is not empty by mistake
+    for name in ("snug", "torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
+        assert name not in loaded, f"{name} was loaded"
+    text = (out / "results.csv").read_text()
+    assert "energy/strain" in text and "energy/collision" not in text and "penetration" not in text
