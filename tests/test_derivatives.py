@@ -18,7 +18,9 @@ from meshes import patch, random_rotation
 from reference_sim import Cloth, Material
 from reference_sim.energies import (
     HOME,
+    AreaBarrier,
     BendHinge,
+    ContactFriction,
     ContactPenalty,
     Energy,
     Gravity,
@@ -58,6 +60,19 @@ def contact(cloth: Cloth, **options) -> ContactPenalty:
     return energy
 
 
+def friction(cloth: Cloth) -> ContactFriction:
+    """Random forces and slips: one sample in ten is out of contact, about half of the rest stick."""
+    energy = ContactFriction(contact(cloth))
+    generator = np.random.default_rng(6)
+    count = len(energy.stencils)
+    energy.forces = generator.uniform(0.1, 1.0, count) * (generator.uniform(size=count) > 0.1)
+    energy.normals = energy.contact.normals
+    energy.threshold = 0.01  # [m]: wide enough for finite differences
+    slips = generator.normal(size=(count, 3)) * generator.uniform(0, 0.015, (count, 1))
+    energy.anchors = energy.contact.sample_matrix @ deformed(cloth, 1) - slips
+    return energy
+
+
 def inertia(cloth: Cloth) -> Inertia:
     energy = Inertia(cloth, 1 / 30)
     energy.x_hat = deformed(cloth, 2)
@@ -77,12 +92,13 @@ class Case:
     make: Callable[[Cloth], Energy]
     active: float = 1.0
     uv: bool = False
+    scale: float = 1.0  # of the deformed positions
     gradient: float = 1e-6  # [N] of the largest component
     hessian: float = 1e-4  # [N/m]; 0 for a linear term
 
     def __call__(self) -> tuple[Energy, np.ndarray]:
         cloth = curved_cloth(uv=self.uv)
-        return self.make(cloth), deformed(cloth, 1)
+        return self.make(cloth), self.scale * deformed(cloth, 1)
 
 
 CASES = [
@@ -107,6 +123,8 @@ CASES = [
         gradient=1e-3,
         hessian=1.0,
     ),
+    Case("friction", friction, active=0.8, gradient=0.1, hessian=10.0),
+    Case("area-barrier", AreaBarrier, active=0.5, scale=0.5, gradient=1e-2, hessian=1.0),
 ]
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
@@ -326,4 +344,4 @@ def test_every_term_has_its_line_above():
     tested = {type(case()[0]).__name__ for case in CASES}
     terms = {name for name in HOME if name not in ("Energy", "Step")}
     assert tested == terms, f"add to CASES: {', '.join(sorted(terms - tested))}"
-    assert all(re.fullmatch("[a-z]+", case()[0].name) for case in CASES)
+    assert all(re.fullmatch("[a-z_]+", case()[0].name) for case in CASES)
