@@ -41,7 +41,7 @@ motions: without --motions the embedded library, which has its own test set. Wit
   replace the library; "library" among the paths keeps it. --test-motions names those to test on, all
   others train. Without it the library's test set tests; of files alone the first by name tests and
   the others train; a single file tests and the library trains. Files are brought to 30 frames per
-  second, placed on the floor, arms spread by 20 degrees, and cut to the preset's length.
+  second, placed on the floor, arms spread clear of the torso, and cut to the preset's length.
 
 exit status: 0 when every cell ended as ok or as an explained skip (in extremes an honest failure with
   its reason is an accepted outcome); 1 when a cell failed: its row says why and the rest went on;

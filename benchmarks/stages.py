@@ -111,8 +111,9 @@ class RunInProgress:
         if self.wardrobe is not None:
             with self.stage("ground truth"):
                 self.ground_truth()
-            with self.stage("training"):
-                self.train()
+            if plan.models:
+                with self.stage("training"):
+                    self.train()
         if plan.cells:
             outcomes = self.cells_and_metrics()
             failed = sum(outcome.status == "failed" for outcome in outcomes)

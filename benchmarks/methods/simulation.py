@@ -26,9 +26,11 @@ class Simulation:
     def run(self) -> Trajectory:
         """All frames."""
         assert self.scene is not None
-        return self._simulate(frames=self.scene.frames)
+        # Hours at the paper's scale: a bar with the time left, a microsecond of a frame's milliseconds.
+        label = self.scene.name if self.scene.dressed else None
+        return self._simulate(frames=self.scene.frames, progress=label)
 
-    def _simulate(self, *, frames: int) -> Trajectory:
+    def _simulate(self, *, frames: int, progress: str | None = None) -> Trajectory:
         scene = self.scene
         assert scene is not None
         return simulate(
@@ -39,6 +41,7 @@ class Simulation:
             obstacle=scene.obstacle,
             start=scene.start,
             velocity=scene.start_velocity,
+            progress=progress,
             **self.options,
         )
 

@@ -136,10 +136,10 @@ def _independent(step: HardStep, positions: np.ndarray) -> _Truth:
         x = fixed.index_copy(0, torch.as_tensor(free), part.reshape(-1, 3))
         return torch.stack([energy.energy(x).sum() for energy in step.potential.energies]).sum()
 
-    at = fixed[torch.as_tensor(free)].flatten()
-    gradient = torch.func.grad(total)(at)
-    hessian = torch.func.hessian(total)(at)
-    norm = float(gradient.abs().max()) / step.weight
+    at = fixed[torch.as_tensor(free)].flatten().requires_grad_(True)
+    (gradient,) = torch.autograd.grad(total(at), at, create_graph=True)
+    hessian = torch.stack([torch.autograd.grad(part, at, retain_graph=True)[0] for part in gradient])
+    norm = float(gradient.detach().abs().max()) / step.weight
     if not torch.isfinite(hessian).all():
         return _Truth(norm, 0.0, float("-inf"), float("inf"))
     values = torch.linalg.eigvalsh(hessian)
