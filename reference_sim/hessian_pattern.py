@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -12,9 +13,14 @@ from numba import njit
 from .energies.energy import Energy
 from .linear_solver import nested_dissection
 
+SPARE = 3  # a wider pattern keeps up to this many times the blocks that dynamic terms need at the moment
+
 
 class HessianPattern:
     """Pattern of the sum of `energies` over the vertices that `free` marks, built once per scene.
+
+    Dynamic terms have no blocks in it at first: `covering` gives a wider pattern when they couple vertices
+    that no other term couples.
 
     The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order: what a
     Cholesky factorisation reads. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that all three
@@ -42,18 +48,26 @@ class HessianPattern:
             keys.append(np.unique(_block_keys(number[energy.stencils], n)))
         key = np.unique(np.concatenate(keys))
         key = key[key >= 0]  # -1 stands for a pinned vertex or the upper triangle
-        column, row = np.divmod(key, n)
-        start = np.searchsorted(column, np.arange(n + 1))
-        height = np.diff(start)
-        within = np.arange(len(key)) - start[column]
-        self._base = block**2 * start[column] + block * within
-        self._stride = block * height[column]
+        self._number = number
+        self._dynamic = [energy for energy in energies if energy.dynamic]
         self._slots = [
             np.searchsorted(key, block_key) if len(key) else block_key
             for block_key in (_block_keys(number[e.stencils], n) for e in energies)
         ]
         for slots, energy in zip(self._slots, energies):
             slots[_block_keys(number[energy.stencils], n) < 0] = -1
+        self._fixed = self
+        self._lay_out(key)
+
+    def _lay_out(self, key: np.ndarray) -> None:
+        """Place the blocks of the sorted keys column * n + row one after the other."""
+        self._key, block, n = key, self.block, len(self.free)
+        column, row = np.divmod(key, n)
+        start = np.searchsorted(column, np.arange(n + 1))
+        height = np.diff(start)
+        within = np.arange(len(key)) - start[column]
+        self._base = block**2 * start[column] + block * within
+        self._stride = block * height[column]
         self.indptr = np.concatenate([[0], np.cumsum(np.repeat(block * height, block))])
         self.indices = np.empty(block**2 * len(row), dtype=np.int64)
         _fill_rows(start, row, block, self.indices)
@@ -62,6 +76,40 @@ class HessianPattern:
         lower = sp.csr_matrix((ones, (row[off], column[off])), shape=(n, n))
         self._adjacency = (lower + lower.T).tocsr()
         self.diagonal = self._diagonal_places(start)
+
+    def covering(self, x: np.ndarray) -> HessianPattern:
+        """This pattern, or a wider one if dynamic terms couple vertices at x (V, 3) that have no block here.
+
+        A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis each
+        time, until more than SPARE times the needed ones are kept.
+        """
+        if not self._dynamic:
+            return self
+        needed = np.unique(np.concatenate([self._keys_of(e.sparse_hessian(x))[0] for e in self._dynamic]))
+        needed = np.setdiff1d(needed, self._fixed._key, assume_unique=True)
+        if not len(np.setdiff1d(needed, self._key, assume_unique=True)):
+            return self
+        kept = np.setdiff1d(self._key, self._fixed._key, assume_unique=True)
+        return self._fixed._widened(np.union1d(kept, needed) if len(kept) < SPARE * len(needed) else needed)
+
+    def _widened(self, extra: np.ndarray) -> HessianPattern:
+        wider = copy.copy(self)
+        wider.__dict__.pop("order", None)
+        key = np.union1d(self._key, extra)
+        moved = np.append(np.searchsorted(key, self._key), -1)  # slot -1, not stored, stays -1
+        wider._slots = [moved[slots] for slots in self._slots]
+        wider._lay_out(key)
+        return wider
+
+    def _keys_of(self, hessian: sp.csc_matrix) -> tuple[np.ndarray, np.ndarray]:
+        """Keys (m,) of the stored blocks of a (3V, 3V) matrix, sorted, and their values (m, 3, 3)."""
+        blocks = hessian.tobsr(blocksize=(3, 3))
+        row = self._number[np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))]
+        column = self._number[blocks.indices]
+        stored = np.flatnonzero((row >= column) & (column >= 0))
+        key = (column * len(self.free) + row)[stored]
+        order = np.argsort(key)
+        return key[order], blocks.data[stored[order]]
 
     @property
     def size(self) -> int:
@@ -81,12 +129,21 @@ class HessianPattern:
         """Values (nnz,) of the lower matrix at x (V, 3) [N/m]: Hessian, or scalar stiffness for block 1."""
         data = np.zeros(len(self.indices))
         for energy, slots in zip(self.energies, self._slots):
+            if energy.dynamic:
+                self._add(energy.sparse_hessian(x), data)
+                continue
             elements, blocks = (
                 energy.active_hessian_blocks(x) if self.block == 3 else energy.scalar_stiffness(x)
             )
             k = energy.stencils.shape[1]
             _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
         return data
+
+    def _add(self, hessian: sp.csc_matrix, data: np.ndarray) -> None:
+        key, values = self._keys_of(hessian)
+        slot = np.searchsorted(self._key, key)
+        i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
+        data[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += values
 
     def lower(self, data: np.ndarray) -> sp.csc_matrix:
         """The values as a scipy matrix; the upper halves of its diagonal blocks are stored too."""
@@ -103,7 +160,7 @@ def _block_keys(stencils: np.ndarray, n: int) -> np.ndarray:
     row, column = stencils[:, :, None], stencils[:, None, :]
     key = column * n + row
     key = np.where((row < 0) | (column < 0) | (row < column), -1, key)
-    return key.reshape(len(stencils), -1)
+    return key.reshape(len(stencils), stencils.shape[1] ** 2)
 
 
 @njit(cache=True)

@@ -61,10 +61,24 @@ class Potential:
         """Largest share of `direction` (V, 3) [m] that every term allows from x (V, 3)."""
         return min(energy.largest_step(x, direction) for energy in self.energies)
 
+    def clear_way(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+        """Share of the way from x to goal (V, 3) that every term leaves open; see `Energy.clear_way`."""
+        return min(energy.clear_way(x, goal, progress) for energy in self.energies)
+
+    def set_progress(self, progress: float) -> None:
+        """Put the obstacle of every term at `progress` (0 to 1) of its motion in this step."""
+        for energy in self.energies:
+            energy.set_progress(progress)
+
+    def objection(self, x: np.ndarray) -> str:
+        """The first objection of a term to x (V, 3); "" if there is none."""
+        return next(filter(None, (energy.objection(x) for energy in self.energies)), "")
+
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
         """Second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
-        pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
-        return pattern.symmetric(pattern.assemble(np.ascontiguousarray(x, dtype=np.float64)))
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool)).covering(x)
+        return pattern.symmetric(pattern.assemble(x))
 
     def pattern(self, free: np.ndarray, *, block: int = 3) -> HessianPattern:
         """Pattern over the vertices marked free (V,), of the Hessian or (block=1) of a scalar stiffness."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from .obstacle import Obstacle
 
 GUESSES = ("previous", "extrapolated", "carried")
+MAX_APPROACHES = 30  # minimisations on the way of an obstacle within one step
 
 
 def simulate(
@@ -137,6 +140,7 @@ class _Loop:
         self.quasi_static, self.options = quasi_static, options
         self.potential = Potential([*energies, Inertia(cloth, dt)])
         self.newton = Newton(self.potential, **options)
+        self._started = False
 
     def step(self, frame: int, x: np.ndarray, v: np.ndarray, pins: np.ndarray | None) -> Result:
         """One backward-Euler step from x (V, 3) with velocity v (V, 3)."""
@@ -147,7 +151,52 @@ class _Loop:
             first = x + self.dt * v if self.guess == "extrapolated" else x.copy()
         first[self.cloth.pins] = x[self.cloth.pins] if pins is None else pins
         self.potential.prepare(Step(x, v, first, self.dt, self.obstacle, frame))
-        return self.newton.minimise(first)
+        return self._reach(x, first)
+
+    def _reach(self, x: np.ndarray, guess: np.ndarray) -> Result:
+        """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
+
+        With such a term (a barrier) x, pins and obstacle walk together from the start of the step to the
+        guess until something would touch; a rough minimisation there makes room, and they walk on. Where
+        standing still takes the obstacle further, free vertices do that. So the last minimisation starts
+        without an intersection, pins and obstacle at the end of their way. Without such a term it starts at
+        the guess.
+
+        Raises:
+            ValueError: the very first x is impossible already.
+        """
+        potential, pins = self.potential, self.cloth.pins
+        if not self._started:
+            potential.set_progress(0.0)
+            if objection := potential.objection(x):
+                raise ValueError(f"simulate: the start is not free of intersections: {objection}")
+            self._started = True
+        motion, goal, progress = guess - x, guess, 0.0
+        for _ in range(MAX_APPROACHES):
+            share = potential.clear_way(x, goal, progress)
+            if share < 1:
+                held = x.copy()
+                held[pins] = guess[pins]
+                held_share = potential.clear_way(x, held, progress)
+                share, goal = max((share, goal), (held_share, held), key=lambda pair: pair[0])
+            progress = 1.0 if share == 1 else progress + share * (1 - progress)
+            potential.set_progress(progress)
+            if share == 1:
+                return self.newton.minimise(goal)
+            x = self.rough.minimise(x + share * (goal - x)).positions
+            goal = x + (1 - progress) * motion
+            goal[pins] = guess[pins]
+        result = self.newton.minimise(x)
+        if result.status == "diverged":
+            return result
+        reason = f"no way without intersection: pins and obstacle came {progress:.1%} of theirs"
+        return replace(result, status="stalled", reason=reason)
+
+    @cached_property
+    def rough(self) -> Newton:
+        """What makes room half-way: a few iterations."""
+        options: dict[str, Any] = self.options | {"max_iterations": 8, "tolerance": 1e-2}
+        return Newton(self.potential, **options)
 
     def first_fields(self, x: np.ndarray) -> dict[str, float]:
         """The fields of frame 0, which nobody minimised."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    import scipy.sparse as sp
     from torch import Tensor
 
     from ..cloth import Cloth
@@ -42,11 +43,14 @@ class Energy:
         name: the term's name in tables.
         cloth: the rest state that the term was built on.
         stencils: (N, k) vertex indices of each element.
+        dynamic: True where the vertices that the term couples change with x, as the pairs of a contact do.
+            Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks.
     """
 
     name: str
     cloth: Cloth
     stencils: np.ndarray
+    dynamic: bool = False
 
     def energy(self, x: Tensor) -> Tensor:
         """Energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""
@@ -103,12 +107,31 @@ class Energy:
         """Elements with a non-zero Hessian (n,), their blocks (n, 3k, 3k): all of them unless overridden."""
         return np.arange(len(self.stencils)), self.hessian_blocks(x)
 
+    def sparse_hessian(self, x: np.ndarray) -> sp.csc_matrix:
+        """Of a dynamic term: its second derivatives (3V, 3V) [N/m] at x (V, 3)."""
+        raise NotImplementedError
+
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
         """Largest share of `direction` (V, 3) [m] that may be walked from x (V, 3); 1 if nothing forbids.
 
         For terms that are infinite beyond a first touch.
         """
         return 1.0
+
+    def clear_way(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+        """Share (0 to 1) of the joint way from x (V, 3) to goal (V, 3) that this term leaves open.
+
+        On that way the obstacle moves from its place at `progress` (0: start of the step, 1: end) to its
+        place at the end.
+        """
+        return 1.0
+
+    def set_progress(self, progress: float) -> None:
+        """Put the obstacle at `progress` of its motion in this step; `prepare` puts it at the end, 1."""
+
+    def objection(self, x: np.ndarray) -> str:
+        """What makes x (V, 3) impossible for this term, in words with the elements; "" if nothing does."""
+        return ""
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A positive semi-definite stand-in for the Hessian that treats x, y and z alike.

@@ -11,6 +11,7 @@ therefore judges by slopes (Hager and Zhang 2005, approximate Wolfe conditions).
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -59,7 +60,16 @@ class Newton:
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]."""
-        return _Run(self, np.array(x0, dtype=np.float64, order="C")).to_the_end()
+        result = _Run(self, np.array(x0, dtype=np.float64, order="C")).to_the_end()
+        objection = self.potential.objection(result.positions)
+        return replace(result, status="diverged", reason=objection) if objection else result
+
+    def cover(self, x: np.ndarray) -> None:
+        """Renew pattern and symbolic analysis if a dynamic term has left the pattern at x (V, 3)."""
+        pattern = self._pattern.covering(x)
+        if pattern is not self._pattern:
+            self._pattern = pattern
+            self._solver = analyse(pattern.indptr, pattern.indices, pattern.order)
 
 
 class _Run:
@@ -113,6 +123,7 @@ class _Run:
     def assemble(self) -> np.ndarray:
         start = time.perf_counter()
         with np.errstate(all="ignore"):
+            self.n.cover(self.x)
             data = self.n._pattern.assemble(self.x)
         self.seconds["assemble"] += time.perf_counter() - start
         return data
@@ -194,10 +205,11 @@ class _Run:
             v = self.solve(self.n._metric * v)
             v /= np.abs(v).max()
         v *= -1.0 if float(v @ self.g) > 0 else 1.0
-        scale = 100 * self.n._step_tolerance
+        step = np.zeros_like(self.x)
+        step[self.n._free] = 100 * self.n._step_tolerance * v.reshape(-1, 3)
+        scale = self.n.potential.largest_step(self.x, step)
         for _ in range(30):
-            trial = self.x.copy()
-            trial[self.n._free] += scale * v.reshape(-1, 3)
+            trial = self.x + scale * step
             value, gradient = self.evaluate(trial)
             if np.isfinite(value) and value < self.value - 1e-13 * abs(self.value):
                 self.x, self.value, self.g = trial, value, gradient
