@@ -121,6 +121,7 @@ def save(
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=200, metadata={"Software": None})
     if vector:
+        figure.set_layout_engine("none")  # it has done its work, which is half of the time of a figure
         path = folder / f"{name}.svg"
         with replacing(path) as temporary:
             figure.savefig(temporary, metadata={"Date": None})

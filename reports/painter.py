@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,7 +43,8 @@ def paint(
     half = camera.height / 2.0
     axes.set(xlim=(-half * size[0] / size[1], half * size[0] / size[1]), ylim=(-half, half))
     paints = np.concatenate(colours)[order]
-    polygons = list(np.concatenate(corners)[order])
+    # One array, not a list: matplotlib then makes all outlines at once.
+    polygons: Any = np.concatenate(corners)[order]
     axes.add_collection(PolyCollection(polygons, facecolors=paints, edgecolors=paints, linewidths=0.3))
     FigureCanvasAgg(figure).print_png(image, metadata={"Software": None})
 

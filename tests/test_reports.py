@@ -81,13 +81,16 @@ def all_rows() -> list[Row]:
             rows.append(row(scene, method, "cost/frame", 10.0 / factor, unit="ms"))
             if method != "simulation":
                 rows.append(row(scene, method, "curvature/error", factor, unit="1/m"))
-        rows.append(row(scene, "supervised", value=None, status="failed", reason="diverged at step 7"))
+        for metric in ("energy/strain", "cost/frame"):
+            failed = {"value": None, "status": "failed", "reason": "diverged at step 7"}
+            rows.append(row(scene, "supervised", metric, **failed))
     for cut in (1, 4):
         more = {"suite": "speed", "method": f"newton-{cut}"}
         rows.append(row(SCENES[0], metric="cost/frame", unit="ms", value=2.0 * cut, **more))
         rows.append(row(SCENES[0], metric="curvature/error", unit="1/m", value=3.0 / cut, **more))
         rows.append(row(SCENES[0], metric="energy/total", value=1.5 - cut * 0.2, **more))
         rows.append(row("hanging_sheet", metric="energy/strain", value=0.0, **more))
+    rows.append(row("free_fall", "simulation", "energy/gravity", -0.5, suite="speed"))
     rows.append(skipped(scene="hanging_sheet", suite="speed"))
     check = {"suite": "validation", "method": "simulation", "metric": "check", "unit": "m"}
     rows.append(row("free_fall", value=1e-15, expected=0.0, tolerance=1e-12, **check))
@@ -138,6 +141,8 @@ def test_what_is_not_declared_is_a_dash_and_zero_stays_zero(made):
     sheet_line = next(x for x in lines if x["scene"] == "hanging_sheet" and x["method"] == "newton-1")
     assert sheet_line["strain [J]"] == "0"
     assert sheet_line["collision [J]"] == sheet_line["total [J]"] == "-"
+    fall = next(x for x in lines if x["scene"] == "free_fall")
+    assert fall["strain [J]"] == "-" and fall["gravity [J]"] == "-0.5"
 
 
 def test_every_file_of_the_report_is_there(made):
@@ -205,10 +210,12 @@ def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
     assert "fewer scenes" in block["note"] and "unconverged" in block["note"]
 
 
-def test_a_cell_of_two_suites_counts_once():
-    rows = [row(value=1.0, suite=suite) for suite in ("garments", "speed")]
-    table = tables.energies_by_scene(rows)
-    assert table is not None and len(table.rows) == 1
+def test_a_cell_of_two_suites_counts_once_in_its_own_table():
+    rows = [row(value=v, metric="cost/frame", suite=s) for v, s in ((1.0, "garments"), (2.0, "speed"))]
+    rows += [row(value=v, suite=s) for v, s in ((1.0, "garments"), (2.0, "speed"))]
+    by_scene, speed = tables.energies_by_scene(rows), tables.speed(rows)
+    assert by_scene is not None and speed is not None
+    assert [line[2].value for line in by_scene.rows] == [1.0] and speed.rows[0][2].value == 2.0
 
 
 @pytest.mark.parametrize(
@@ -255,6 +262,7 @@ def test_the_answer_follows_the_numbers():
 
     assert "SNUG has the lowest" in said(1.0, 2.5) and "inertia is reproduced." not in said(2.5, 1.0)
     assert "PBNS has the lowest" in said(2.5, 1.0) and "2.5 times as much" in said(2.5, 1.0)
+    assert "SNUG is lower in strain" in said(1.0, 2.5) and "SNUG is higher in strain" in said(2.5, 1.0)
     assert "gravity and inertia, is reproduced." in said(1.0, 1.2)
     assert "equal in strain" in said(1.0, 1.001) and "reproduced in 0 of the 4" in said(1.0, 1.001)
 
