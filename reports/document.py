@@ -76,7 +76,7 @@ def document(
     problems: Sequence[str],
 ) -> dict[str, Any]:
     """Everything the template needs, as JSON-ready values."""
-    lead = _lead_picture(pictures)
+    lead = next((picture for picture in pictures if picture.kind == "speed"), None)
     rest = [picture for picture in pictures if picture is not lead]
     sections = [
         {"title": "Garments on moving bodies", "blocks": _garments(tables, rest)},
@@ -111,13 +111,6 @@ def _subtitle(config: dict[str, Any]) -> str:
     parts += [f"commit {config['commit']}"] if config.get("commit") else []
     parts += [str(config["started"])[:10]] if config.get("started") else []
     return " · ".join(parts)
-
-
-def _lead_picture(pictures: Sequence[Picture]) -> Picture | None:
-    """The plot for the first page: error against run time, dressed first, then with cut solvers."""
-    plots = [picture for picture in pictures if picture.kind == "speed"]
-    plots.sort(key=lambda p: (not p.caption.startswith("dressed/"), "iterations" not in p.caption))
-    return next(iter(plots), None)
 
 
 def _figures(pictures: Sequence[Picture], section: str, kind: str) -> list[Block]:

@@ -26,7 +26,7 @@ from reports.vtkhdf import MeshSeries, read_series
 SIZE = (420, 520)  # pixels of one view
 BODY_COLOUR = "#D9CFC6"
 CLOTH_COLOUR = "#7FA8C9"
-GL_SECONDS = 90.0  # for all views together, the start of pyvista included
+GL_SECONDS = 20.0, 1.5  # to start pyvista, and for each view; some drivers hang rather than crash
 PER_ROW = 6
 
 
@@ -82,7 +82,8 @@ def _rendered_by_opengl(views: Sequence[View]) -> bool:
         jobs.write_text(json.dumps([asdict(view) for view in views]), encoding="utf-8")
         command = [sys.executable, "-m", "reports.render", str(jobs)]
         try:
-            ended = subprocess.run(command, capture_output=True, timeout=GL_SECONDS)
+            limit = GL_SECONDS[0] + GL_SECONDS[1] * len(views)
+            ended = subprocess.run(command, capture_output=True, timeout=limit)
         except (OSError, subprocess.TimeoutExpired):
             return False
     return ended.returncode == 0 and all(Path(view.image).is_file() for view in views)

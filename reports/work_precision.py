@@ -12,7 +12,7 @@ from benchmarks.results import Row
 from reports import palette
 from reports.canvas import PAGE_WIDTH, Picture, file_name, grid, legend_above, log_axis, new_figure, save
 from reports.numbers import number
-from reports.summary import Measurements, excess_energy, speed_measurements
+from reports.summary import Measurements, dressed_scenes, excess_energy, speed_measurements
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,10 +33,17 @@ def _error(measured: Measurements, scene: str, method: str, error: str) -> float
 
 
 def error_against_time(folder: Path, rows: Sequence[Row]) -> list[Picture]:
-    """One figure per scene: a panel per error measure, a marker per method, cut solvers joined by a line."""
+    """One figure per scene: a panel per error measure, a marker per method, cut solvers joined by a line.
+
+    Dressed bodies come first, and of those the one on which most methods ran.
+    """
     measured = speed_measurements(rows)
+    dressed = dressed_scenes(measured)
+    ran = {
+        s: sum(bool(measured.seeds(s, m, "cost/frame")) for m in measured.methods) for s in measured.scenes
+    }
     pictures = []
-    for scene in measured.scenes:
+    for scene in sorted(measured.scenes, key=lambda scene: (scene not in dressed, -ran[scene])):
         times = {m: measured.value(m, "cost/frame", [scene]) for m in measured.methods}
         points: dict[str, dict[str, tuple[float, float]]] = {}
         for key, _ in ERRORS:

@@ -342,6 +342,18 @@ def test_without_opengl_the_painter_draws(made, tmp_path, monkeypatch, ending):
     assert picture[0, 0, :3].min() == 1.0
 
 
+@pytest.mark.slow
+def test_with_opengl_or_without_there_is_a_picture(made, tmp_path):
+    garment = str(made.trajectory_path(SCENES[0], "snug"))
+    view = render.View(garment, "", -1, (0.2, 1.25, 0.0), 0.8, str(tmp_path / "view.png"))
+    assert render.render_views([view]) in ("OpenGL", "painter")
+    from matplotlib.image import imread
+
+    picture = imread(view.image)
+    middle = picture[picture.shape[0] // 2, picture.shape[1] // 2, :3]
+    assert middle[2] > middle[0] + 0.05 and picture[0, 0, :3].min() > 0.98
+
+
 def test_the_reader_knows_the_simulators_files(tmp_path):
     positions = np.random.default_rng(0).normal(size=(3, 4, 3))
     fields = {"energy/strain": np.array([0.0, 1.0, 2.0])}
