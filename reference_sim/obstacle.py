@@ -5,14 +5,18 @@ The simulator knows a body as nothing more than this.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import igl
 import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
+from .closed_mesh import check_closed
 from .cloth import MeshError
+from .resume import fingerprint
 
 DEFAULT_REGION = 0.20  # [m]
 
@@ -42,7 +46,7 @@ class Obstacle:
         region: radius of that rule [m].
 
     Raises:
-        MeshError: wrong shapes, NaN, an open or inside-out mesh.
+        MeshError: wrong shapes, NaN, a mesh that is no closed surface (see `check_closed`).
     """
 
     def __init__(
@@ -56,25 +60,47 @@ class Obstacle:
         positions = np.asarray(positions, dtype=np.float64)
         self.positions = positions[None] if positions.ndim == 2 else positions
         self.faces = np.ascontiguousarray(faces, dtype=np.int64)
-        _check_closed(self.positions, self.faces)
+        check_closed(self.positions, self.faces)
         self.region = float(region)
         self.rest_centroids: np.ndarray | None = None
         if rest_positions is not None:
             rest = np.asarray(rest_positions, dtype=np.float64)
-            if rest.shape != self.positions.shape[1:]:
-                raise MeshError(f"obstacle rest_positions {rest.shape}: expected {self.positions.shape[1:]}")
+            if rest.shape != self.positions.shape[1:] or not np.isfinite(rest).all():
+                raise MeshError(
+                    f"obstacle rest_positions {rest.shape}: expected finite {self.positions.shape[1:]}"
+                )
             self.rest_centroids = np.ascontiguousarray(rest[self.faces].mean(axis=1))
+        self._substeps = 1
+        self._forget()
+
+    def _forget(self) -> None:
         self._seen: list[np.ndarray] = []  # rest points asked about so far, and
         self._reachable = np.arange(len(self.faces))  # the faces that any of them may meet
         self._trees: dict[bool, tuple[int, igl.AABB, np.ndarray, np.ndarray]] = {}
 
     @property
     def frames(self) -> int:
-        return len(self.positions)
+        return (len(self.positions) - 1) * self._substeps + 1
 
     def at(self, frame: int) -> np.ndarray:
         """Vertices (B, 3) at `frame`; the last frame holds on for ever."""
-        return self.positions[min(frame, self.frames - 1)]
+        whole, part = divmod(min(frame, self.frames - 1), self._substeps)
+        if part == 0:
+            return self.positions[whole]
+        share = part / self._substeps
+        return (1 - share) * self.positions[whole] + share * self.positions[whole + 1]
+
+    def refined(self, substeps: int) -> Obstacle:
+        """The same motion, linear in between, with `substeps` frames for each frame here."""
+        fine = copy.copy(self)
+        fine._substeps = self._substeps * substeps
+        fine._forget()
+        return fine
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of everything that decides how it touches."""
+        return fingerprint(self.positions, self.faces, self.rest_centroids, np.array(self.region))
 
     def _closest(self, points: np.ndarray, frame: int, *, reachable: bool) -> tuple[np.ndarray, np.ndarray]:
         """Nearest face and point, on the whole mesh or on the reachable faces; the last tree is kept."""
@@ -164,27 +190,6 @@ class Obstacle:
 
     def _vertex_normals(self, frame: int) -> np.ndarray:
         return np.asarray(igl.per_vertex_normals(np.asfortranarray(self.at(frame)), self.faces))
-
-
-def _check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
-    if positions.ndim != 3 or positions.shape[2] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
-        raise MeshError(f"obstacle positions {positions.shape}, faces {faces.shape}: want (T, B, 3), (F, 3)")
-    if faces.min() < 0 or faces.max() >= positions.shape[1]:
-        raise MeshError(f"obstacle faces name a vertex outside 0..{positions.shape[1] - 1}")
-    bad = np.argwhere(~np.isfinite(positions))
-    if bad.size:
-        raise MeshError(f"obstacle vertex {bad[0, 1]} of frame {bad[0, 0]} is not finite")
-    half = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    size = positions.shape[1]
-    forward, backward = half[:, 0] * size + half[:, 1], half[:, 1] * size + half[:, 0]
-    lonely = np.flatnonzero(~np.isin(forward, backward))
-    if lonely.size:
-        a, b = half[lonely[0]]
-        raise MeshError(f"obstacle is not closed: edge ({a}, {b}) of face {lonely[0] // 3} has one face only")
-    corner = positions[0][faces]
-    volume = np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6
-    if volume <= 0:
-        raise MeshError(f"obstacle is inside out (volume {volume:.3g} m^3): reverse its faces")
 
 
 def _face_frames(corners: np.ndarray) -> np.ndarray:

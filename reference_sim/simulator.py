@@ -3,14 +3,14 @@
     x_{t+1} = argmin  1/(2 dt^2) (x - x_hat)^T M (x - x_hat) + Phi(x),   x_hat = x_t + dt v_t
 
 (SNUG, eq. 4; Martin et al. 2011; Gast et al. 2015). The velocity of the next step is (x_{t+1} - x_t) / dt.
+With sub-steps a stored frame is n such steps of dt / n, pins and obstacle moving linearly in between.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,9 @@ from .cloth import Cloth
 from .energies.energy import Energy, Step
 from .minimise import Newton, Result
 from .potential import Potential
-from .trajectory import Trajectory, TrajectoryWriter
+from .recorder import Recorder
+from .resume import Past, fingerprint, recover
+from .trajectory import Trajectory, TrajectoryError
 
 if TYPE_CHECKING:
     from .obstacle import Obstacle
@@ -42,7 +44,9 @@ def simulate(
     pin_positions: Callable[[int], np.ndarray] | None = None,
     guess: str | None = None,
     quasi_static: bool = False,
+    substeps: int = 1,
     path: str | Path | None = None,
+    resume: bool = False,
     progress: str | None = None,
     **options: float,
 ) -> Trajectory:
@@ -51,7 +55,7 @@ def simulate(
     Args:
         cloth: the rest state; its pins stay where `start` has them unless pin_positions moves them.
         energies: the terms of Phi. Inertia is added here; no other term is.
-        dt: time step [s].
+        dt: time between frames [s].
         frames: number of frames T in the result.
         obstacle: the moving body, one mesh per frame; terms of contact read it.
         start: (V, 3) [m] at frame 0; default the rest positions.
@@ -60,7 +64,12 @@ def simulate(
         guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "carried" by the obstacle's
             nearest faces (default where there is an obstacle; else "extrapolated").
         quasi_static: forget the velocity at every frame; for settling.
+        substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
+            counts, the worst gradient norm, and the energies of the last sub-step.
         path: write the VTKHDF file there, frame by frame.
+        resume: go on after the last whole frame of `path`, where a run with the same arguments left it (more
+            frames may be asked for); without such a file start at the beginning. The same bits come out as
+            without the interruption.
         progress: label of a progress bar with time left; None for silence.
         options: of the minimiser (tolerance, max_iterations, timeout).
 
@@ -70,51 +79,45 @@ def simulate(
         weights), converged (0/1), energy/<term> [J].
 
     Raises:
-        ValueError: unknown guess, wrong shapes, fewer than 1 frame.
+        ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step.
+        TrajectoryError: `path` cannot be resumed: unreadable, or made by another run.
     """
-    loop = _Loop(cloth, energies, dt, obstacle, guess, quasi_static, options)
+    for name, count in (("frames", frames), ("substeps", substeps)):
+        if count < 1:
+            raise ValueError(f"simulate: {name} = {count}: must be at least 1")
     x = _checked(start, cloth.rest_positions, "start")
     v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
-    if frames < 1:
-        raise ValueError(f"simulate: frames = {frames}: must be at least 1")
-    provenance = loop.provenance()
-    recorded: dict[str, list[Any]] = {"x": [x], "t": [0.0], "s": [0.0], "fields": [loop.first_fields(x)]}
-    status, reason = "converged", ""
-    writer = (
-        TrajectoryWriter(path, cloth.faces, provenance, vertex_count=cloth.vertex_count)
-        if path
-        else nullcontext()
-    )
-    with writer as file:
-        if file:
-            file.append(x, 0.0, 0.0, recorded["fields"][0])
-        for frame in _bar(range(1, frames), progress):
+    loop = _Loop(cloth, energies, dt, substeps, obstacle, guess, quasi_static, options)
+    provenance = loop.provenance() | {"start": fingerprint(x, v)}
+    past = recover(path, provenance, frames=frames) if resume and path else None
+    if past and past.over(frames):
+        return past.trajectory
+    state = _State(x, v) if past is None else loop.taken_up(past, v, pin_positions)
+    with Recorder(cloth, provenance, path) as record:
+        if past is None:
+            record.start(x, loop.first_fields(x))
+        else:
+            record.replay(past)
+        for frame in _bar(range(record.frames, frames), progress):
             clock = time.perf_counter()
-            result = loop.step(frame, x, v, None if pin_positions is None else pin_positions(frame))
+            after, results = loop.advance(frame, state, pin_positions and pin_positions(frame))
             seconds = time.perf_counter() - clock
-            if result.status != "converged" and status == "converged":
-                status, reason = result.status, f"frame {frame}: {result.reason}"
-            if not np.isfinite(result.positions).all() or result.status == "diverged":
+            record.judge(frame, results)
+            if after is None:
                 break
-            v = np.zeros_like(x) if quasi_static else (result.positions - x) / dt
-            x = result.positions
-            fields = _fields(result)
-            for key, value in (("x", x), ("t", frame * dt), ("s", seconds), ("fields", fields)):
-                recorded[key].append(value)
-            if file:
-                file.append(x, frame * dt, seconds, fields)
-        if file:
-            file.finish(status, reason)
-    return Trajectory(
-        positions=np.array(recorded["x"]),
-        faces=cloth.faces,
-        times=np.array(recorded["t"]),
-        frame_seconds=np.array(recorded["s"]),
-        status=status,
-        reason=reason,
-        provenance=provenance,
-        frame_fields={k: np.array([f[k] for f in recorded["fields"]]) for k in recorded["fields"][0]},
-    )
+            state = after
+            record.add(state.x, frame * dt, seconds, _fields(results), state.before)
+    return record.trajectory()
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Positions (V, 3) [m] and velocity (V, 3) [m/s]; before: both (2, V, 3) one step earlier, where resuming
+    needs them stored."""
+
+    x: np.ndarray
+    v: np.ndarray
+    before: np.ndarray | None = None
 
 
 class _Loop:
@@ -125,6 +128,7 @@ class _Loop:
         cloth: Cloth,
         energies: Sequence[Energy],
         dt: float,
+        substeps: int,
         obstacle: Obstacle | None,
         guess: str | None,
         quasi_static: bool,
@@ -135,23 +139,72 @@ class _Loop:
         if guess is None:
             guess = "extrapolated" if obstacle is None else "carried"
         if guess not in GUESSES or (guess == "carried" and obstacle is None):
-            raise ValueError(f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)}; carried needs a body")
-        self.cloth, self.dt, self.obstacle, self.guess = cloth, dt, obstacle, guess
+            raise ValueError(
+                f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)}; carried needs a body"
+            )
+        self.cloth, self.guess, self.substeps = cloth, guess, substeps
+        self.frame_dt, self.dt = dt, dt / substeps  # between frames, and of one step
+        self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refined(substeps)
         self.quasi_static, self.options = quasi_static, options
-        self.potential = Potential([*energies, Inertia(cloth, dt)])
+        self.potential = Potential([*energies, Inertia(cloth, self.dt)])
         self.newton = Newton(self.potential, **options)
         self._started = False
 
-    def step(self, frame: int, x: np.ndarray, v: np.ndarray, pins: np.ndarray | None) -> Result:
-        """One backward-Euler step from x (V, 3) with velocity v (V, 3)."""
+    def advance(
+        self, frame: int, state: _State, pins: np.ndarray | None
+    ) -> tuple[_State | None, list[Result]]:
+        """The sub-steps to `frame`, pins (P, 3) [m] at its end; the state is None where one was lost."""
+        x, v, results = state.x, state.v, []
+        for j in range(1, self.substeps + 1):
+            share = j / self.substeps
+            handles = state.x[self.cloth.pins]
+            if pins is not None:
+                handles = (1 - share) * handles + share * pins
+            step = (frame - 1) * self.substeps + j
+            guess = self.prepare(step, x, v, handles)
+            results.append(self._reach(x, guess))
+            y = results[-1].positions
+            if results[-1].status == "diverged" or not np.isfinite(y).all():
+                return None, results
+            before = np.stack([x, v])
+            x, v = y, self.velocity(y, x)
+        return _State(x, v, before if self.substeps > 1 else None), results
+
+    def velocity(self, x: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """What a step from `before` to x (V, 3) leaves behind [m/s]."""
+        return np.zeros_like(x) if self.quasi_static else (x - before) / self.dt
+
+    def prepare(self, step: int, x: np.ndarray, v: np.ndarray, handles: np.ndarray) -> np.ndarray:
+        """Freeze every term for the step from x with velocity v (V, 3); returns its first guess (V, 3)."""
         if self.guess == "carried":
             assert self.obstacle is not None
-            first = self.obstacle.carried(x, frame, self.cloth.rest_positions)
+            first = self.obstacle.carried(x, step, self.cloth.rest_positions)
         else:
             first = x + self.dt * v if self.guess == "extrapolated" else x.copy()
-        first[self.cloth.pins] = x[self.cloth.pins] if pins is None else pins
-        self.potential.prepare(Step(x, v, first, self.dt, self.obstacle, frame))
-        return self._reach(x, first)
+        first[self.cloth.pins] = handles
+        self.potential.prepare(Step(x, v, first, self.dt, self.obstacle, step))
+        return first
+
+    def taken_up(
+        self, past: Past, v0: np.ndarray, pin_positions: Callable[[int], np.ndarray] | None
+    ) -> _State:
+        """The state at the last frame of an earlier run that began with velocity v0 (V, 3)."""
+        positions, before = past.trajectory.positions, past.before
+        last = len(positions) - 1
+        x = positions[last]
+        if last == 0:
+            return _State(x, v0)
+        if self.substeps == 1:
+            v = v0 if last == 1 else self.velocity(positions[last - 1], positions[last - 2])
+            before = np.stack([positions[last - 1], v])
+        pins = self.cloth.pins
+        if pin_positions is not None and not np.array_equal(pin_positions(last), x[pins]):
+            raise TrajectoryError(f"simulate: pins at frame {last} are not where the earlier run had them")
+        if before is None:
+            raise TrajectoryError(f"simulate: the sub-step before frame {last} is lost: start again")
+        # Terms may remember the step before, and an obstacle what it was asked about.
+        self.prepare(last * self.substeps, before[0], before[1], x[pins])
+        return _State(x, self.velocity(x, before[0]), before if self.substeps > 1 else None)
 
     def _reach(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
@@ -202,26 +255,36 @@ class _Loop:
         """The fields of frame 0, which nobody minimised."""
         names = [energy.name for energy in self.potential.energies]
         fields = dict.fromkeys([f"energy/{name}" for name in names], float("nan"))
-        return {"iterations": 0.0, "factorisations": 0.0, "gradient_norm": float("nan"), "converged": 1.0} | fields
+        return {
+            "iterations": 0.0,
+            "factorisations": 0.0,
+            "gradient_norm": float("nan"),
+            "converged": 1.0,
+        } | fields
 
     def provenance(self) -> dict[str, Any]:
+        cloth, obstacle = self.cloth, self.obstacle
         return {
             "method": "backward Euler, Newton",
-            "dt_s": self.dt,
+            "dt_s": self.frame_dt,
+            "substeps": self.substeps,
             "guess": self.guess,
             "quasi_static": self.quasi_static,
             "options": self.options,
             "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
+            "material": asdict(cloth.material),
+            "cloth": fingerprint(cloth.rest_positions, cloth.faces, np.asarray(cloth.pins), cloth.rest_uv),
+            "obstacle": None if obstacle is None else obstacle.fingerprint,
         }
 
 
-def _fields(result: Result) -> dict[str, float]:
+def _fields(results: Sequence[Result]) -> dict[str, float]:
     return {
-        "iterations": float(result.iterations),
-        "factorisations": float(result.factorisations),
-        "gradient_norm": result.gradient_norm,
-        "converged": float(result.status == "converged"),
-    } | {f"energy/{name}": value for name, value in result.terms.items()}
+        "iterations": float(sum(result.iterations for result in results)),
+        "factorisations": float(sum(result.factorisations for result in results)),
+        "gradient_norm": max(result.gradient_norm for result in results),
+        "converged": float(all(result.status == "converged" for result in results)),
+    } | {f"energy/{name}": value for name, value in results[-1].terms.items()}
 
 
 def _checked(value: np.ndarray | None, default: np.ndarray, name: str) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,11 @@ import numpy as np
 
 if TYPE_CHECKING:
     import h5py
+
+
+UNFINISHED = "unfinished"  # status of a file whose writer did not end by itself
+# Where the writer keeps what a resumed run needs.
+BEFORE, FAILURE = "before_last_step", "first_failure"
 
 
 class TrajectoryError(ValueError):
@@ -58,15 +63,12 @@ class Trajectory:
 
     def save(self, path: str | Path) -> None:
         """Write the whole file under a temporary name, then put it in place."""
-        path = Path(path)
-        part = path.with_name(path.name + ".part")
         count = self.positions.shape[1]
-        with TrajectoryWriter(part, self.faces, self.provenance, vertex_count=count) as writer:
+        with TrajectoryWriter(path, self.faces, self.provenance, vertex_count=count, live=False) as writer:
             for k in range(self.frames):
                 fields = {name: values[k] for name, values in self.frame_fields.items()}
-                writer.append(self.positions[k], self.times[k], self.frame_seconds[k], fields, flush=False)
+                writer.append(self.positions[k], self.times[k], self.frame_seconds[k], fields)
             writer.finish(self.status, self.reason)
-        os.replace(part, path)
 
     @classmethod
     def load(cls, path: str | Path) -> Trajectory:
@@ -79,45 +81,63 @@ class Trajectory:
 
         try:
             with h5py.File(path, "r") as file:
-                return cls._read(file)
+                return read_trajectory(file)
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
         except (OSError, KeyError) as error:
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({error})") from None
 
-    @classmethod
-    def _read(cls, file: h5py.File) -> Trajectory:
-        own, vtk = file["benchmark"], file["VTKHDF"]
-        frames = int(own.attrs["frames"])
-        vertex_count = int(vtk["NumberOfPoints"][0])
-        return cls(
-            positions=vtk["Points"][: frames * vertex_count].reshape(frames, vertex_count, 3),
-            faces=vtk["Polygons/Connectivity"][:].reshape(-1, 3),
-            times=vtk["Steps/Values"][:frames],
-            frame_seconds=own["frame_seconds"][:frames],
-            status=str(own.attrs["status"]),
-            reason=str(own.attrs["reason"]),
-            provenance=json.loads(own.attrs["provenance"]),
-            frame_fields={k.replace(":", "/"): v[:frames] for k, v in own["frame_fields"].items()},
-        )
+    def with_status(self, status: str, reason: str) -> Trajectory:
+        """The same frames under another verdict."""
+        return replace(self, status=status, reason=reason)
+
+
+def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:
+    """The first `frames` frames of an open file, default all that are whole; raises KeyError or OSError."""
+    own, vtk = file["benchmark"], file["VTKHDF"]
+    frames = int(own.attrs["frames"]) if frames is None else frames
+    vertex_count = int(vtk["NumberOfPoints"][0])
+    return Trajectory(
+        positions=vtk["Points"][: frames * vertex_count].reshape(frames, vertex_count, 3),
+        faces=vtk["Polygons/Connectivity"][:].reshape(-1, 3),
+        times=vtk["Steps/Values"][:frames],
+        frame_seconds=own["frame_seconds"][:frames],
+        status=str(own.attrs["status"]),
+        reason=str(own.attrs["reason"]),
+        provenance=json.loads(own.attrs["provenance"]),
+        frame_fields={k.replace(":", "/"): v[:frames] for k, v in own["frame_fields"].items()},
+    )
 
 
 class TrajectoryWriter:
     """Appends frames to a VTKHDF file; use it in a `with` block.
+
+    A file appears under its name with its first whole frame in it, and from then on a frame counts only once
+    all of it has been flushed: kill -9 leaves the whole frames.
 
     Args:
         path: the file, replaced if it exists.
         faces: (F, 3).
         provenance: JSON values.
         vertex_count: V.
+        live: False to put the file in place at the end, and only if the block ends well.
     """
 
     def __init__(
-        self, path: str | Path, faces: np.ndarray, provenance: dict[str, Any], *, vertex_count: int
+        self,
+        path: str | Path,
+        faces: np.ndarray,
+        provenance: dict[str, Any],
+        *,
+        vertex_count: int,
+        live: bool = True,
     ) -> None:
         import h5py
 
-        self._file = h5py.File(path, "w")
+        self.path = Path(path)
+        self._part: Path | None = self.path.with_name(self.path.name + ".part")
+        self._file = h5py.File(self._part, "w")
+        self._live = live
         self._vertex_count = vertex_count
         self.frames = 0
         _vtk_skeleton(self._file, np.asarray(faces, dtype=np.int64), vertex_count)
@@ -127,7 +147,7 @@ class TrajectoryWriter:
         own.attrs.update(
             {
                 "frames": 0,
-                "status": "unfinished",
+                "status": UNFINISHED,
                 "reason": "the run that wrote this did not end",
                 "provenance": json.dumps(provenance),
             }
@@ -140,13 +160,17 @@ class TrajectoryWriter:
         seconds: float = float("nan"),
         fields: dict[str, float] | None = None,
         *,
-        flush: bool = True,
+        before: np.ndarray | None = None,
     ) -> None:
-        """Add one frame: positions (V, 3) [m], its time [s], the clock's seconds, further numbers by name."""
+        """Add one frame: positions (V, 3) [m], its time [s], the clock's seconds, further numbers by name.
+
+        before: (2, V, 3) positions [m] and velocity [m/s] from which the last step to this frame was made; a
+        run with sub-steps that is resumed from this frame needs them.
+        """
         k, vtk, own = self.frames, self._file["VTKHDF"], self._file["benchmark"]
         steps = vtk["Steps"]
         # VTK crashes on Values longer than NSteps, so the count is raised first.
-        steps.attrs["NSteps"] = k + 1
+        steps.attrs.modify("NSteps", k + 1)
         _extend(vtk["Points"], positions)
         _extend(steps["Values"], [time])
         _extend(steps["PointOffsets"], [k * self._vertex_count])
@@ -163,10 +187,37 @@ class TrajectoryWriter:
                 group.create_dataset(key, (0,), maxshape=(None,), dtype="f8", fillvalue=np.nan)
             group[key].resize((k + 1,))
             group[key][k] = value
+        if before is not None:
+            if BEFORE not in own:
+                own.create_dataset(BEFORE, (2, *np.shape(before)), dtype="f8")
+            own[BEFORE][k % 2] = before  # the other half still serves the frame before, should this one fail
         self.frames = k + 1
-        own.attrs["frames"] = self.frames  # last: a reader trusts only whole frames
-        if flush:
+        if self._live:
             self._file.flush()
+        own.attrs.modify("frames", self.frames)  # last: a reader trusts only whole frames
+        if self._live:
+            self._file.flush()
+            self._put_in_place()
+
+    def _put_in_place(self) -> None:
+        if self._part is None:
+            return
+        import h5py
+
+        self._file.close()
+        os.replace(self._part, self.path)
+        self._part = None
+        self._file = h5py.File(self.path, "r+")
+
+    def go_live(self) -> None:
+        """From now on every frame is flushed; the file is put in place with what it holds."""
+        self._live = True
+        self._file.flush()
+        self._put_in_place()
+
+    def first_failure(self, status: str, reason: str) -> None:
+        """Remember the verdict on the frame that is appended next, for a run that resumes this one."""
+        self._file["benchmark"].attrs[FAILURE] = json.dumps([status, reason])
 
     def finish(self, status: str, reason: str) -> None:
         """Say how it ended."""
@@ -175,8 +226,12 @@ class TrajectoryWriter:
     def __enter__(self) -> TrajectoryWriter:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None and self.frames:
+            self._put_in_place()
         self._file.close()
+        if self._part is not None:
+            self._part.unlink()
 
 
 def _extend(dataset: h5py.Dataset, rows: Any) -> None:
