@@ -13,6 +13,7 @@ from .cell import Outcome
 from .metrics.curvature import CurvatureSeries, curvature_error, curvature_series
 from .metrics.energy import energy_series, mean_energy
 from .metrics.geometry import distance_rms, penetration
+from .metrics.optimality import relative_gap
 from .results import Row, RunFolder
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ REFERENCE = "simulation"
 UNITS = {
     "energy": "J", "curvature": "1/m", "distance": "mm", "penetration/vertices": "%",
     "penetration/depth_p99": "mm", "dynamics": "mm", "cost/frame": "ms", "cost/data": "s",
-    "cost/train": "s", "cost/memory": "MB", "exact": "m",
+    "cost/train": "s", "cost/memory": "MB", "exact": "m", "gap": "1",
 }  # fmt: skip
 
 
@@ -44,7 +45,12 @@ class Reference:
 
 
 def measure_scene(
-    outcomes: Sequence[Outcome], scene: BuiltScene, run: RunFolder, costs: Sequence[Mapping[str, float]]
+    outcomes: Sequence[Outcome],
+    scene: BuiltScene,
+    run: RunFolder,
+    costs: Sequence[Mapping[str, float]],
+    *,
+    gap_samples: int,
 ) -> list[dict[str, float]]:
     """Every metric of the recorded cells of one scene, in their order.
 
@@ -69,6 +75,8 @@ def measure_scene(
         if inside:
             metrics["penetration/vertices"] = 100.0 * float(inside[k].share.mean())
             metrics["penetration/depth_p99"] = MM * float(np.percentile(inside[k].depth, 99))
+        if "speed" in outcome.cell.suites:
+            metrics["gap/relative"] = relative_gap(scene, positions[k], samples=gap_samples)
         if scene.exact is not None:
             exact = scene.exact[: trajectory.frames]
             metrics["exact/distance"] = float(np.linalg.norm(positions[k] - exact, axis=2).max())

@@ -11,7 +11,8 @@ class Preset:
 
     frames: at most so many frames of each motion, at 30 per second. steps: optimiser steps per kind
     of network. settle_frames: frames from the T-pose into the first pose of a motion.
-    sheet_cells: the small scenes are sheets of so many cells along each side.
+    sheet_cells: the small scenes are sheets of so many cells along each side. gap_samples: frames of a
+    trajectory at which suite speed solves the step again to know the gap to its minimum.
     """
 
     name: str
@@ -25,6 +26,7 @@ class Preset:
     sheet_cells: int
     sheet_frames: int
     newton_cuts: tuple[int, ...]
+    gap_samples: int
 
 
 PRESETS = (
@@ -40,6 +42,7 @@ PRESETS = (
         sheet_cells=6,
         sheet_frames=10,
         newton_cuts=(1, 4),
+        gap_samples=3,
     ),
     Preset(
         name="quick",
@@ -53,6 +56,7 @@ PRESETS = (
         sheet_cells=14,
         sheet_frames=45,
         newton_cuts=(1, 2, 4, 8),
+        gap_samples=8,
     ),
     Preset(
         name="paper",
@@ -66,6 +70,7 @@ PRESETS = (
         sheet_cells=30,
         sheet_frames=90,
         newton_cuts=(1, 2, 4, 8),
+        gap_samples=20,
     ),
 )
 

@@ -282,7 +282,8 @@ class RunInProgress:
         metrics: list[dict[str, float]] = []
         try:
             if scene is not None and recorded:
-                metrics = measure_scene(recorded, scene, self.folder, costs)
+                samples = self.plan.preset.gap_samples
+                metrics = measure_scene(recorded, scene, self.folder, costs, gap_samples=samples)
         except Exception as error:
             reason = f"metrics: {one_line(error)}"
             failed = {o.cell: dataclasses.replace(o, status="failed", reason=reason) for o in recorded}

@@ -16,6 +16,7 @@ from benchmarks.metrics.curvature import (
 )
 from benchmarks.metrics.energy import energy_series, mean_energy
 from benchmarks.metrics.geometry import distance_rms, penetration
+from benchmarks.metrics.optimality import first_guess, relative_gap
 from benchmarks.presets import find_preset
 from benchmarks.scenes import hanging_sheet, sheet_on_sphere
 from reference_sim import simulate
@@ -145,3 +146,21 @@ def test_energies_are_those_that_the_simulator_minimised():
     # Planes of the simulator were searched at its initial guess, those of the metric where it ended.
     assert series["collision"][-1] == pytest.approx(own["energy/collision"][-1], rel=0.3)
     assert series["collision"][-1] > 0.0
+
+
+@pytest.mark.parametrize("module", [hanging_sheet, sheet_on_sphere], ids=lambda m: m.__name__.split(".")[-1])
+def test_the_gap_is_zero_for_the_reference_one_for_the_guess_and_falls_between(module):
+    scene = module.build(module.__name__.split(".")[-1], find_preset("smoke"))
+
+    def gap(**options):
+        given = {"obstacle": scene.obstacle, "start": scene.start} | options
+        trajectory = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=10, **given)
+        return relative_gap(scene, trajectory.positions, samples=4)
+
+    cut = [gap(max_iterations=n) for n in (1, 3)]
+    assert 0.0 <= gap() < 1e-9 and 1e-9 < cut[1] < cut[0] < 1.0
+    x = [scene.start, scene.start]
+    for frame in range(2, 6):
+        x.append(first_guess(scene, x[-1], (x[-1] - x[-2]) / scene.dt, frame))
+    assert relative_gap(scene, np.array(x), samples=3) == pytest.approx(1.0)
+    assert np.isnan(relative_gap(scene, np.array(x[:2]), samples=3))

@@ -306,7 +306,7 @@ def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
 
 def test_every_unit_is_known():
     assert unit_of("energy/strain") == "J" and unit_of("penetration/depth_p99") == "mm"
-    assert set(UNITS.values()) == {"J", "1/m", "mm", "%", "ms", "s", "MB", "m"}
+    assert set(UNITS.values()) == {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1"}
     with pytest.raises(KeyError):
         unit_of("nonsense/x")
 

@@ -7,6 +7,7 @@ two before it; it counts as moving freely, hence inertia 0 there, and means star
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -32,10 +33,12 @@ def energy_series(
     """
     from reference_sim.energies import Inertia
 
-    terms = [*scene.energies, *([Inertia(scene.cloth, scene.dt)] if scene.dynamic else [])]
-    found = [{term.name: np.zeros(len(positions)) for term in terms} for positions in trajectories]
+    declared = [*scene.energies, *([Inertia(scene.cloth, scene.dt)] if scene.dynamic else [])]
+    # A term may remember the step before: each trajectory has terms of its own.
+    own = [[copy.copy(term) for term in declared] for _ in trajectories]
+    found = [{term.name: np.zeros(len(positions)) for term in declared} for positions in trajectories]
     for frame in range(max(map(len, trajectories), default=0)):
-        for positions, series in zip(trajectories, found):
+        for positions, terms, series in zip(trajectories, own, found):
             if frame < len(positions):
                 for name, value in _terms_at(scene, terms, positions, frame).items():
                     series[name][frame] = value
