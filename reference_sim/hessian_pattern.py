@@ -49,7 +49,6 @@ class HessianPattern:
         key = np.unique(np.concatenate(keys))
         key = key[key >= 0]  # -1 stands for a pinned vertex or the upper triangle
         self._number = number
-        self._dynamic = [energy for energy in energies if energy.dynamic]
         self._slots = [
             np.searchsorted(key, block_key) if len(key) else block_key
             for block_key in (_block_keys(number[e.stencils], n) for e in energies)
@@ -77,15 +76,19 @@ class HessianPattern:
         self._adjacency = (lower + lower.T).tocsr()
         self.diagonal = self._diagonal_places(start)
 
-    def covering(self, x: np.ndarray) -> HessianPattern:
-        """This pattern, or a wider one if dynamic terms couple vertices at x (V, 3) that have no block here.
+    def changing(self, x: np.ndarray, convexity: float = 0.0) -> list[sp.csc_matrix]:
+        """Hessians (3V, 3V) of the dynamic terms at x (V, 3)."""
+        return [energy.sparse_hessian(x, convexity) for energy in self.energies if energy.dynamic]
+
+    def covering(self, changing: Sequence[sp.csc_matrix]) -> HessianPattern:
+        """This pattern, or a wider one if the matrices couple vertices that have no block here.
 
         A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis each
         time, until more than SPARE times the needed ones are kept.
         """
-        if not self._dynamic:
+        if not changing:
             return self
-        needed = np.unique(np.concatenate([self._keys_of(e.sparse_hessian(x))[0] for e in self._dynamic]))
+        needed = np.unique(np.concatenate([self._keys_of(matrix)[0] for matrix in changing]))
         needed = np.setdiff1d(needed, self._fixed._key, assume_unique=True)
         if not len(np.setdiff1d(needed, self._key, assume_unique=True)):
             return self
@@ -125,18 +128,27 @@ class HessianPattern:
         step = self._stride[first][:, None] + 1
         return (self._base[first][:, None] + np.arange(self.block) * step).ravel()
 
-    def assemble(self, x: np.ndarray) -> np.ndarray:
-        """Values (nnz,) of the lower matrix at x (V, 3) [N/m]: Hessian, or scalar stiffness for block 1."""
+    def assemble(
+        self, x: np.ndarray, changing: Sequence[sp.csc_matrix] = (), *, convexity: float = 0.0
+    ) -> np.ndarray:
+        """Values (nnz,) of the lower matrix at x (V, 3) [N/m]: Hessian, or scalar stiffness for block 1.
+
+        changing: Hessians of the dynamic terms at x, which this pattern must cover. convexity: see
+        Energy.active_hessian_blocks.
+        """
         data = np.zeros(len(self.indices))
         for energy, slots in zip(self.energies, self._slots):
             if energy.dynamic:
-                self._add(energy.sparse_hessian(x), data)
                 continue
             elements, blocks = (
-                energy.active_hessian_blocks(x) if self.block == 3 else energy.scalar_stiffness(x)
+                energy.active_hessian_blocks(x, convexity)
+                if self.block == 3
+                else energy.scalar_stiffness(x)
             )
             k = energy.stencils.shape[1]
             _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
+        for matrix in changing:
+            self._add(matrix, data)
         return data
 
     def _add(self, hessian: sp.csc_matrix, data: np.ndarray) -> None:

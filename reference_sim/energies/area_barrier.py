@@ -57,8 +57,9 @@ class AreaBarrier(Energy):
         blocks[elements] = active
         return blocks
 
-    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return _hessian(x, self.stencils, self.Dm_inverse, self.scales, self.threshold)
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """E'' grad q grad q^T is never negative; the term with Hess q is reduced by `convexity`."""
+        return _hessian(x, self.stencils, self.Dm_inverse, self.scales, self.threshold, convexity)
 
 
 @njit(cache=True, inline="always")
@@ -99,8 +100,11 @@ def _gradient(x, faces, Dm_inverse, scales, q0, gradient):
 
 
 @njit(cache=True, error_model="numpy")
-def _hessian(x, faces, Dm_inverse, scales, q0):
-    """4 E'' (F adj b_a)(F adj b_c)^T + 2 E' [(b_a.adj b_c) I + 2 Fb_a Fb_c^T - Fb_c Fb_a^T - (b_a.b_c) F F^T]."""
+def _hessian(x, faces, Dm_inverse, scales, q0, convexity):
+    """E'' grad q grad q^T + E' Hess q.
+
+    grad_a q = 2 F adj(C) b_a;  Hess_ac q = 2 [(b_a.adj(C) b_c) I + 2 Fb_a Fb_c^T - Fb_c Fb_a^T - (b_a.b_c) F F^T]
+    """
     F, C = np.empty((3, 2)), np.empty(3)
     b, Fb, Gb = np.empty((3, 2)), np.empty((3, 3)), np.empty((3, 3))
     elements = np.empty(faces.shape[0], dtype=np.int64)
@@ -115,7 +119,7 @@ def _hessian(x, faces, Dm_inverse, scales, q0):
         D = Dm_inverse[f]
         q = _squared_area_ratio(x, faces[f], D, F, C)
         log = np.log(q / q0)
-        slope = -scales[f] * (2 * (q - q0) * log + (q - q0) ** 2 / q)
+        slope = -(1.0 - convexity) * scales[f] * (2 * (q - q0) * log + (q - q0) ** 2 / q)
         curvature = -scales[f] * (2 * log + 4 * (q - q0) / q - (q - q0) ** 2 / q**2)
         for k in range(2):
             b[1, k], b[2, k] = D[0, k], D[1, k]

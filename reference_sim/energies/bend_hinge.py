@@ -77,9 +77,13 @@ class BendHinge(Energy):
         return _gradient(x, self.stencils, self.stiffness, self.rest_angles, gradient), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        return self.active_hessian_blocks(x)[1]
+
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """grad theta grad theta^T is never negative; the term with Hess theta is reduced by `convexity`."""
         blocks = np.empty((len(self.stencils), 12, 12))
-        _hessian(x, self.stencils, self.stiffness, self.rest_angles, blocks)
-        return blocks
+        _hessian(x, self.stencils, self.stiffness, self.rest_angles, convexity, blocks)
+        return np.arange(len(blocks)), blocks
 
 
 def _wrap(angle):
@@ -193,8 +197,8 @@ def _add_half_hessian(x, i0, i1, i2, tip, scale, m, n2, w, length, D, B):
 
 
 @njit(cache=True)
-def _hessian(x, hinges, stiffness, rest, blocks):
-    """k [grad theta grad theta^T + (theta - theta_0) Hess theta].
+def _hessian(x, hinges, stiffness, rest, convexity, blocks):
+    """k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta].
 
     The two halves of Hess theta are symmetric only in their sum.
     """
@@ -214,6 +218,6 @@ def _hessian(x, hinges, stiffness, rest, blocks):
         for i in range(12):
             for j in range(12):
                 B[i, j] = stiffness[h] * g[i] * g[j]
-        s = stiffness[h] * theta
+        s = (1.0 - convexity) * stiffness[h] * theta
         _add_half_hessian(x, i0, i1, i2, 2, s, mA, nA2, wA, length, D, B)
         _add_half_hessian(x, i0, i1, i3, 3, -s, mB, nB2, wB, length, D, B)

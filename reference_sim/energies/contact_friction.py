@@ -87,7 +87,7 @@ class ContactFriction(Energy):
         blocks[elements] = active
         return blocks
 
-    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         elements = np.flatnonzero(self.forces)
         state = (self.forces, self.anchors, self.normals, self.threshold)
         return elements, _hessian(x, elements, self.stencils, self.weights, *state)

@@ -125,7 +125,7 @@ class ContactPenalty(Energy):
         blocks[elements] = active
         return blocks
 
-    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         return _hessian(
             x, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals
         )

@@ -103,12 +103,22 @@ class Energy:
         zero = torch.zeros_like(u)
         return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()
 
-    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Elements with a non-zero Hessian (n,), their blocks (n, 3k, 3k): all of them unless overridden."""
-        return np.arange(len(self.stencils)), self.hessian_blocks(x)
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Elements with a non-zero Hessian (n,) and their blocks (n, 3k, 3k) [N/m].
 
-    def sparse_hessian(self, x: np.ndarray) -> sp.csc_matrix:
-        """Of a dynamic term: its second derivatives (3V, 3V) [N/m] at x (V, 3)."""
+        convexity is the share of the negative curvature that is taken out: 0 gives the true second
+        derivatives, 1 positive semi-definite blocks. Here by eigenvalues; terms with a closed form know
+        where their negative curvature sits.
+        """
+        blocks = self.hessian_blocks(x)
+        if convexity > 0:
+            values, vectors = np.linalg.eigh(blocks)
+            values = np.where(values < 0, (1 - convexity) * values, values)
+            blocks = (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
+        return np.arange(len(self.stencils)), blocks
+
+    def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
+        """Of a dynamic term: its second derivatives (3V, 3V) [N/m] at x (V, 3), as active_hessian_blocks."""
         raise NotImplementedError
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:

@@ -46,5 +46,5 @@ class Gravity(Energy):
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
         return np.zeros((len(self.stencils), 3, 3))
 
-    def active_hessian_blocks(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         return np.arange(0), np.zeros((0, 3, 3))

@@ -55,5 +55,8 @@ class Inertia(Energy):
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
         return (self.masses / self.dt**2)[:, None, None] * np.eye(3)
 
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        return np.arange(len(self.masses)), self.hessian_blocks(x)
+
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.arange(len(self.masses)), (self.masses / self.dt**2)[:, None, None]

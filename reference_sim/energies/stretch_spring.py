@@ -39,14 +39,18 @@ class StretchSpring(Energy):
         return _gradient(x, self.stencils, self.rest_lengths, self.stiffness, gradient), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """+-2k [n n^T + (1 - l0/l)(I - n n^T)] for the two ends."""
+        return self.active_hessian_blocks(x)[1]
+
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """+-2k [n n^T + (1 - l0/l)(I - n n^T)]; a spring shorter than l0 is negative across itself."""
         d = x[self.stencils[:, 1]] - x[self.stencils[:, 0]]
         length = np.linalg.norm(d, axis=1)
         n = d / length[:, None]
         outer = n[:, :, None] * n[:, None, :]
         slack = (1 - self.rest_lengths / length)[:, None, None]
+        slack = np.where(slack < 0, (1 - convexity) * slack, slack)
         block = 2 * self.stiffness * (outer + slack * (np.eye(3) - outer))
-        return np.block([[block, -block], [-block, block]])
+        return np.arange(len(block)), np.block([[block, -block], [-block, block]])
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         block = 2 * self.stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])

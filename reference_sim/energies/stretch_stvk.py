@@ -55,9 +55,13 @@ class StretchStVK(Energy):
         return value, gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        return self.active_hessian_blocks(x)[1]
+
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Negative curvature comes from compressive stress alone, so only that is reduced by `convexity`."""
         blocks = np.empty((len(self.stencils), 9, 9))
-        _hessian(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, blocks)
-        return blocks
+        _hessian(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, convexity, blocks)
+        return np.arange(len(blocks)), blocks
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(mu + lambda/2) times the cotangent Laplacian: the mean over directions of the Hessian at rest."""
@@ -102,8 +106,25 @@ def _gradient(x, faces, Dm_inverse, areas, lam, mu, gradient):
     return total
 
 
+@njit(cache=True, inline="always")
+def _less_compressed(S00, S11, S01, keep):
+    """The symmetric matrix S with its negative eigenvalues times `keep`."""
+    mean, half = 0.5 * (S00 + S11), 0.5 * (S00 - S11)
+    radius = np.sqrt(half * half + S01 * S01)
+    high, low = mean + radius, mean - radius
+    if low >= 0.0:
+        return S00, S11, S01
+    low *= keep
+    if high < 0.0:
+        high *= keep
+    # S = mean I + radius R with a reflection R; at radius 0 any R will do.
+    scale = 0.5 * (high - low) / radius if radius > 0.0 else 0.0
+    mean = 0.5 * (high + low)
+    return mean + scale * half, mean - scale * half, scale * S01
+
+
 @njit(cache=True)
-def _hessian(x, faces, Dm_inverse, areas, lam, mu, blocks):
+def _hessian(x, faces, Dm_inverse, areas, lam, mu, convexity, blocks):
     """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)]."""
     b = np.empty((3, 2))
     Fb = np.empty((3, 3))
@@ -112,6 +133,8 @@ def _hessian(x, faces, Dm_inverse, areas, lam, mu, blocks):
         fa, fb, G00, G11, G01 = _deformation(x, faces[f], D)
         trace = G00 + G11
         S00, S11, S01 = lam * trace + 2 * mu * G00, lam * trace + 2 * mu * G11, 2 * mu * G01
+        if convexity > 0.0:
+            S00, S11, S01 = _less_compressed(S00, S11, S01, 1.0 - convexity)
         for k in range(2):
             b[1, k], b[2, k] = D[0, k], D[1, k]
             b[0, k] = -D[0, k] - D[1, k]
