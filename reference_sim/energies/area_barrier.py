@@ -103,7 +103,8 @@ def _gradient(x, faces, Dm_inverse, scales, q0, gradient):
 def _hessian(x, faces, Dm_inverse, scales, q0, convexity):
     """E'' grad q grad q^T + E' Hess q.
 
-    grad_a q = 2 F adj(C) b_a;  Hess_ac q = 2 [(b_a.adj(C) b_c) I + 2 Fb_a Fb_c^T - Fb_c Fb_a^T - (b_a.b_c) F F^T]
+    grad_a q = 2 F adj(C) b_a
+    Hess_ac q = 2 [(b_a.adj(C) b_c) I + 2 Fb_a Fb_c^T - Fb_c Fb_a^T - (b_a.b_c) F F^T]
     """
     F, C = np.empty((3, 2)), np.empty(3)
     b, Fb, Gb = np.empty((3, 2)), np.empty((3, 3)), np.empty((3, 3))

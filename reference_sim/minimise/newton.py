@@ -68,7 +68,10 @@ class Newton:
         return replace(result, status="diverged", reason=objection) if objection else result
 
     def assemble(self, x: np.ndarray, convexity: float) -> np.ndarray:
-        """Values of the Hessian at x (V, 3), made convex by that share; dynamic terms may need a wider pattern, analysed anew."""
+        """Values of the Hessian at x (V, 3), made convex by that share.
+
+        Dynamic terms may need a wider pattern, analysed anew.
+        """
         changing = self._pattern.changing(x, convexity)
         pattern = self._pattern.covering(changing)
         if pattern is not self._pattern:
