@@ -77,8 +77,10 @@ class Potential:
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
         """Second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
         x = np.ascontiguousarray(x, dtype=np.float64)
-        pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool)).covering(x)
-        return pattern.symmetric(pattern.assemble(x))
+        pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
+        changing = pattern.changing(x)
+        pattern = pattern.covering(changing)
+        return pattern.symmetric(pattern.assemble(x, changing))
 
     def pattern(self, free: np.ndarray, *, block: int = 3) -> HessianPattern:
         """Pattern over the vertices marked free (V,), of the Hessian or (block=1) of a scalar stiffness."""

@@ -210,10 +210,9 @@ class _Loop:
         """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
 
         With such a term (a barrier) x, pins and obstacle walk together from the start of the step to the
-        guess until something would touch; a rough minimisation there makes room, and they walk on. Where
-        standing still takes the obstacle further, free vertices do that. So the last minimisation starts
-        without an intersection, pins and obstacle at the end of their way. Without such a term it starts at
-        the guess.
+        guess until something would touch. From there pins and obstacle go on alone; if they cannot, a rough
+        minimisation makes room, and all walk on. So the last minimisation starts without an intersection,
+        pins and obstacle at the end of their way. Without such a term it starts at the guess.
 
         Raises:
             ValueError: the very first x is impossible already.
@@ -226,17 +225,20 @@ class _Loop:
             self._started = True
         motion, goal, progress = guess - x, guess, 0.0
         for _ in range(MAX_APPROACHES):
-            share = potential.clear_way(x, goal, progress)
-            if share < 1:
-                held = x.copy()
-                held[pins] = guess[pins]
-                held_share = potential.clear_way(x, held, progress)
-                share, goal = max((share, goal), (held_share, held), key=lambda pair: pair[0])
-            progress = 1.0 if share == 1 else progress + share * (1 - progress)
+            shares = []
+            for free_too in (True, False):
+                if not free_too:
+                    goal = x.copy()
+                    goal[pins] = guess[pins]
+                share = potential.clear_way(x, goal, progress)
+                if share == 1:
+                    potential.set_progress(1.0)
+                    return self.newton.minimise(goal)
+                if share >= max(shares, default=0.0):
+                    x, progress = x + share * (goal - x), progress + share * (1 - progress)
+                shares.append(share)
             potential.set_progress(progress)
-            if share == 1:
-                return self.newton.minimise(goal)
-            x = self.rough.minimise(x + share * (goal - x)).positions
+            x = self.rough.minimise(x).positions
             goal = x + (1 - progress) * motion
             goal[pins] = guess[pins]
         result = self.newton.minimise(x)
