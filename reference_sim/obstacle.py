@@ -182,10 +182,11 @@ class Obstacle:
         """True distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
         _, nearest = self._closest(points, frame, reachable=False)
         distance = np.linalg.norm(points - nearest, axis=1)
-        near = np.flatnonzero(distance < 0.15)  # nothing of a body is deeper than that below its skin
         vertices = np.asfortranarray(self.at(frame))
-        winding = igl.fast_winding_number(vertices, self.faces, np.asfortranarray(points[near]))
-        distance[near] *= np.where(np.asarray(winding).ravel() > 0.5, -1.0, 1.0)
+        # Only what lies in the bounding box can be inside.
+        boxed = np.flatnonzero(((points > vertices.min(axis=0)) & (points < vertices.max(axis=0))).all(axis=1))
+        winding = igl.fast_winding_number(vertices, self.faces, np.asfortranarray(points[boxed]))
+        distance[boxed] *= np.where(np.asarray(winding).ravel() > 0.5, -1.0, 1.0)
         return distance
 
     def _vertex_normals(self, frame: int) -> np.ndarray:
