@@ -184,7 +184,8 @@ class Obstacle:
         distance = np.linalg.norm(points - nearest, axis=1)
         vertices = np.asfortranarray(self.at(frame))
         # Only what lies in the bounding box can be inside.
-        boxed = np.flatnonzero(((points > vertices.min(axis=0)) & (points < vertices.max(axis=0))).all(axis=1))
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        boxed = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
         winding = igl.fast_winding_number(vertices, self.faces, np.asfortranarray(points[boxed]))
         distance[boxed] *= np.where(np.asarray(winding).ravel() > 0.5, -1.0, 1.0)
         return distance
