@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from .energies.energy import Energy, Step
-from .hessian_pattern import HessianPattern
+
+if TYPE_CHECKING:
+    from .hessian_pattern import HessianPattern
 
 
 class Potential:
@@ -84,6 +87,8 @@ class Potential:
 
     def pattern(self, free: np.ndarray, *, block: int = 3) -> HessianPattern:
         """Pattern over the vertices marked free (V,), of the Hessian or (block=1) of a scalar stiffness."""
+        from .hessian_pattern import HessianPattern  # loads numba, which a command's --help can do without
+
         key = (np.packbits(free).tobytes(), block)
         if key not in self._patterns:
             terms = [e for e in self.energies if block == 3 or e.has_scalar_stiffness]
