@@ -1,0 +1,193 @@
+"""Backward-Euler steps: the first guess, the way there, and the state that one step leaves to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .cloth import Cloth
+from .energies.energy import Energy, Step
+from .minimise import Newton, Result
+from .potential import Potential
+from .resume import Past, fingerprint
+from .trajectory import TrajectoryError
+
+if TYPE_CHECKING:
+    from .obstacle import Obstacle
+
+GUESSES = ("previous", "extrapolated", "carried")
+MAX_APPROACHES = 30  # minimisations on the way of an obstacle within one step
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Between two frames: positions x (V, 3) [m] and velocity v (V, 3) [m/s].
+
+    before: both (2, V, 3) one step earlier, where a resumed run needs them stored.
+    """
+
+    x: np.ndarray
+    v: np.ndarray
+    before: np.ndarray | None = None
+
+
+class Stepper:
+    """What stays the same from frame to frame: the potential, its minimiser, the rule for a first guess."""
+
+    def __init__(
+        self,
+        cloth: Cloth,
+        energies: Sequence[Energy],
+        dt: float,
+        substeps: int,
+        obstacle: Obstacle | None,
+        guess: str | None,
+        quasi_static: bool,
+        options: dict[str, Any],
+    ) -> None:
+        from .energies.inertia import Inertia
+
+        if guess is None:
+            guess = "extrapolated" if obstacle is None else "carried"
+        if guess not in GUESSES or (guess == "carried" and obstacle is None):
+            raise ValueError(
+                f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)}; carried needs a body"
+            )
+        self.cloth, self.guess, self.substeps = cloth, guess, substeps
+        self.frame_dt, self.dt = dt, dt / substeps  # between frames, and of one step
+        self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refined(substeps)
+        self.quasi_static, self.options = quasi_static, options
+        self.potential = Potential([*energies, Inertia(cloth, self.dt)])
+        self.newton = Newton(self.potential, **options)
+        self._started = False
+
+    def advance(self, frame: int, state: State, pins: np.ndarray | None) -> tuple[State | None, list[Result]]:
+        """The sub-steps to `frame`, pins (P, 3) [m] at its end; the state is None where one was lost."""
+        x, v, results = state.x, state.v, []
+        for j in range(1, self.substeps + 1):
+            share = j / self.substeps
+            handles = state.x[self.cloth.pins]
+            if pins is not None:
+                handles = (1 - share) * handles + share * pins
+            step = (frame - 1) * self.substeps + j
+            guess = self.prepare(step, x, v, handles)
+            results.append(self.reach(x, guess))
+            y = results[-1].positions
+            if results[-1].status == "diverged" or not np.isfinite(y).all():
+                return None, results
+            before = np.stack([x, v])
+            x, v = y, self.velocity(y, x)
+        return State(x, v, before if self.substeps > 1 else None), results
+
+    def velocity(self, x: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """What a step from `before` to x (V, 3) leaves behind [m/s]."""
+        return np.zeros_like(x) if self.quasi_static else (x - before) / self.dt
+
+    def prepare(self, step: int, x: np.ndarray, v: np.ndarray, handles: np.ndarray) -> np.ndarray:
+        """Freeze every term for the step from x with velocity v (V, 3); returns its first guess (V, 3)."""
+        if self.guess == "carried":
+            assert self.obstacle is not None
+            first = self.obstacle.carried(x, step, self.cloth.rest_positions)
+        else:
+            first = x + self.dt * v if self.guess == "extrapolated" else x.copy()
+        first[self.cloth.pins] = handles
+        self.potential.prepare(Step(x, v, first, self.dt, self.obstacle, step))
+        return first
+
+    def taken_up(
+        self, past: Past, v0: np.ndarray, pin_positions: Callable[[int], np.ndarray] | None
+    ) -> State:
+        """The state at the last frame of an earlier run that began with velocity v0 (V, 3)."""
+        positions, before = past.trajectory.positions, past.before
+        last = len(positions) - 1
+        x = positions[last]
+        if last == 0:
+            return State(x, v0)
+        if self.substeps == 1:
+            v = v0 if last == 1 else self.velocity(positions[last - 1], positions[last - 2])
+            before = np.stack([positions[last - 1], v])
+        pins = self.cloth.pins
+        if pin_positions is not None and not np.array_equal(pin_positions(last), x[pins]):
+            raise TrajectoryError(f"simulate: pins at frame {last} are not where the earlier run had them")
+        if before is None:
+            raise TrajectoryError(f"simulate: the sub-step before frame {last} is lost: start again")
+        # Terms may remember the step before, and an obstacle what it was asked about.
+        self.prepare(last * self.substeps, before[0], before[1], x[pins])
+        return State(x, self.velocity(x, before[0]), before if self.substeps > 1 else None)
+
+    def reach(self, x: np.ndarray, guess: np.ndarray) -> Result:
+        """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
+
+        With such a term (a barrier) x, pins and obstacle walk together from the start of the step to the
+        guess until something would touch. From there pins and obstacle go on alone; if they cannot, a rough
+        minimisation makes room, and all walk on. So the last minimisation starts without an intersection,
+        pins and obstacle at the end of their way. Without such a term it starts at the guess.
+
+        Raises:
+            ValueError: the very first x is impossible already.
+        """
+        potential, pins = self.potential, self.cloth.pins
+        if not self._started:
+            potential.set_progress(0.0)
+            if objection := potential.objection(x):
+                raise ValueError(f"simulate: the start is not free of intersections: {objection}")
+            self._started = True
+        motion, goal, progress = guess - x, guess, 0.0
+        for _ in range(MAX_APPROACHES):
+            shares: list[float] = []
+            for free_too in (True, False):
+                if not free_too:
+                    goal = x.copy()
+                    goal[pins] = guess[pins]
+                share = potential.clear_way(x, goal, progress)
+                if share == 1:
+                    potential.set_progress(1.0)
+                    return self.newton.minimise(goal)
+                if share >= max(shares, default=0.0):
+                    x, progress = x + share * (goal - x), progress + share * (1 - progress)
+                shares.append(share)
+            potential.set_progress(progress)
+            x = self.rough.minimise(x).positions
+            goal = x + (1 - progress) * motion
+            goal[pins] = guess[pins]
+        result = self.newton.minimise(x)
+        if result.status == "diverged":
+            return result
+        reason = f"no way without intersection: pins and obstacle came {progress:.1%} of theirs"
+        return replace(result, status="stalled", reason=reason)
+
+    @cached_property
+    def rough(self) -> Newton:
+        """What makes room half-way: a few iterations."""
+        options: dict[str, Any] = self.options | {"max_iterations": 8, "tolerance": 1e-2}
+        return Newton(self.potential, **options)
+
+    def first_fields(self, x: np.ndarray) -> dict[str, float]:
+        """The fields of frame 0, which nobody minimised."""
+        names = [energy.name for energy in self.potential.energies]
+        fields = dict.fromkeys([f"energy/{name}" for name in names], float("nan"))
+        return {
+            "iterations": 0.0,
+            "factorisations": 0.0,
+            "gradient_norm": float("nan"),
+            "converged": 1.0,
+        } | fields
+
+    def provenance(self) -> dict[str, Any]:
+        cloth, obstacle = self.cloth, self.obstacle
+        return {
+            "method": "backward Euler, Newton",
+            "dt_s": self.frame_dt,
+            "substeps": self.substeps,
+            "guess": self.guess,
+            "quasi_static": self.quasi_static,
+            "options": self.options,
+            "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
+            "material": asdict(cloth.material),
+            "cloth": fingerprint(cloth.rest_positions, cloth.faces, np.asarray(cloth.pins), cloth.rest_uv),
+            "obstacle": None if obstacle is None else obstacle.fingerprint,
+        }
