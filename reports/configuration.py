@@ -29,7 +29,8 @@ def configuration(config: dict[str, Any], rows: Sequence[Row]) -> list[dict[str,
         if name == "stages":
             groups.append({"title": "Time of each stage", "pairs": _stages(value)})
         elif isinstance(value, dict):
-            groups.append({"title": _title(name), "pairs": [[_title(k), v] for k, v in _flat(value)]})
+            pairs = [[_title(key), _text(item)] for key, item in value.items()]
+            groups.append({"title": _title(name), "pairs": pairs})
         elif name not in _FIRST and value not in (None, "", []):
             run.append([_title(name), _text(value)])
     return [group for group in groups if group["pairs"]]
@@ -56,7 +57,7 @@ def _text(value: Any) -> str:
     if isinstance(value, int):
         return str(value)
     if isinstance(value, float):
-        return number(value, 4)
+        return number(value, 4, trim=True)
     if isinstance(value, list | tuple):
         return ", ".join(_text(item) for item in value) or "–"
     if isinstance(value, dict):

@@ -97,6 +97,7 @@ def document(
     return {
         "title": "Neural garments beside a converged solver",
         "subtitle": _subtitle(config),
+        "size": _size(config),
         "question": QUESTION,
         "findings": [list(finding) for finding in findings(rows)],
         "lead": figure_block(lead) if lead else None,
@@ -111,6 +112,13 @@ def _subtitle(config: dict[str, Any]) -> str:
     parts += [f"commit {config['commit']}"] if config.get("commit") else []
     parts += [str(config["started"])[:10]] if config.get("started") else []
     return " · ".join(parts)
+
+
+def _size(config: dict[str, Any]) -> str:
+    """What the preset says of itself; a smoke test says here that its numbers mean nothing."""
+    values = config.get("preset_values")
+    words = values.get("description") if isinstance(values, dict) else None
+    return f"This run: {words}." if words else ""
 
 
 def _figures(pictures: Sequence[Picture], section: str, kind: str) -> list[Block]:

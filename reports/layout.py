@@ -29,6 +29,7 @@ _WORDS: dict[str, Callable[[str], str]] = {
     "status": lambda text: "pass" if text == "ok" else text,
 }
 _DIGITS = {"measured": 7, "expected": 7, "tolerance": 2, "gradient": 2}
+_NOISE = 1e-3  # what is measured below it is an error, of which two digits say enough
 _TIMES = ("data_generation", "training")
 
 
@@ -114,7 +115,10 @@ def _text(name: str, cell: Cell) -> str:
         return duration(value)
     if isinstance(value, int):
         return str(value)
-    return number(value, _DIGITS[name], trim=True) if name in _DIGITS else number(value)
+    if name not in _DIGITS:
+        return number(value)
+    small = name == "measured" and value is not None and abs(value) < _NOISE
+    return number(value, 2 if small else _DIGITS[name], trim=True)
 
 
 def figure_block(picture: Picture) -> Block:

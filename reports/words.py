@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
 from benchmarks.results import Row
@@ -42,7 +43,10 @@ def findings(rows: Sequence[Row]) -> list[tuple[str, str]]:
         ("Extremes", outcomes(rows)),
         ("Not finished", trouble(rows)),
     ]
-    return [(topic, words) for topic, words in found if words]
+    # A number keeps its unit on its line.
+    return [
+        (topic, re.sub(r"(?<=\d) (?=(J|ms|1/m|%)\b|%)", "\u00a0", words)) for topic, words in found if words
+    ]
 
 
 def name(method: str) -> str:

@@ -100,7 +100,7 @@ def _draw_points(
     high = max((p[1] for p in above.values()), default=1.0)
     margin = max((high / low) ** 0.12, 1.6)
     floor = low / margin**2
-    axes.set_ylim(floor / 1.25 if len(above) < len(points) else low / margin, high * margin)
+    axes.set_ylim(floor / 1.5 if len(above) < len(points) else low / margin, high * margin)
     families: dict[str, list[tuple[int, float, float]]] = {}
     for method, (time, error) in points.items():
         look = palette.style(method)
