@@ -7,17 +7,13 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from . import provenance
 from .cell import Outcome, run_cell
 from .methods import find_method
 from .plan import Cell, Plan, runs
-from .results import Row, RunFolder, with_provenance
+from .record import Record, now
+from .results import Row
 
 if TYPE_CHECKING:
     from .jobs import Trained
@@ -27,22 +23,23 @@ if TYPE_CHECKING:
 
 def execute(plan: Plan) -> int:
     """Run the plan. Returns 0 when every cell ended well, 1 when one failed or there is no report."""
-    run = RunInProgress(plan)
+    record = Record(plan)
+    stages = Stages(record)
     try:
-        run.all_stages()
+        stages.run()
     except KeyboardInterrupt:
-        run.note("interrupted", True)
-        run.write_rows()
+        record.note("interrupted", True)
+        record.write_rows()
         raise
-    made = run.make_report()
+    made = stages.make_report()
     from .closing import summary
 
-    print(summary(run.rows, run.stages), flush=True)
-    failed = [row for row in run.rows if not accepted(row)]
+    print(summary(record.rows, record.stages), flush=True)
+    failed = [row for row in record.rows if not accepted(row)]
     for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
         print(line, file=sys.stderr)
     if made:
-        print(run.folder.report_path.resolve(), flush=True)
+        print(record.folder.report_path.resolve(), flush=True)
     return 0 if made and not failed else 1
 
 
@@ -51,84 +48,46 @@ def accepted(row: Row) -> bool:
     return row.passed or (row.suite == "extremes" and row.status != "failed" and bool(row.reason))
 
 
-class RunInProgress:
-    """The folder, the configuration and the rows of a run while it is going on."""
+class Stages:
+    """Everything that a run does, one stage after another."""
 
-    def __init__(self, plan: Plan) -> None:
-        self.plan = plan
-        self.folder = RunFolder(plan.folder)
-        self.hardware = provenance.hardware(plan.device)
-        self.commit = provenance.commit()
-        self.rows: list[Row] = []
-        self.stages: list[dict[str, Any]] = []
+    def __init__(self, record: Record) -> None:
+        self.record = record
+        self.plan, self.folder = record.plan, record.folder
         self.trained: dict[tuple[str, int], Trained] = {}
         self.untrained: dict[tuple[str, int], str] = {}  # why a network could not be trained
         self.data_seconds = 0.0
         self.targets: list[str] = []  # training motions with a whole simulation
         self.wardrobe: Wardrobe | None = None
         self.naked = ""  # why there is no wardrobe
-        self.config: dict[str, Any] = {
-            "command": plan.command,
-            "preset": plan.preset.name,
-            "suites": list(plan.suites),
-            "scenes": [scene.name for scene in plan.scenes],
-            "methods": list(dict.fromkeys(cell.method for cell in plan.cells)),
-            "motions": {"train": list(plan.train), "test": list(plan.test)} if plan.needs_wardrobe else {},
-            "seeds": list(plan.seeds),
-            "commit": self.commit,
-            "started": now(),
-            "finished": None,
-            "hardware": self.hardware,
-            "versions": provenance.versions(),
-            "preset_values": dataclasses.asdict(plan.preset),
-            "stages": self.stages,
-        }
-        plan.folder.mkdir(parents=True, exist_ok=True)
-        self.folder.write_config(self.config)
 
-    def note(self, name: str, value: Any) -> None:
-        """Set an entry of run.json and write it."""
-        self.config[name] = value
-        self.folder.write_config(self.config)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Announce a stage and keep its wall time, also when it is interrupted."""
-        print(f"== {name}", file=sys.stderr, flush=True)
-        clock = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.stages.append({"name": name, "seconds": round(time.perf_counter() - clock, 3)})
-            self.folder.write_config(self.config)
-
-    def all_stages(self) -> None:
+    def run(self) -> None:
         """Everything but the report."""
         plan = self.plan
         if plan.needs_wardrobe:
-            with self.stage("body, T-shirt and motions"):
+            with self.record.stage("body, T-shirt and motions"):
                 self.open_wardrobe()
         if self.wardrobe is not None:
-            with self.stage("ground truth"):
+            with self.record.stage("ground truth"):
                 self.ground_truth()
             if plan.models:
-                with self.stage("training"):
+                with self.record.stage("training"):
                     self.train()
         if plan.cells:
             outcomes = self.cells_and_metrics()
             failed = sum(outcome.status == "failed" for outcome in outcomes)
-            self.note("cells", {"run": sum(map(runs, plan.cells)), "failed": failed})
+            self.record.note("cells", {"run": sum(map(runs, plan.cells)), "failed": failed})
         if plan.checks:
-            with self.stage("validation"):
+            with self.record.stage("validation"):
                 from .suites.validation import run_check
 
-                self.rows += [run_check(check) for check in _bar(plan.checks, "validation", "check")]
+                self.record.rows += [run_check(check) for check in _bar(plan.checks, "validation", "check")]
         if plan.cases:
-            with self.stage("extremes"):
+            with self.record.stage("extremes"):
                 from .suites.extremes import run_case
 
-                self.rows += [run_case(case) for case in _bar(plan.cases, "extremes", "case")]
-        self.write_rows()
+                self.record.rows += [run_case(case) for case in _bar(plan.cases, "extremes", "case")]
+        self.record.write_rows()
 
     def open_wardrobe(self) -> None:
         from .wardrobe import embedded_motions, open_wardrobe
@@ -143,13 +102,13 @@ class RunInProgress:
             self.naked = one_line(error)
             return
         garment = self.wardrobe.garment
-        self.note("garment", {
+        self.record.note("garment", {
             "name": garment.name, "vertices": len(garment.rest_positions), "triangles": len(garment.faces),
             "parameters": {name: float(value) for name, value in garment.parameters.items()},
         })  # fmt: skip
         motions_of = self.wardrobe.motions
-        self.config["motions"]["frames"] = {name: motions_of[name].frames for name in names}
-        self.note("motion_sources", {name: motions_of[name].source or "embedded library" for name in names})
+        self.record.config["motions"]["frames"] = {name: motions_of[name].frames for name in names}
+        self.record.note("motion_sources", {name: motions_of[name].source for name in names})
 
     def ground_truth(self) -> None:
         """Settle every dressed scene and simulate the training motions, two at a time."""
@@ -178,7 +137,7 @@ class RunInProgress:
                 unused[job.label] = result.reason
         done = [result for result in results if isinstance(result, jobs.Simulated)]
         rough = {r.motion: f"{r.status}: {r.reason}" for r in done if r.status != "converged"}
-        self.note("data", {
+        self.record.note("data", {
             "workers": worker_count(),
             "seconds": self.data_seconds,
             "frames": sum(result.frames for result in done),
@@ -208,20 +167,20 @@ class RunInProgress:
             else:
                 self.trained[kind, seed] = result
                 summary[job.label] = {"seconds": result.seconds, "steps": result.steps, "last": result.final}
-        self.note("training", summary)
+        self.record.note("training", summary)
 
     def cells_and_metrics(self) -> list[Outcome]:
         """Cells one after another, nothing beside them; then metrics from their files, scene by scene."""
         outcomes: list[Outcome] = []
         built: dict[str, BuiltScene] = {}
-        with self.stage("cells"):
+        with self.record.stage("cells"):
             for cell in _bar(self.plan.cells, "cells", "cell"):
                 outcomes.append(self.one_cell(cell, built))
-        with self.stage("metrics"):
+        with self.record.stage("metrics"):
             for scene in _bar(self.plan.scenes, "metrics", "scene"):
                 of_scene = [outcome for outcome in outcomes if outcome.cell.scene == scene]
-                self.rows += self.measured(of_scene, built.get(scene.name))
-            self.write_rows()
+                self.record.rows += self.measured(of_scene, built.get(scene.name))
+            self.record.write_rows()
         return outcomes
 
     def one_cell(self, cell: Cell, built: dict[str, BuiltScene]) -> Outcome:
@@ -291,21 +250,11 @@ class RunInProgress:
         by_cell = {outcome.cell: found for outcome, found in zip(recorded, metrics)}
         return [row for outcome in outcomes for row in rows_of(outcome, by_cell.get(outcome.cell, {}), scene)]
 
-    def write_rows(self) -> None:
-        """results.csv with the rows so far."""
-        self.rows = with_provenance(
-            self.rows,
-            preset=self.plan.preset.name,
-            commit=self.commit,
-            hardware=provenance.hardware_line(self.hardware),
-        )
-        self.folder.write_rows(self.rows)
-
     def make_report(self) -> bool:
         """tables/, figures/ and report.pdf from the files; a failure is said and leaves the results."""
-        self.note("finished", now())
+        self.record.note("finished", now())
         try:
-            with self.stage("report"):
+            with self.record.stage("report"):
                 from reports.build import build_report
 
                 _, problems = build_report(self.folder.path)
@@ -321,11 +270,6 @@ class RunInProgress:
 def one_line(error: Exception) -> str:
     """What was raised, in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())
-
-
-def now() -> str:
-    """The time as ISO text with its zone."""
-    return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
 def _bar(items: Any, title: str, unit: str) -> Any:

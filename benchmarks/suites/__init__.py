@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Suite:
-    """A question put to many cells. `module` is imported when it is run; `names` lists its rows cheaply."""
+    """A question put to many cells; the module of that name in this folder says which and how."""
 
     name: str
     description: str

@@ -1,0 +1,76 @@
+"""What a run keeps while it goes on: its folder, its configuration, its rows and the time of each stage."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from typing import Any
+
+from . import provenance
+from .plan import Plan
+from .results import Row, RunFolder, with_provenance
+
+
+class Record:
+    """run.json and results.csv of one run, each written whole at every change. Making it makes the folder."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.folder = RunFolder(plan.folder)
+        self.hardware = provenance.hardware(plan.device)
+        self.commit = provenance.commit()
+        self.rows: list[Row] = []
+        self.stages: list[dict[str, Any]] = []
+        self.config: dict[str, Any] = {
+            "command": plan.command,
+            "preset": plan.preset.name,
+            "suites": list(plan.suites),
+            "scenes": [scene.name for scene in plan.scenes],
+            "methods": list(dict.fromkeys(cell.method for cell in plan.cells)),
+            "motions": {"train": list(plan.train), "test": list(plan.test)} if plan.needs_wardrobe else {},
+            "seeds": list(plan.seeds),
+            "commit": self.commit,
+            "started": now(),
+            "finished": None,
+            "hardware": self.hardware,
+            "versions": provenance.versions(),
+            "preset_values": dataclasses.asdict(plan.preset),
+            "stages": self.stages,
+        }
+        plan.folder.mkdir(parents=True, exist_ok=True)
+        self.folder.write_config(self.config)
+
+    def note(self, name: str, value: Any) -> None:
+        """Set an entry of run.json and write it."""
+        self.config[name] = value
+        self.folder.write_config(self.config)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Announce a stage and keep its wall time, also when it is interrupted."""
+        print(f"== {name}", file=sys.stderr, flush=True)
+        clock = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.stages.append({"name": name, "seconds": round(time.perf_counter() - clock, 3)})
+            self.folder.write_config(self.config)
+
+    def write_rows(self) -> None:
+        """results.csv with the rows so far."""
+        self.rows = with_provenance(
+            self.rows,
+            preset=self.plan.preset.name,
+            commit=self.commit,
+            hardware=provenance.hardware_line(self.hardware),
+        )
+        self.folder.write_rows(self.rows)
+
+
+def now() -> str:
+    """The time as ISO text with its zone."""
+    return datetime.now().astimezone().isoformat(timespec="seconds")
