@@ -130,7 +130,7 @@ def _from_rest(theta, rest):
     return theta - 2 * np.pi * np.floor((theta + np.pi) / (2 * np.pi))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dihedral_angles(x, hinges):
     """(H,) signed dihedral angles [rad] of positions x (V, 3); 0 is flat."""
     mA, mB, w = np.empty(3), np.empty(3), np.empty(3)
@@ -143,7 +143,7 @@ def dihedral_angles(x, hinges):
     return angles
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gradient(x, hinges, stiffness, rest, gradient):
     mA, mB, wA, wB = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     total = 0.0
@@ -196,7 +196,7 @@ def _add_half_hessian(x, i0, i1, i2, tip, scale, m, n2, w, length, D, B):
                 B[3 * tip + i, column + j] += -sm * dL + w[2] * dm
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _hessian(x, hinges, stiffness, rest, convexity, blocks):
     """k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta].
 

@@ -57,7 +57,7 @@ class StretchSpring(Energy):
         return np.arange(len(self.stencils)), np.broadcast_to(block, (len(self.stencils), 2, 2))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gradient(x, edges, rest_lengths, stiffness, gradient):
     total = 0.0
     for e in range(edges.shape[0]):
