@@ -195,9 +195,9 @@ class _Run:
         round-off, so that rigid motions of an unpinned cloth do not count) and its step negligible.
         """
         diagonal = data[self.n._pattern.diagonal]
-        tiny = 1e-10 * float((np.abs(diagonal) / self.n._metric).max())
+        tiny = 1e-10 * float((np.abs(diagonal) / self.n._metric).max(initial=0.0))
         if self.factorise(data, tiny):
-            step = float(np.abs(self.solve(-self.g)).max())
+            step = float(np.abs(self.solve(-self.g)).max(initial=0.0))
             if step <= self.n._step_tolerance or self.gradient_norm() == 0.0:
                 return self.result("converged", f"gradient within tolerance, Newton step {step:.1e} m")
             return None
