@@ -170,18 +170,32 @@ def test_a_sample_meets_only_faces_near_its_own_place_at_rest(region):
         assert np.linalg.norm(points - free.points, axis=1) == pytest.approx(anywhere, abs=1e-14)
 
 
+def test_what_samples_may_meet_is_found_also_from_a_few_of_them():
+    """The faces searched are those that some sample may meet, up to the very rim of the region."""
+    rest, faces = bar()
+    obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.2)
+    centroids = rest[faces].mean(axis=1)
+    rest_points = centroids[centroids[:, 0] < -0.45]
+    points = rest_points + np.array([0.17, 0.0, 0.01])  # the nearest faces are near the rim of the region
+    allowed = np.linalg.norm(centroids[None] - rest_points[:, None], axis=2) <= 0.2
+    exact = brute_force(points, rest, faces, allowed)
+    planes = obstacle.planes(points, 0, rest_points)
+    assert np.linalg.norm(points - planes.points, axis=1) == pytest.approx(exact, abs=1e-14)
+    assert exact.min() < 0.05
+
+
 def test_two_kinds_of_samples_do_not_disturb_each_other():
     rest, faces = bar()
     obstacle = Obstacle(bent(rest), faces, rest_positions=rest, region=0.15)
-    left, right = (rest[side] for side in (rest[:, 0] < -0.3, rest[:, 0] > 0.3))
+    left = rest[rest[:, 0] < -0.3]
     above = bent(left) + np.array([0.0, 0.0, 0.01])
     first = obstacle.planes(above, 0, left)
-    second = obstacle.planes(bent(right), 0, right)
+    second = obstacle.planes(bent(rest), 0, rest)
     again = obstacle.planes(above, 0, left)
     # Where two faces are equally near either may answer, with the same point.
     assert again.points == pytest.approx(first.points, abs=1e-14)
     assert again.normals == pytest.approx(first.normals, abs=1e-9)
-    assert np.linalg.norm(second.points - bent(right), axis=1).max() < 1e-12
+    assert np.linalg.norm(second.points - bent(rest), axis=1).max() < 1e-12
 
 
 def test_each_frame_has_its_own_surface_and_the_last_one_stays():
