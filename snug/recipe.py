@@ -37,6 +37,8 @@ class Recipe:
     contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
     contact_refresh: share of a batch's frames whose contact anchors are searched anew after a step.
+    mixed: frames of mixed motions (snug.mixing) for each frame of a training motion; not for `supervised`,
+        which can only learn what was simulated. mixed_turn: see there [rad].
     terms: energies in the loss; leaving one out is an ablation.
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped.
     gradient_limit: norm to which the gradient of such a step is clipped.
@@ -61,6 +63,8 @@ class Recipe:
     contact_stiffness: float | None = None
     contact_margin: float | None = None
     contact_refresh: float = 0.03
+    mixed: float = 2.0
+    mixed_turn: float = 0.1
     terms: tuple[str, ...] = TERMS
     spike: float = 2.0
     gradient_limit: float = 1.0
@@ -82,6 +86,9 @@ class Recipe:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
+        for option in ("mixed", "mixed_turn", "smoothing", "h0_sigma", "shape_range", "contact_refresh"):
+            if getattr(self, option) < 0:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         for option in ("learning_rate", "output_scale", "drop_factor", "gradient_limit", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
@@ -115,6 +122,7 @@ PAPER = Recipe(
     contact_samples="vertices",
     contact_stiffness=250.0,
     contact_margin=0.002,
+    mixed=0.0,
 )
 RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER)}
 

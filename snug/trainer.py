@@ -15,6 +15,7 @@ from torch import Tensor
 from snug.baselines.supervised import matched_targets, vertex_loss
 from snug.dresser import DressedBody
 from snug.loss import PhysicsLoss, make_contact
+from snug.mixing import mixed_motions
 from snug.recipe import Recipe
 from snug.skinning import skin
 from snug.trained_model import TrainedModel, find_kind, make_network
@@ -47,6 +48,9 @@ class Trainer:
             raise TrainingError("no motions to train on")
         how = find_kind(kind)
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
+        if how.physics:
+            frames = round(recipe.mixed * sum(len(motion.poses) for motion in motions))
+            motions = [*motions, *mixed_motions(motions, frames, turn=recipe.mixed_turn, seed=seed)]
         self.data = TrainingSet(dressed, motions, recipe, features=how.features, sequences=how.sequences)
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing)
         self.network = make_network(kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed)

@@ -1,0 +1,98 @@
+"""New training motions from old ones: limbs of different clips put together, mirrored, and turned a little.
+
+Self-supervision needs no simulation, so a training set is not bound to what was recorded. Fourteen clips show
+a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
+clip takes the root, the legs, the spine and each arm from five random places of the training clips (mirrored
+half of the time), scales legs and spine, and adds to each joint of the trunk a slow turn about a random axis.
+Every part stays continuous in time, so velocities keep their meaning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from snug.motion import Motion
+from snug.skeleton import JOINT, axis_angles, rotation_matrices
+
+PARTS: tuple[tuple[str, ...], ...] = (
+    ("pelvis",),
+    (
+        "left_hip",
+        "right_hip",
+        "left_knee",
+        "right_knee",
+        "left_ankle",
+        "right_ankle",
+        "left_foot",
+        "right_foot",
+    ),
+    ("spine1", "spine2", "spine3", "neck", "head"),
+    ("left_collar", "left_shoulder", "left_elbow", "left_wrist", "left_hand"),
+    ("right_collar", "right_shoulder", "right_elbow", "right_wrist", "right_hand"),
+)
+SCALED = (1, 2)  # legs and spine: an arm swung further might enter the torso
+SCALE = (0.6, 1.3)
+# Turn of each joint, relative to the recipe's; the collar bone turns little.
+TURNED = {
+    "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,
+    "left_shoulder": 1.2, "right_shoulder": 1.2, "left_collar": 0.4, "right_collar": 0.4,
+}  # fmt: skip
+RATE = (0.2, 1.0)  # Hz, of the slow turns
+FRAMES = 60  # of a mixed clip
+
+
+def mixed_motions(motions: Sequence[Motion], frames: int, *, turn: float, seed: int) -> list[Motion]:
+    """About `frames` frames of mixed clips, named mixed_0, mixed_1, ...; deterministic for a seed.
+
+    turn: standard deviation of the added turns, per axis [rad]; half of it stays, half comes and goes.
+    """
+    random = np.random.default_rng(seed)
+    count = max(1, round(frames / FRAMES)) if frames > 0 else 0
+    return [_mixed(motions, random, turn, f"mixed_{number}") for number in range(count)]
+
+
+def mirrored(motion: Motion) -> Motion:
+    """The motion as a mirror in the plane x = 0 shows it: sides change, turns about y and z change sign."""
+    twin = [JOINT[_other_side(name)] for name in JOINT]
+    return Motion(
+        name=f"{motion.name}_mirrored",
+        poses=motion.poses[:, twin] * [1.0, -1.0, -1.0],
+        translations=motion.translations * [-1.0, 1.0, 1.0],
+        fps=motion.fps,
+        kind=motion.kind,
+        source=motion.source,
+    )
+
+
+def _other_side(name: str) -> str:
+    if name.startswith("left_"):
+        return "right_" + name.removeprefix("left_")
+    return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
+
+
+def _mixed(motions: Sequence[Motion], random: np.random.Generator, turn: float, name: str) -> Motion:
+    poses = np.zeros((FRAMES, len(JOINT), 3))
+    translations = np.zeros((FRAMES, 3))
+    fps = motions[0].fps
+    for number, part in enumerate(PARTS):
+        source = motions[int(random.integers(len(motions)))]
+        if random.random() < 0.5:
+            source = mirrored(source)
+        start = random.integers(max(1, source.frames - FRAMES + 1))
+        taken = np.minimum(
+            np.arange(start, start + FRAMES), source.frames - 1
+        )  # a short clip rests at its end
+        scale = random.uniform(*SCALE) if number in SCALED else 1.0
+        joints = [JOINT[joint] for joint in part]
+        poses[:, joints] = scale * source.poses[np.ix_(taken, joints)]
+        if number == 0:
+            translations = source.translations[taken]
+    seconds = np.arange(FRAMES)[:, None] / fps
+    for joint, share in TURNED.items():
+        stays, swings = random.normal(0.0, share * turn, (2, 3))
+        phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
+        added = rotation_matrices(stays + swings * np.sin(phase))
+        poses[:, JOINT[joint]] = axis_angles(rotation_matrices(poses[:, JOINT[joint]]) @ added)
+    return Motion(name, poses, translations, fps=fps, kind="mixed")

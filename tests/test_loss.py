@@ -1,0 +1,152 @@
+"""The loss is the simulator's energy, its fast backward is the derivative of the definition, and contact
+planes are where an independent search finds them."""
+
+import igl
+import numpy as np
+import pytest
+import torch
+from dressing import swaying, tube_dress
+
+from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
+from snug.contact import Anchors, Patch
+from snug.loss import PhysicsLoss, make_contact, summed
+from snug.recipe import DEFAULT, PAPER, Recipe
+from snug.skinning import skin
+
+DT = 1 / 30
+
+
+def posed_batch(dtype=torch.float64, seed=0):
+    """Crumpled garments in three poses: x (1, 3, V, 3) relative to the pelvis, and planes near them."""
+    dressed, motion = tube_dress(), swaying()
+    random = np.random.default_rng(seed)
+    frames = [5, 6, 7]
+    rest = dressed.rest().double() + torch.as_tensor(random.normal(0, 0.006, (3, dressed.vertices, 3)))
+    x = skin(rest, dressed.weights(5).double(), dressed.transforms(motion.poses[frames]).double())[None]
+    contact = ContactPenalty(dressed.cloth)
+    samples = contact.sample_matrix @ x[0, 0].numpy()
+    normals = random.normal(size=(1, 3, *samples.shape))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    points = np.stack([contact.sample_matrix @ x[0, t].numpy() for t in range(3)])[None] - 0.002 * normals
+    return dressed, x.to(dtype), points, normals
+
+
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
+@pytest.mark.parametrize("term", ["strain", "bending", "gravity", "collision"])
+def test_closed_form_backward_is_the_derivative_of_the_definition(term, dtype):
+    dressed, x, points, normals = posed_batch(dtype)
+    made = {E.name: E for E in (StretchStVK, BendHinge, Gravity, ContactPenalty)}[term](dressed.cloth)
+    planes = (points, normals) if term == "collision" else ()
+    fast, slow = x.clone().requires_grad_(), x.double().requires_grad_()
+    weight = torch.tensor([[1.0, -2.0, 0.5]])  # each configuration has its own factor from above
+    value = summed(made, fast, *(p.astype(np.float32) if dtype == torch.float32 else p for p in planes))
+    (value * weight).sum().backward()
+    exact = made.energy(slow, *map(torch.as_tensor, planes)).sum(-1)
+    (exact * weight).sum().backward()
+    tolerance = 1e-10 if dtype == torch.float64 else 2e-4  # float32 of 1e-6 m on centimetre edges
+    assert value.shape == (1, 3) and fast.grad.dtype == dtype
+    assert slow.grad.norm() > 1e-3
+    assert torch.allclose(value.double(), exact, rtol=tolerance)
+    assert (fast.grad.double() - slow.grad).norm() < tolerance * slow.grad.norm()
+
+
+def test_window_loss_is_the_simulators_energy_of_its_frames():
+    dressed, x, points, normals = posed_batch()
+    motion = swaying()
+    pelvis = dressed.pelvis(motion)[[5, 6, 7]]
+    ahead = np.zeros((1, 3, 3))
+    ahead[0, 2] = 2 * pelvis[1] - pelvis[0] - pelvis[2]
+    terms = PhysicsLoss(dressed.cloth, DEFAULT, dt=DT)(x, torch.as_tensor(ahead), (points, normals))
+    assert set(terms) == set(DEFAULT.terms) and all(value.shape == (1, 3) for value in terms.values())
+    world = x[0].numpy() + pelvis[:, None]
+    inertia = Inertia(dressed.cloth, DT).value_and_gradient(world[2], 2 * world[1] - world[0])[0]
+    assert np.allclose(terms["inertia"][0].numpy(), [0, 0, inertia], rtol=1e-9) and inertia > 1e-6
+    for t in range(3):
+        strain = StretchStVK(dressed.cloth).value_and_gradient(world[t])[0]
+        weight = Gravity(dressed.cloth, pelvis[t, 1]).value_and_gradient(world[t])[0]
+        assert np.isclose(float(terms["strain"][0, t]), strain, rtol=1e-9)
+        assert np.isclose(float(terms["gravity"][0, t]), weight, rtol=1e-9)
+
+
+def test_inertia_reaches_all_three_frames():
+    dressed, x, *_ = posed_batch()
+    x = x.requires_grad_()
+    recipe = Recipe(terms=("inertia",))
+    PhysicsLoss(dressed.cloth, recipe, dt=DT)(x, torch.zeros(1, 3, 3), None)["inertia"].sum().backward()
+    one, two, three = x.grad[0]
+    assert torch.allclose(two, -2 * three) and torch.allclose(one, three) and three.norm() > 0
+
+
+def test_leaving_out_a_term_leaves_it_out():
+    dressed, x, points, normals = posed_batch()
+    recipe = Recipe(terms=("strain", "collision"))
+    terms = PhysicsLoss(dressed.cloth, recipe, dt=DT)(x, torch.zeros(1, 3, 3), (points, normals))
+    assert set(terms) == {"strain", "collision"}
+
+
+def test_paper_recipe_has_the_papers_contact():
+    contact = make_contact(tube_dress().cloth, PAPER)
+    assert len(contact.stencils) == tube_dress().vertices and contact.margin == 0.002
+    assert (contact.stiffness == 250.0).all()
+
+
+def found(patch: Patch, anchors: np.ndarray, weights: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    return (positions[patch.faces[anchors]] * weights[..., None]).sum(1)
+
+
+def test_contact_search_finds_the_closest_allowed_point():
+    dressed, motion = tube_dress(), swaying()
+    contact = ContactPenalty(dressed.cloth)
+    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
+    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(motion.poses[[8, 16]])
+    positions = skin(torch.as_tensor(patch.rest), weights, transforms).numpy()
+    garment = skin(dressed.rest(), dressed.weights(5), transforms).numpy()
+    anchors = np.zeros(len(patch.sample_rest), np.int32)
+    for body, x in zip(positions, garment):
+        samples = (contact.sample_matrix @ x).astype(np.float32)
+        faces, barycentric = patch.search(samples, body, anchors)
+        assert np.allclose(barycentric.sum(1), 1, atol=1e-5) and barycentric.min() > -1e-5
+        distance = np.linalg.norm(found(patch, faces, barycentric, body) - samples, axis=1)
+        squared, nearest, _ = igl.point_mesh_squared_distance(
+            samples.astype(float), body.astype(float), patch.faces.astype(np.int64)
+        )
+        allowed = np.linalg.norm(patch.centroids[nearest] - patch.sample_rest, axis=1) < patch.region
+        wrong = np.abs(distance - np.sqrt(squared))[allowed] > 5e-4
+        # The walk down the surface may end in a dent between two seeds: rarely, and only there.
+        assert allowed.mean() > 0.9 and wrong.mean() < 0.01
+        taken = np.linalg.norm(patch.centroids[faces] - patch.sample_rest, axis=1)
+        assert taken.max() < patch.region
+
+
+def test_anchors_follow_the_body_and_forget_nothing_but_what_is_renewed():
+    dressed, motion = tube_dress(), swaying()
+    contact = ContactPenalty(dressed.cloth, samples="vertices")
+    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
+    anchors = Anchors(patch, 3)
+    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
+    positions = skin(torch.as_tensor(patch.rest), weights, dressed.transforms(motion.poses[:3])).numpy()
+    normals = patch.normals(positions)
+    frames = np.array([2, 0])
+    points, directions = anchors.planes(frames, frames, positions, normals)
+    expected = found(patch, anchors.faces[0], anchors.barycentric[0], positions[2])
+    assert np.abs(points[0] - expected).max() < 1e-6
+    assert np.allclose(np.linalg.norm(directions, axis=-1), 1, atol=1e-5)
+    # Outward: the garment's T-pose samples lie on the positive side of the body they hang on.
+    height = np.einsum(
+        "si,si->s",
+        patch.sample_rest - found(patch, anchors.faces[0], anchors.barycentric[0], patch.rest),
+        patch.normals(patch.rest[None])[0][patch.faces[anchors.faces[0]]].mean(1),
+    )
+    assert height.min() > 0.01
+    before = anchors.faces.copy()
+    assert list(anchors.oldest(frames, 1)) == [0]
+    anchors.renew(2, patch.sample_rest[::-1].copy(), positions[2])
+    assert (anchors.faces[:2] == before[:2]).all() and (anchors.faces[2] != before[2]).any()
+    assert list(anchors.oldest(frames, 1)) == [1]  # frame 2 is young again
+
+
+def test_garment_far_from_the_body_is_refused():
+    dressed = tube_dress()
+    with pytest.raises(ValueError, match="no body face"):
+        Patch.around(dressed.garment.rest_positions + 5.0, dressed.body.shaped(), dressed.body.faces)

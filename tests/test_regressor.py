@@ -1,0 +1,143 @@
+"""The networks: what they see does not depend on what it should not, and what they start from is known."""
+
+import numpy as np
+import pytest
+import torch
+from dressing import swaying, tube_dress
+
+from snug.baselines.pbns import PoseSpaceDeformation
+from snug.motion import Motion
+from snug.recipe import DEFAULT, PAPER, RECIPES, Recipe, RecipeError, find_recipe
+from snug.regressor import Regressor, parameter_megabytes
+from snug.skeleton import axis_angles, rotation_matrices
+from snug.trained_model import make_network
+
+
+def turned(motion: Motion, angle: float, shift: np.ndarray) -> Motion:
+    """The whole motion, turned about the vertical at the pelvis and moved."""
+    turn = rotation_matrices(np.array([0.0, angle, 0.0]))
+    poses = motion.poses.copy()
+    poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
+    return Motion(motion.name, poses, motion.translations @ turn.T + shift, fps=motion.fps)
+
+
+def test_paper_scale_network_has_the_papers_size():
+    network = Regressor(85, 4424)
+    gru = sum(p.numel() for p in network.gru.parameters())
+    # 3 gates x 256 x (inputs + 256 + 2 biases), first layer on 85 inputs and three on 256.
+    assert gru == 3 * 256 * (85 + 256 + 2) + 3 * 3 * 256 * (256 + 256 + 2)
+    assert sum(p.numel() for p in network.offsets.parameters()) == (256 + 1) * 3 * 4424
+    assert 18.0 < parameter_megabytes(network) < 20.0  # the paper prints 19 MB
+
+
+def test_state_carries_a_sequence_over_a_cut():
+    network = Regressor(10, 7)
+    features = torch.randn(2, 9, 10)
+    whole, _ = network(features)
+    first, state = network(features[:, :4])
+    second, _ = network(features[:, 4:], state)
+    assert torch.allclose(whole, torch.cat([first, second], 1), atol=1e-6)
+    forgotten, _ = network(features[:, 4:])
+    assert (forgotten - second).abs().max() > 1e-3
+
+
+def test_zero_last_layer_starts_at_the_template():
+    for kind in ("snug", "pbns"):
+        network = make_network(kind, 12, 5, DEFAULT, seed=1)
+        offsets, _ = network(torch.randn(3, 4, 12))
+        assert offsets.shape == (3, 4, 5, 3) and (offsets == 0).all()
+        random, _ = make_network(kind, 12, 5, PAPER, seed=1)(torch.randn(3, 4, 12))
+        assert random.abs().max() > 1e-3
+
+
+def test_seed_alone_decides_the_start():
+    torch.manual_seed(5)
+    a = make_network("snug", 12, 5, PAPER, seed=3)
+    before = torch.rand(1)
+    torch.manual_seed(5)
+    b = make_network("snug", 12, 5, PAPER, seed=3)
+    assert all(torch.equal(p, q) for p, q in zip(a.parameters(), b.parameters()))
+    assert torch.equal(before, torch.rand(1))  # and it leaves the caller's randomness alone
+    c = make_network("snug", 12, 5, PAPER, seed=4)
+    assert not torch.equal(a.offsets.weight, c.offsets.weight)
+
+
+def test_pbns_is_one_matrix_per_activation():
+    network = PoseSpaceDeformation(72, 6)
+    features = torch.randn(1, 1, 72)
+    offsets, state = network(features)
+    activations = network.activations(features)[0, 0]
+    matrix = network.offsets.weight.T.reshape(32, 6, 3)  # (32, V, 3)
+    expected = torch.einsum("i,ivc->vc", activations, matrix)
+    assert state is None and torch.allclose(offsets[0, 0], expected, atol=1e-6)
+
+
+def test_default_inputs_know_no_heading_and_no_place():
+    dressed, motion = tube_dress(), swaying()
+    moved = turned(motion, 1.1, np.array([3.0, 0.5, -2.0]))
+    plain, other = (dressed.features(m, DEFAULT) for m in (motion, moved))
+    assert torch.allclose(plain, other, atol=1e-6)
+    literal = dressed.features(moved, PAPER) - dressed.features(motion, PAPER)
+    assert literal.abs().max() > 0.5
+
+
+def test_default_inputs_know_lean_speed_and_shape():
+    dressed, motion = tube_dress(), swaying()
+    plain = dressed.features(motion, DEFAULT)
+    leaning = Motion("lean", motion.poses + np.eye(24)[:, :1] * [0.3, 0, 0], motion.translations)
+    assert (dressed.features(leaning, DEFAULT) - plain).abs().max() > 0.1
+    velocity = plain[:, -13:-10]
+    assert (velocity[0] == 0).all() and np.allclose(velocity[1:, 2], 1.2, atol=1e-5)
+    betas = np.linspace(-1, 1, 10)
+    assert np.allclose(dressed.features(motion, DEFAULT, betas)[:, -10:], betas, atol=1e-6)
+    assert dressed.features(motion, PAPER, kind="pose").shape == (motion.frames, 72)
+
+
+def test_dresser_agrees_with_the_body_in_the_world():
+    """A garment that is a piece of the body, with the body's weights, must land on the posed body."""
+    dressed, motion = tube_dress(), swaying()
+    betas = np.array([1.0, -0.5, 0.3, 0, 0, 0, 0, 0.2, 0, -0.4])
+    body = dressed.body
+    expected = body.vertices(motion.poses, motion.translations, betas)[:, ::97]
+    from snug.skinning import skin
+
+    weights = torch.as_tensor(body.skinning_weights[::97]).float()
+    rest = torch.as_tensor(body.shaped(betas)[::97]).float()
+    posed = skin(rest, weights, dressed.transforms(motion.poses, betas)).double().numpy()
+    assert np.abs(posed + dressed.pelvis(motion, betas)[:, None] - expected).max() < 1e-5
+
+
+def test_rest_follows_the_body_shape():
+    dressed = tube_dress()
+    betas = np.array([0.5, 2.0, -1.0, 0, 0, 1.0, 0, 0, 0, -2.0])
+    expected = dressed.garment.rest_for(dressed.body, betas)
+    assert np.abs(dressed.rest(betas).numpy() - expected).max() < 1e-6
+    assert np.abs(expected - dressed.garment.rest_positions).max() > 5e-3
+    assert dressed.rest(np.stack([betas, -betas])).shape == (2, dressed.vertices, 3)
+
+
+@pytest.mark.parametrize("recipe", RECIPES.values(), ids=list(RECIPES))
+def test_recipes_survive_a_file(recipe):
+    assert Recipe.from_dict(recipe.as_dict()) == recipe
+    assert find_recipe(recipe.name) is recipe
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"pose_input": "quaternion"}, "pose_input='quaternion'"),
+        ({"terms": ("strain", "wind")}, "'wind'"),
+        ({"window": 2}, "window"),
+        ({"learning_rate": 0.0}, "learning_rate"),
+    ],
+)
+def test_recipe_refuses_nonsense(options, words):
+    with pytest.raises(RecipeError, match=words):
+        Recipe(**options)
+
+
+def test_recipe_refuses_unknown_names():
+    with pytest.raises(RecipeError, match=r"'papers'.*default, paper"):
+        find_recipe("papers")
+    with pytest.raises(RecipeError, match="'momentum'"):
+        Recipe.from_dict({"momentum": 0.9})

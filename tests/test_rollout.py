@@ -1,0 +1,82 @@
+"""A roll-out is the network one frame at a time: timed, in the world, and as long as the motion."""
+
+import numpy as np
+import pytest
+import torch
+from dressing import swaying, tube_dress
+
+from snug.recipe import DEFAULT, PAPER
+from snug.rollout import RollOutError, roll_out
+from snug.train import untrained_model
+from snug.trained_model import TrainedModel, make_network
+
+
+def test_zero_offsets_give_skinning_alone():
+    dressed, motion = tube_dress(), swaying()
+    inputs = dressed.features(motion, DEFAULT).shape[1]
+    model = TrainedModel("snug", make_network("snug", inputs, dressed.vertices, DEFAULT, seed=0), DEFAULT)
+    run = roll_out(model, dressed, motion)
+    assert run.positions.dtype == np.float64
+    assert np.abs(run.positions - dressed.skinned(motion, smoothing=DEFAULT.smoothing)).max() < 1e-6
+    assert run.status == "ok" and np.allclose(run.times, np.arange(motion.frames) / 30)
+
+
+@pytest.mark.parametrize("kind", ["snug", "pbns"])
+def test_frame_by_frame_equals_the_whole_sequence(kind):
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model(kind, dressed, [motion], seed=2)
+    features = dressed.features(motion, model.recipe, kind="motion" if kind == "snug" else "pose")
+    with torch.no_grad():
+        offsets, _ = model.network(features[None])
+    whole = dressed.skinned(motion, smoothing=model.recipe.smoothing, offsets=offsets[0])
+    run = roll_out(model, dressed, motion)
+    assert np.abs(run.positions - whole).max() < 1e-5
+    assert offsets.abs().max() > 1e-3
+
+
+def test_every_frame_is_timed():
+    dressed, motion = tube_dress(), swaying()
+    run = roll_out(untrained_model("snug", dressed, [motion], seed=0), dressed, motion)
+    assert run.frame_seconds.shape == (motion.frames,)
+    assert (run.frame_seconds > 0).all() and np.median(run.frame_seconds) < 0.05
+
+
+def test_held_pose_forgets_the_past_and_the_velocity():
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    held = roll_out(model, dressed, motion, held_pose=True)
+    reordered = type(motion)("back", motion.poses[::-1], motion.translations[::-1] * 2.0)
+    back = roll_out(model, dressed, reordered, held_pose=True)
+    pelvis, other = dressed.pelvis(motion)[:, None], dressed.pelvis(reordered)[:, None]
+    assert np.abs((held.positions - pelvis) - (back.positions - other)[::-1]).max() < 1e-5
+    assert np.isnan(held.frame_seconds).all()
+    moving = roll_out(model, dressed, motion)
+    assert np.abs(moving.positions - held.positions).max() > 1e-5
+
+
+def test_body_shape_changes_the_roll_out():
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    betas = np.array([0.0, 2.0, 0, 0, 0, 0, 0, 0, 0, 0])
+    run = roll_out(model, dressed, motion, betas)
+    assert np.abs(run.positions - roll_out(model, dressed, motion).positions).max() > 5e-3
+
+
+def test_misfits_are_named():
+    dressed, motion = tube_dress(), swaying()
+    with pytest.raises(RollOutError, match="7 vertices, the garment 150"):
+        roll_out(
+            TrainedModel("snug", make_network("snug", 154, 7, DEFAULT, seed=0), DEFAULT), dressed, motion
+        )
+    network = make_network("snug", 85, dressed.vertices, PAPER, seed=0)
+    with pytest.raises(RollOutError, match="reads 85 numbers"):
+        roll_out(TrainedModel("snug", network, DEFAULT), dressed, motion)
+
+
+def test_not_finite_is_a_status_not_a_crash():
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    with torch.no_grad():
+        model.network.offsets.bias[0] = float("nan")
+    run = roll_out(model, dressed, motion)
+    assert run.status == "diverged" and "not finite" in run.reason

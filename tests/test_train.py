@@ -1,0 +1,252 @@
+"""Training lowers the physics, repeats bit for bit, survives files, and names what goes wrong."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from dressing import swaying, tube_dress
+
+from snug.baselines.supervised import TargetError, vertex_loss
+from snug.mixing import mirrored, mixed_motions
+from snug.motion import Motion, make_motion
+from snug.recipe import DEFAULT, PAPER, Recipe
+from snug.rollout import roll_out
+from snug.skeleton import joint_positions
+from snug.train import train, untrained_model
+from snug.trained_model import ModelFileError, TrainedModel
+from snug.trainer import Trainer
+from snug.training_set import TrainingError, TrainingSet
+
+PLAIN = replace(DEFAULT, mixed=0.0)
+
+
+def short(kind="snug", *, steps=60, seed=0, recipe=PLAIN, motions=None, **options):
+    clips = motions or [swaying(30)]
+    options = {"progress": False, "every": 10, **options}
+    return train(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
+
+
+@pytest.fixture(scope="module")
+def trained():
+    return short(steps=150)
+
+
+def test_training_lowers_the_potential(trained):
+    first, last = trained.history[0], trained.history[-1]
+    assert last["loss"] < 0.9 * first["loss"] and last["strain"] < first["strain"]
+    parts = sum(last[term] for term in DEFAULT.terms)
+    assert last["loss"] == pytest.approx(parts, rel=1e-6) and last["step"] == 150
+
+
+def test_trained_beats_skinning_in_a_roll_out(trained):
+    from reference_sim.energies import Gravity, StretchStVK
+
+    dressed, motion = tube_dress(), swaying(30)
+
+    def joules(x):
+        return sum(E(dressed.cloth).value_and_gradient(x)[0] for E in (StretchStVK, Gravity))
+
+    run, skinned = roll_out(trained, dressed, motion), dressed.skinned(motion, smoothing=20)
+    assert np.mean([joules(x) for x in run.positions]) < np.mean([joules(x) for x in skinned])
+
+
+@pytest.mark.parametrize("kind", ["snug", "pbns"])
+def test_same_seed_same_weights(kind):
+    a, b, c = (short(kind, steps=12, seed=seed) for seed in (4, 4, 5))
+    same = [torch.equal(p, q) for p, q in zip(a.network.parameters(), b.network.parameters())]
+    assert all(same)
+    assert not torch.equal(a.network.offsets.weight, c.network.offsets.weight)
+
+
+def test_model_survives_its_file(trained, tmp_path):
+    path = trained.save(tmp_path / "deep" / "model.safetensors")
+    loaded = TrainedModel.load(path)
+    assert [p.name for p in path.parent.iterdir()] == ["model.safetensors"]
+    assert (loaded.kind, loaded.recipe, loaded.steps) == ("snug", trained.recipe, 150)
+    assert loaded.history == trained.history and loaded.megabytes == trained.megabytes
+    motion = swaying(12)
+    before, after = (roll_out(model, tube_dress(), motion).positions for model in (trained, loaded))
+    assert (before == after).all()
+
+
+def test_broken_model_files_are_named(tmp_path, trained):
+    from safetensors.torch import save_file
+
+    with pytest.raises(ModelFileError, match="no such model"):
+        TrainedModel.load(tmp_path / "none.safetensors")
+    broken = tmp_path / "broken.safetensors"
+    broken.write_bytes(trained.save(tmp_path / "m.safetensors").read_bytes()[:2000])
+    with pytest.raises(ModelFileError, match=r"broken\.safetensors"):
+        TrainedModel.load(broken)
+    foreign = tmp_path / "foreign.safetensors"
+    save_file({"a": torch.zeros(2)}, foreign)
+    with pytest.raises(ModelFileError, match="no model of this project"):
+        TrainedModel.load(foreign)
+
+
+def test_supervised_learns_what_it_is_shown():
+    dressed, motion = tube_dress(), swaying(30)
+    target = dressed.skinned(motion, smoothing=20)
+    target[:, :, 1] -= 0.02
+    model = short("supervised", steps=150, motions=[motion], trajectories={"sway": target})
+    start = vertex_loss(torch.as_tensor(target - [0, -0.02, 0]), torch.as_tensor(target)).mean()
+    assert start == pytest.approx(4.0, rel=1e-3)  # 2 cm, squared
+    assert model.history[-1]["loss"] < 0.1 * float(start)
+    error = np.abs(roll_out(model, dressed, motion).positions - target)
+    assert error.mean() < 4e-3
+
+
+def test_supervised_names_unfit_targets():
+    dressed, motion = tube_dress(), swaying(30)
+    good = dressed.skinned(motion)
+    with pytest.raises(TargetError, match="needs trajectories"):
+        short("supervised")
+    with pytest.raises(TargetError, match="'sway'"):
+        short("supervised", trajectories={"walk": good})
+    with pytest.raises(TargetError, match=r"shape \(29, 150, 3\), expected \(30, 150, 3\)"):
+        short("supervised", trajectories={"sway": good[:-1]})
+    good[17, 3] = np.nan
+    with pytest.raises(TargetError, match="frame 17"):
+        short("supervised", trajectories={"sway": good})
+
+
+def test_paper_recipe_varies_the_body(monkeypatch):
+    shapes = []
+    whole = TrainingSet.batch
+
+    def spy(self, windows, betas):
+        shapes.append(betas)
+        return whole(self, windows, betas)
+
+    monkeypatch.setattr(TrainingSet, "batch", spy)
+    model = short(recipe=PAPER, steps=8)
+    assert all(np.isfinite(row["loss"]) for row in model.history)
+    betas = np.concatenate(shapes)
+    assert (
+        betas.shape == (8 * 16, 10) and betas.max() > 2.5 and betas.min() < -2.5 and np.abs(betas).max() <= 3
+    )
+
+
+def test_other_skeletons_pose_as_the_body_does():
+    dressed, motion = tube_dress(), swaying(12)
+    data = TrainingSet(dressed, [motion], PLAIN, features="motion", sequences=True)
+    betas = np.random.default_rng(0).uniform(-3, 3, (2, 10))
+    batch = data.batch(np.array([1, 5]), betas)
+    assert torch.allclose(batch.transforms[1], dressed.transforms(motion.poses[5:8], betas[1]), atol=1e-5)
+    assert torch.allclose(batch.rest[1, 0], dressed.rest(betas[1]))
+    assert torch.allclose(batch.features[1], dressed.features(motion, PLAIN, betas[1])[5:8], atol=1e-6)
+
+
+def test_windows_stay_within_a_motion_and_all_come_by():
+    clips = [swaying(9, name="a"), swaying(7, name="b")]
+    trainer = Trainer("snug", tube_dress(), clips, steps=1, seed=0, recipe=replace(PLAIN, batch=4))
+    starts = set()
+    for _ in range(3):
+        frames = trainer.data.batch(trainer.draw(), None).frames
+        assert ((frames < 9).all(axis=1) | (frames >= 9).all(axis=1)).all()
+        starts |= set(frames[:, 0].tolist())
+    assert starts == {*range(7), *range(9, 14)}
+    assert trainer.data.where(9 + 3) == "motion 'b' frame 3"
+    disjoint = TrainingSet(
+        tube_dress(), clips, replace(PLAIN, window_stride=3), features="motion", sequences=True
+    )
+    assert disjoint.starts.tolist() == [0, 3, 6, 9, 12]
+
+
+def test_guard_names_a_window_and_keeps_the_weights():
+    trainer = Trainer("snug", tube_dress(), [swaying(120)], steps=8, seed=0, recipe=PLAIN)
+    before = trainer.network.offsets.weight.clone()
+    trainer.data.features[20] = float("nan")  # in 3 of 118 windows: in at most 3 of the first 8 batches
+    for number in range(8):
+        trainer.step(number)
+    assert 1 <= trainer.summary["skipped_updates"] <= 3
+    named = trainer.summary["named_windows"][0]
+    assert named["action"] == "update left out" and "motion 'sway' frame" in named["window"]
+    after = trainer.network.offsets.weight
+    assert torch.isfinite(after).all() and not torch.equal(before, after)
+
+
+def test_guard_counts_high_windows_and_clips():
+    trainer = Trainer(
+        "snug", tube_dress(), [swaying(30)], steps=99, seed=0, recipe=replace(PLAIN, spike=1e-6)
+    )
+    trainer.step(0)
+    assert trainer.summary["high_windows"] == 0  # the first steps are not judged
+    trainer.step(60)
+    assert trainer.summary["high_windows"] == 16
+    norms = [p.grad.norm() for p in trainer.network.parameters()]
+    assert torch.stack(norms).norm() <= PLAIN.gradient_limit * 1.001
+
+
+def test_training_gives_up_with_a_reason():
+    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=200, seed=0, recipe=PLAIN)
+    trainer.data.features[:] = float("nan")
+    with pytest.raises(TrainingError, match=r"diverged.*motion 'sway' frame"):
+        trainer.run(log=None, progress=False, every=10)
+
+
+def test_impossible_trainings_are_refused():
+    with pytest.raises(TrainingError, match="steps=0"):
+        short(steps=0)
+    with pytest.raises(TrainingError, match="has 3 frames"):
+        short(motions=[swaying(2)])
+    with pytest.raises(TrainingError, match="one frame rate"):
+        short(motions=[swaying(30), swaying(30, fps=60.0)])
+    with pytest.raises(ValueError, match=r"'gnn'.*snug, supervised, pbns"):
+        short("gnn")
+    with pytest.raises(TrainingError, match="no motions"):
+        train("snug", tube_dress(), [], steps=1, seed=0)
+
+
+def test_untrained_is_not_skinning_alone():
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    gap = roll_out(model, dressed, motion).positions - dressed.skinned(motion, smoothing=20)
+    assert 1e-3 < np.abs(gap).max() < 0.1 and model.steps == 0
+
+
+def test_mirror_swaps_the_sides():
+    motion = make_motion("kick")
+    mirror = mirrored(motion)
+    plain = joint_positions(motion.poses, motion.translations)
+    other = joint_positions(mirror.poses, mirror.translations)
+    assert np.abs(other[:, 1] - plain[:, 2] * [-1, 1, 1]).max() < 1e-9  # left hip, right hip
+    assert np.abs(other[:, 20] - plain[:, 21] * [-1, 1, 1]).max() < 1e-9  # wrists
+    assert np.abs(mirrored(mirror).poses - motion.poses).max() == 0
+
+
+def test_mixed_motions_are_continuous_and_repeat():
+    clips = [make_motion(name) for name in ("walk", "squat", "arm_raise")]
+    mixed = mixed_motions(clips, 300, turn=0.1, seed=3)
+    again = mixed_motions(clips, 300, turn=0.1, seed=3)
+    assert len(mixed) == 5 and all((a.poses == b.poses).all() for a, b in zip(mixed, again))
+    assert mixed_motions(clips, 0, turn=0.1, seed=3) == []
+    from snug.motion import joint_speeds
+
+    fastest = max(joint_speeds(clip).max() for clip in clips)
+    assert max(joint_speeds(clip).max() for clip in mixed) < 2 * fastest + 2.0
+
+
+def test_mixed_motions_join_the_training_set():
+    model = short(recipe=replace(DEFAULT, mixed=2.0), steps=2)
+    assert model.summary["training_frames"] == 30 + 60
+
+
+def test_command_line_answers_without_torch():
+    code = "import sys, snug.train as t; t.parse([]); sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+    shown = subprocess.run([sys.executable, "-m", "snug.train", "--help"], capture_output=True, text=True)
+    assert shown.returncode == 0 and "examples:" in shown.stdout
+
+
+def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
+    from snug.train import main
+
+    out = tmp_path / "model.safetensors"
+    assert main(["--motions", str(tmp_path / "nowhere"), "-o", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "nowhere" in error and not out.exists()
+    assert Recipe() == DEFAULT and isinstance(swaying(), Motion)
