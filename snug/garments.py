@@ -1,4 +1,4 @@
-"""Garments tailored to a body: triangles, and for each vertex the body vertex and the skinning weights it borrows.
+"""Garments tailored to a body: triangles, and per vertex the body vertex and skinning weights it borrows.
 
 The T-pose shape of a garment is its rest shape: areas, Dm^-1, masses and hinges all come from it.
 """
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
-from snug.remeshing import boundary_loops, corner_angles, remesh, triangle_areas, vertex_normals
+from snug.remeshing import boundary_loops, corner_angles, remesh, triangle_areas
 from snug.tailoring import TORSO_BONES, Cut, Form, build_form, cut_sheet, dominated_by, joint, outlines
 
 Array = NDArray[np.float64]
@@ -32,9 +32,10 @@ class GarmentError(ValueError):
 class Garment:
     """A garment on the unposed body. Arrays are not to be written to.
 
-    rest_positions: (V,3) [m]. faces: (F,3), outward. body_vertices: (V,) nearest body vertex among those it may
-    follow. skinning_weights: (V,24), that vertex's own, unsmoothed; rows sum to one. loops: name -> boundary
-    vertices in order along the faces' winding, from the front-most vertex on. parameters: what it was tailored with.
+    rest_positions: (V,3) [m]. faces: (F,3), outward. body_vertices: (V,) nearest body vertex among those it
+    may follow. skinning_weights: (V,24), that vertex's own, unsmoothed; rows sum to one. loops: name ("neck",
+    "left_sleeve", "right_sleeve", "hem") -> boundary vertices in order along the faces' winding, from the
+    front-most vertex on. parameters: what it was tailored with.
     """
 
     name: str
@@ -86,7 +87,7 @@ def _adjacency(faces: Index, count: int) -> csr_array:
 
 
 def nearest_body_vertices(body, positions: Array) -> Index:
-    """For each position (V,3) [m] the nearest vertex of torso, upper arms and upper legs on the unposed body."""
+    """Nearest vertex (V,) of the template's torso, upper arms and upper legs to each position (V,3) [m]."""
     allowed = np.flatnonzero(dominated_by(body, SHIRT_BONES))
     return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
 
@@ -107,7 +108,7 @@ def tailor_tshirt(
     sleeve: share of the upper arm that the sleeve covers. length: hem below the hip joints [m].
     Raises GarmentError for a parameter out of range, or a body on which no sound mesh comes out.
     """
-    _check("vertices", vertices, 100, 20_000, "")
+    _check("vertices", vertices, 100, 20_000, " vertices")
     _check("ease", ease, 0.0, 0.3, " m")
     _check("clearance", clearance, 0.005, 0.05, " m")
     _check("sleeve", sleeve, 0.3, 0.9, " of the upper arm")
@@ -145,23 +146,32 @@ def _check(name: str, value: float, low: float, high: float, unit: str) -> None:
 def _sewn(body, form: Form, cuts: list[Cut], vertices: int, clearance: float) -> tuple[Array, Index]:
     """The whole garment: one half remeshed, kept off the body, mirrored at the seam."""
     sheet, sheet_faces = cut_sheet(form, cuts)
-    curves = outlines(sheet, sheet_faces, cuts)
-    if sorted(name for loop in curves for name, _ in loop) != ["hem", "left_sleeve", "neck", "seam", "seam"]:
-        raise GarmentError("the body does not allow a T-shirt: its form is not one sheet with four openings")
+    try:
+        curves = outlines(sheet, sheet_faces, cuts)
+    except ValueError as error:
+        raise GarmentError(f"no T-shirt fits this body: {error}") from error
+    found = sorted(name for loop in curves for name, _ in loop)
+    if found != ["hem", "left_sleeve", "neck", "seam", "seam"]:
+        raise GarmentError(f"no T-shirt fits this body: the cuts of its form are {', '.join(found)}")
     rims = [[curve for _, curve in loop] for loop in curves]
-    half, problem = vertices // 2, ""
-    for _ in range(6):
-        points, faces = remesh(sheet, sheet_faces, rims, half, form.project)
-        missing = vertices - (2 * len(points) - np.count_nonzero(np.abs(points[:, 0]) < 1e-6))
-        if abs(missing) <= max(1, vertices // 200):
+    # V = 2 half - seam, and only the mesh tells how many vertices its seam has; some sizes come out unsound.
+    half, tried, problem = vertices // 2 + int(0.57 * np.sqrt(vertices)), set[int](), ""
+    while len(tried) < 16:
+        while half in tried:
+            half += 1
+        tried.add(half)
+        try:
+            points, faces = remesh(sheet, sheet_faces, rims, half, form.project)
+            count = 2 * len(points) - int(np.count_nonzero(np.abs(points[:, 0]) < 1e-6))
+            if abs(count - vertices) > max(1, vertices // 100):
+                half += (vertices - count) // 2
+                raise ValueError(f"{count} vertices instead of {vertices}")
             whole, whole_faces = _mirrored(_kept_off(body, points, faces, cuts, clearance), faces)
-            problem = _problem(whole, whole_faces)
-            if not problem:
-                return whole, whole_faces
-        half += int(np.round(missing / 2)) if abs(missing) > 1 else 1
-    raise GarmentError(
-        f"vertices={vertices}: no sound mesh at this size ({problem or 'count not met'}); ask for more"
-    )
+            _demand_even(whole, whole_faces)
+            return whole, whole_faces
+        except ValueError as error:
+            problem = str(error)
+    raise GarmentError(f"vertices={vertices}: no sound mesh of this size ({problem}); ask for more")
 
 
 def _mirrored(points: Array, faces: Index) -> tuple[Array, Index]:
@@ -173,17 +183,18 @@ def _mirrored(points: Array, faces: Index) -> tuple[Array, Index]:
 
 
 def _kept_off(body, points: Array, faces: Index, cuts: list[Cut], clearance: float) -> Array:
-    """Points pushed outward, within their cut planes, until no sample is nearer to the skin than `clearance`.
+    """Points pushed outward, along their cuts, until no sample is nearer to the skin than `clearance`.
 
-    The form stays outside of the body, so the distance needs no sign here.
+    Errors: ValueError if it cannot be met.
     """
     import igl
 
     skin, skin_faces = np.asarray(body.template, dtype=np.float64), np.asarray(body.faces, dtype=np.int64)
-    skin = np.concatenate(
-        [skin, skin * [-1.0, 1.0, 1.0]]
-    )  # a shape that is not quite symmetric: both of its sides
+    # Of a body that is not quite symmetric, both of its sides.
+    skin = np.concatenate([skin, skin * [-1.0, 1.0, 1.0]])
     skin_faces = np.concatenate([skin_faces, skin_faces[:, ::-1] + len(body.template)])
+    a, b, c = (skin[skin_faces[:, k]] for k in range(3))
+    outward = np.cross(b - a, c - a)
     tree = igl.AABB()
     tree.init(skin, skin_faces)
     points = points.copy()
@@ -191,13 +202,17 @@ def _kept_off(body, points: Array, faces: Index, cuts: list[Cut], clearance: flo
         corners = points[faces]
         middles = 0.5 * (corners + np.roll(corners, 1, axis=1))
         samples = np.concatenate([corners, middles, corners.mean(axis=1, keepdims=True)], axis=1)  # (F,7,3)
-        squared, _, closest = tree.squared_distance(skin, skin_faces, samples.reshape(-1, 3))
-        distance = np.sqrt(squared).reshape(-1, 7)
+        squared, nearest, closest = tree.squared_distance(skin, skin_faces, samples.reshape(-1, 3))
+        away = samples.reshape(-1, 3) - closest
+        side = np.sign(np.sum(away * outward[nearest], axis=1))  # a chord may run inside of the body
+        away *= (side / np.maximum(np.sqrt(squared), 1e-12))[:, None]
+        distance = (side * np.sqrt(squared)).reshape(-1, 7)
         lack = clearance - distance.min(axis=1)
         if lack.max() <= 0:
-            break
+            points[np.abs(points[:, 0]) < 1e-6, 0] = 0.0
+            return points
         worst = np.arange(len(faces)), distance.argmin(axis=1)
-        away = (samples[worst] - closest.reshape(-1, 7, 3)[worst]) / distance[worst][:, None]
+        away = away.reshape(-1, 7, 3)[worst]
         short = np.flatnonzero(lack > 0)
         short = short[np.argsort(lack[short], kind="stable")]
         push = np.zeros_like(points)
@@ -211,21 +226,21 @@ def _kept_off(body, points: Array, faces: Index, cuts: list[Cut], clearance: flo
             length2 = np.sum(push[on] ** 2, axis=1), np.maximum(np.sum(slanted**2, axis=1), 1e-20)
             push[on] = slanted * np.minimum(length2[0] / length2[1], 4.0)[:, None]
         points += push
-    points[np.abs(points[:, 0]) < 1e-6, 0] = 0.0
-    return points
+    raise ValueError(f"{1000 * lack.max():.2f} mm of clearance missing")
 
 
-def _problem(points: Array, faces: Index) -> str:
-    """What is wrong with a finished mesh, or an empty string."""
+def _demand_even(points: Array, faces: Index) -> None:
+    """Errors: ValueError for a triangle too small, large or sharp, and for other than four openings."""
     areas = triangle_areas(points, faces)
     ratio = areas / areas.mean()
     if ratio.min() < AREA_BOUNDS[0] or ratio.max() > AREA_BOUNDS[1]:
-        return f"triangle areas from {ratio.min():.2f} to {ratio.max():.2f} of the mean"
+        raise ValueError(f"triangle areas from {ratio.min():.2f} to {ratio.max():.2f} of the mean")
     smallest = np.degrees(corner_angles(points, faces).min())
     if smallest < SMALLEST_ANGLE:
-        return f"an angle of {smallest:.1f} degrees"
+        raise ValueError(f"an angle of {smallest:.1f} degrees")
     openings = len(boundary_loops(faces))
-    return "" if openings == 4 else f"{openings} openings"
+    if openings != 4:
+        raise ValueError(f"{openings} openings instead of 4")
 
 
 def _named_loops(points: Array, faces: Index) -> dict[str, Index]:

@@ -1,0 +1,226 @@
+"""The tailored T-shirt: topology, even triangles, room around the body, ease, borrowed weights."""
+
+import igl
+import numpy as np
+import pytest
+
+from snug.body import Body
+from snug.garments import GarmentError, smooth_weights, tailor_tshirt
+
+WAIST = "spine1"
+
+
+@pytest.fixture(scope="session")
+def body():
+    return Body.load()
+
+
+@pytest.fixture(scope="session")
+def shirts(body):
+    return {count: tailor_tshirt(body, vertices=count) for count in (300, 1000, 2000, 4400)}
+
+
+@pytest.fixture(scope="session")
+def shirt(shirts):
+    return shirts[1000]
+
+
+def edge_counts(faces):
+    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges, counts = np.unique(np.sort(halves, axis=1), axis=0, return_counts=True)
+    return halves, edges, counts
+
+
+def face_normals(points, faces):
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def girth(points, faces, axis, level):
+    """Length of the cut of a mesh with the plane where coordinate `axis` is `level`, triangle by triangle."""
+    total = 0.0
+    for corners in points[faces]:
+        height = corners[:, axis] - level
+        ends = []
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            if height[i] * height[j] < 0:
+                ends.append(corners[i] + (corners[j] - corners[i]) * height[i] / (height[i] - height[j]))
+        if len(ends) == 2:
+            total += float(np.linalg.norm(ends[1] - ends[0]))
+    return total
+
+
+def waist(body):
+    return body.joint_template[body.joint_names.index(WAIST), 1]
+
+
+@pytest.mark.parametrize("count", [300, 1000, 2000, 4400])
+def test_topology_and_triangles_at_every_resolution(shirts, count):
+    shirt = shirts[count]
+    points, faces = shirt.rest_positions, shirt.faces
+    assert abs(len(points) - count) <= 0.01 * count  # asked: 3 %
+    assert np.array_equal(np.unique(faces), np.arange(len(points)))
+    halves, edges, counts = edge_counts(faces)
+    assert counts.max() == 2
+    assert len(np.unique(halves, axis=0)) == len(
+        halves
+    )  # every edge once in each direction: consistent winding
+    # A sphere with four holes: V - E + F = 2 - 4, in one piece.
+    assert len(points) - len(edges) + len(faces) == -2
+    rim = edges[counts == 1]
+    in_loops = [len(loop) for loop in shirt.loops.values()]
+    assert sum(in_loops) == len(rim) == len(np.unique(np.concatenate(list(shirt.loops.values()))))
+    areas = 0.5 * np.linalg.norm(face_normals(points, faces), axis=1)
+    assert areas.min() >= 0.5 * areas.mean() and areas.max() <= 2.0 * areas.mean()
+    # Law of cosines: the smallest angle is opposite the shortest side.
+    sides = np.sort(np.linalg.norm(points[faces] - np.roll(points[faces], 1, axis=1), axis=2), axis=1).T
+    cosine = (sides[1] ** 2 + sides[2] ** 2 - sides[0] ** 2) / (2 * sides[1] * sides[2])
+    assert np.degrees(np.arccos(cosine)).min() > 15
+
+
+def test_one_piece(shirt):
+    component = np.arange(len(shirt.rest_positions))
+    for _ in range(len(component)):
+        least = component[shirt.faces].min(axis=1)
+        new = component.copy()
+        np.minimum.at(new, shirt.faces.ravel(), np.repeat(least, 3))
+        if np.array_equal(new, component):
+            break
+        component = new
+    assert component.max() == 0
+
+
+@pytest.mark.parametrize("count", [300, 1000, 4400])
+def test_clear_of_the_body_at_vertices_and_within_triangles(body, shirts, count):
+    corners = shirts[count].rest_positions[shirts[count].faces]
+    rng = np.random.default_rng(3)
+    shares = rng.dirichlet(np.ones(3), size=len(corners))
+    inside = np.einsum("fk,fkd->fd", shares, corners)
+    vertices = igl.signed_distance(shirts[count].rest_positions, body.template, body.faces)[0]
+    within = igl.signed_distance(inside, body.template, body.faces)[0]
+    assert vertices.min() >= 0.015 - 1e-9
+    assert within.min() >= 0.0145  # random points are not the samples that tailoring looks at
+
+
+def test_faces_point_away_from_the_body(body, shirt):
+    points, faces = shirt.rest_positions, shirt.faces
+    normals = face_normals(points, faces)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    centroids = points[faces].mean(axis=1)
+    closest = igl.signed_distance(centroids, body.template, body.faces)[2]
+    away = centroids - closest
+    assert np.mean(np.sum(normals * away, axis=1) > 0) > 0.995
+
+
+def test_cut_lines_are_plane_and_even(body, shirt):
+    points = shirt.rest_positions
+    assert np.ptp(points[shirt.hem, 1]) < 1e-4
+    hip, ankle = (body.joint_template[body.joint_names.index(n), 1] for n in ("left_hip", "left_ankle"))
+    assert ankle < points[shirt.hem, 1].mean() < hip
+    assert np.ptp(points[shirt.loops["left_sleeve"], 0]) < 1e-4
+    for loop in shirt.loops.values():
+        sides = np.linalg.norm(points[loop] - np.roll(points[loop], 1, axis=0), axis=1)
+        assert sides.max() / sides.min() < 2.0
+        turns = np.diff(points[np.append(loop, loop[:2])], axis=0)
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        assert np.sum(turns[1:] * turns[:-1], axis=1).min() > np.cos(np.radians(75))  # no saw teeth
+
+
+def test_the_left_half_mirrors_the_right(shirt):
+    points = shirt.rest_positions
+    mirrored = {tuple(p) for p in np.round(points * [-1, 1, 1] + 0.0, 9).tolist()}
+    assert mirrored == {tuple(p) for p in np.round(points + 0.0, 9).tolist()}
+
+
+def test_ease_is_girth_at_waist_and_cuff(body, shirts):
+    """On a finer mesh, where a section's chords are close to its curve (at 1000 vertices they lose 1 cm)."""
+    loose = shirts[2000]
+    tight = tailor_tshirt(body, ease=0.0, vertices=2000)
+    at_waist = [girth(g.rest_positions, g.faces, 1, waist(body)) for g in (loose, tight)]
+    assert at_waist[0] - at_waist[1] == pytest.approx(0.06, abs=0.003)
+    # Steiner: a convex section grown by d is 2 pi d longer. Here the arm is convex; the form's
+    # smoothing costs pi sigma^2 / r = 3 mm, the chords 2 mm. The waist is as wide as chest and hips ask.
+    cuff = loose.rest_positions[:, 0].max() - 0.003
+    arm = girth(body.template, body.faces, 0, cuff)
+    assert girth(loose.rest_positions, loose.faces, 0, cuff) == pytest.approx(
+        arm + 2 * np.pi * 0.015 + 0.06, abs=0.006
+    )
+    assert at_waist[0] > girth(body.template, body.faces, 1, waist(body)) + 2 * np.pi * 0.015 + 0.06
+
+
+def test_the_shirt_hangs_from_the_chest(body, shirt):
+    """Not pressed into the waist, nor between the legs: below the chest girth does not shrink."""
+    points, faces = shirt.rest_positions, shirt.faces
+    levels = np.linspace(points[shirt.hem, 1].mean() + 0.01, waist(body) + 0.15, 8)[::-1]
+    girths = [girth(points, faces, 1, level) for level in levels]
+    assert np.diff(girths).min() > -0.01
+    front = points[shirt.hem][:, 2] > 0
+    middle = np.abs(points[shirt.hem][:, 0]) < 0.05
+    assert points[shirt.hem][front & middle, 2].min() > points[shirt.hem][:, 2].max() - 0.01
+
+
+def test_tailoring_twice_gives_the_same(body, shirts):
+    again = tailor_tshirt(body, vertices=300)
+    assert np.array_equal(again.rest_positions, shirts[300].rest_positions)
+    assert np.array_equal(again.faces, shirts[300].faces)
+
+
+def test_weights_are_borrowed_from_the_nearest_allowed_vertex(body, shirt):
+    weights = shirt.skinning_weights
+    assert weights.shape == (len(shirt.rest_positions), 24)
+    assert np.allclose(weights.sum(axis=1), 1.0, atol=1e-12)
+    assert np.array_equal(weights, body.skinning_weights[shirt.body_vertices])
+    strongest = {body.joint_names[j] for j in np.argmax(weights, axis=1)}
+    assert not strongest & {"head", "neck", "left_wrist", "left_hand", "left_knee", "left_foot"}
+    assert {"left_shoulder", "right_shoulder", "spine3", "pelvis"} <= strongest
+
+
+def test_smoothing_keeps_rows_and_lowers_dirichlet_energy(shirt):
+    _, edges, _ = edge_counts(shirt.faces)
+
+    def dirichlet(w):
+        return np.sum((w[edges[:, 0]] - w[edges[:, 1]]) ** 2)
+
+    energies = []
+    for rounds in (0, 1, 10, 50):
+        smooth = smooth_weights(shirt.skinning_weights, shirt.faces, rounds)
+        assert np.allclose(smooth.sum(axis=1), 1.0, atol=1e-12) and smooth.min() >= 0
+        energies.append(dirichlet(smooth))
+    assert energies[0] > 2 * energies[2] > 0 and np.all(np.diff(energies) < 0)
+    assert np.array_equal(smooth_weights(shirt.skinning_weights, shirt.faces, 0), shirt.skinning_weights)
+
+
+def test_another_shape_carries_the_shirt_along(body, shirt):
+    assert np.array_equal(shirt.rest_for(body, None), shirt.rest_positions)
+    assert np.array_equal(shirt.rest_for(body, np.zeros(10)), shirt.rest_positions)
+    for sign in (-1.5, 1.5):
+        betas = np.zeros(10)
+        betas[:3] = sign
+        rest = shirt.rest_for(body, betas)
+        distance = igl.signed_distance(rest, body.shaped(betas), body.faces)[0]
+        assert distance.min() > 0.005
+        assert np.abs(rest - shirt.rest_positions).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"vertices": 99}, "vertices=99"),
+        ({"vertices": 10**6}, "vertices=1000000"),
+        ({"ease": -0.01}, "ease=-0.01"),
+        ({"ease": 0.5}, "ease=0.5"),
+        ({"ease": float("nan")}, "ease=nan"),
+        ({"clearance": 0.0}, "clearance=0.0"),
+        ({"sleeve": 1.2}, "sleeve=1.2"),
+        ({"length": 1.0}, "length=1.0"),
+    ],
+)
+def test_a_parameter_out_of_range_is_named(body, wrong, says):
+    with pytest.raises(GarmentError, match=says) as caught:
+        tailor_tshirt(body, **wrong)
+    assert "\n" not in str(caught.value)
+
+
+def test_negative_smoothing_is_refused(shirt):
+    with pytest.raises(GarmentError, match="iterations=-1"):
+        smooth_weights(shirt.skinning_weights, shirt.faces, -1)
