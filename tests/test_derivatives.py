@@ -15,7 +15,7 @@ import pytest
 import torch
 from meshes import patch, random_rotation
 
-from reference_sim import Cloth, Material
+from reference_sim import Cloth, Material, energies
 from reference_sim.energies import (
     HOME,
     AreaBarrier,
@@ -342,6 +342,7 @@ def test_each_kind_of_contact_sample_carries_the_whole_area():
 
 def test_every_term_has_its_line_above():
     tested = {type(case()[0]).__name__ for case in CASES}
-    terms = {name for name in HOME if name not in ("Energy", "Step")}
+    # Terms that are dynamic have no definition in torch; tests/test_barrier.py holds theirs.
+    terms = {name for name in HOME if name not in ("Energy", "Step") and not getattr(energies, name).dynamic}
     assert tested == terms, f"add to CASES: {', '.join(sorted(terms - tested))}"
     assert all(re.fullmatch("[a-z_]+", case()[0].name) for case in CASES)

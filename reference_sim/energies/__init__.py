@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .area_barrier import AreaBarrier
+    from .barrier_friction import BarrierFriction
     from .bend_hinge import BendHinge
+    from .contact_barrier import ContactBarrier
     from .contact_friction import ContactFriction
     from .contact_penalty import ContactPenalty
     from .energy import Energy, Step
@@ -26,6 +28,8 @@ HOME = {
     "Inertia": "inertia",
     "ContactPenalty": "contact_penalty",
     "ContactFriction": "contact_friction",
+    "ContactBarrier": "contact_barrier",
+    "BarrierFriction": "barrier_friction",
     "AreaBarrier": "area_barrier",
     "Energy": "energy",
     "Step": "energy",
@@ -34,7 +38,9 @@ HOME = {
 __all__ = [
     "HOME",
     "AreaBarrier",
+    "BarrierFriction",
     "BendHinge",
+    "ContactBarrier",
     "ContactFriction",
     "ContactPenalty",
     "Energy",

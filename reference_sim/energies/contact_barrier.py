@@ -1,0 +1,148 @@
+"""IPC's barrier: cloth meets neither itself nor a body (Li et al. 2020; in physical units Li et al. 2023).
+
+    E = kappa dhat sum_k w_k m_k b(d_k^2 / dhat^2),   b(s) = -(s - 1)^2 ln s  for s < 1, else 0
+
+over the pairs k of a vertex and a face, or of two edges, that are closer than dhat; d_k is their distance.
+w_k [m^2] is a quarter of the rest area of the vertex, or of those of both edges; m_k fades out edges that are
+nearly parallel. kappa [Pa] is a pressure: a pair pushes with -2 kappa w_k m_k b'(s) d_k / dhat, which at
+half the distance dhat is 4.3 kappa w_k.
+
+Distances, pairs and derivatives are those of the package ipctk (see collisions.py), which *is* the
+definition: there is none in torch. Networks are trained with ContactPenalty.
+
+Beyond a touch the energy means nothing: a distance has no sign. Hence `largest_step` bounds every line
+search by continuous collision detection, and a step starts without an intersection: `clear_way` and
+`set_progress` let the simulator walk cloth and body together from the start of the step as far as nothing
+meets, minimise there to make room, and go on, until the body is where the frame has it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..cloth import Cloth
+from ..collisions import Collisions
+from .energy import Energy, Step
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    from torch import Tensor
+
+    from ..obstacle import Obstacle
+
+DEFAULT_DISTANCE = 2e-3  # [m]
+DEFAULT_STIFFNESS = 1e2  # [Pa]; measured: a tenth of it saves nothing, a hundred times it doubles Newton
+
+
+class ContactBarrier(Energy):
+    """Barrier energy [J] of `cloth` against itself and against the obstacle of a step.
+
+    Args:
+        distance: dhat [m], where the barrier begins; must be below every height of a rest triangle.
+        stiffness: kappa [Pa].
+        self_contact: whether the cloth meets itself.
+
+    Raises:
+        ImportError: ipctk is not installed.
+        ValueError: distance or stiffness not positive, or distance above a height of a rest triangle.
+    """
+
+    name = "barrier"
+    dynamic = True
+
+    def __init__(
+        self,
+        cloth: Cloth,
+        *,
+        distance: float = DEFAULT_DISTANCE,
+        stiffness: float = DEFAULT_STIFFNESS,
+        self_contact: bool = True,
+    ) -> None:
+        for name, value in (("distance", distance), ("stiffness", stiffness)):
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"ContactBarrier {name} = {value!r}: must be a finite number above 0")
+        if self_contact:
+            _check_heights(cloth, distance)
+        self.cloth = cloth
+        self.stencils = np.zeros((0, 4), dtype=np.int64)
+        self.distance, self.stiffness = float(distance), float(stiffness)
+        self.collisions = Collisions(cloth, distance, self_contact=self_contact)
+        ipctk = self.collisions.package
+        self.potential = ipctk.BarrierPotential(self.distance, self.stiffness, use_physical_barrier=True)
+        self._seen: tuple[Obstacle | None, int] = (None, -1)
+
+    def parameters(self) -> dict[str, Any]:
+        return {
+            "distance_m": self.distance,
+            "stiffness_Pa": self.stiffness,
+            "self_contact": self.collisions.self_contact,
+            "package": f"ipctk {self.collisions.package.__version__}",
+        }
+
+    def energy(self, x: Tensor) -> Tensor:
+        raise NotImplementedError(
+            "ContactBarrier has no definition in torch, its energy is ipctk's: call value_and_gradient(x), "
+            "or train with ContactPenalty"
+        )
+
+    def prepare(self, step: Step) -> None:
+        """Put the obstacle at its end of the step.
+
+        Its start is where the step before left it, if that was the frame before: an obstacle that found no
+        way to its place goes on from where it stopped.
+        """
+        if step.obstacle is None:
+            self.collisions.place(1.0)
+            return
+        after = step.obstacle.at(step.frame)
+        before = step.obstacle.at(max(step.frame - 1, 0))
+        if self._seen == (step.obstacle, step.frame - 1) and self.collisions.progress < 1:
+            before = self.collisions.obstacle_at(self.collisions.progress)
+        self.collisions.set_obstacle(step.obstacle.faces, before, after)
+        self._seen = (step.obstacle, step.frame)
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        if not np.isfinite(x).all():
+            return float("nan"), np.full(x.shape, np.nan)
+        pairs, near, positions = self.collisions.pairs(x)
+        gradient = self.potential.gradient(pairs, near.mesh, positions)
+        return self.potential(pairs, near.mesh, positions), gradient.reshape(-1, 3)[: len(x)]
+
+    def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
+        pairs, near, positions = self.collisions.pairs(x)
+        method = self.collisions.package.PSDProjectionMethod
+        hessian = self.potential.hessian(pairs, near.mesh, positions, method.NONE)
+        if convexity > 0:
+            convex = self.potential.hessian(pairs, near.mesh, positions, method.CLAMP)
+            hessian = (1 - convexity) * hessian + convexity * convex
+        size = 3 * len(x)
+        return hessian[:, :size][:size]
+
+    def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
+        return self.collisions.free_share(x, direction) if np.isfinite(direction).all() else 1.0
+
+    def clear_way(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+        return self.collisions.free_way(x, goal, progress)
+
+    def set_progress(self, progress: float) -> None:
+        self.collisions.place(progress)
+
+    def objection(self, x: np.ndarray) -> str:
+        """An edge that cuts a face, as far as the obstacle has come; "" if there is none."""
+        return self.collisions.crossing(x) if np.isfinite(x).all() else ""
+
+
+def _check_heights(cloth: Cloth, distance: float) -> None:
+    """A barrier that reaches across a triangle would push the resting cloth apart."""
+    points = cloth.rest_positions if cloth.rest_uv is None else cloth.rest_uv
+    corners = points[cloth.faces]
+    edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
+    heights = 2 * cloth.areas / edges.max(axis=1)
+    face = int(np.argmin(heights))
+    if heights[face] <= distance:
+        raise ValueError(
+            f"ContactBarrier distance = {distance:g} m: face {face} is only {heights[face]:.3g} m high at "
+            "rest; choose a distance below that, or a mesh without slivers"
+        )
