@@ -1,0 +1,235 @@
+"""The command `python -m reference_sim.simulate`: a garment and an obstacle from files, a trajectory out.
+
+What only a run needs is imported when it runs, so that --help answers at once.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import warnings
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .command_options import DEFAULT_FRAMES, make_parser
+from .material import Material
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    import numpy as np
+
+    from .cloth import Cloth
+    from .energies.energy import Energy
+    from .obstacle import Obstacle
+
+FAR = 1.0  # [m] from which garment and obstacle hardly belong together
+DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+class InputError(ValueError):
+    """Bad input, in one line that names file, element and remedy."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    options = make_parser().parse_args(arguments)
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: _say(f"note: {message}")  # type: ignore[assignment]
+        try:
+            return _run(options)
+        except (ValueError, OSError) as error:
+            print(f"simulate: {' '.join(str(error).split())}", file=sys.stderr)
+            return BAD_INPUT
+        except KeyboardInterrupt:
+            print(f"simulate: interrupted; --resume goes on from {options.output}", file=sys.stderr)
+            return INTERRUPTED
+
+
+def _run(options: Namespace) -> int:
+    _check_paths(options)
+    cloth = _read_cloth(options)
+    obstacle = _read_obstacle(cloth, options)
+    frames = options.frames
+    if frames is None:
+        frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else DEFAULT_FRAMES
+    from .simulator import simulate
+
+    if options.resume and not options.output.exists():
+        _say(f"note: {options.output} does not exist yet: starting at the beginning")
+    trajectory = simulate(
+        cloth,
+        _terms(cloth, obstacle, options),
+        dt=options.dt,
+        frames=frames,
+        obstacle=obstacle,
+        substeps=options.substeps,
+        path=options.output,
+        resume=options.resume,
+        progress=None if options.quiet else options.output.name,
+        tolerance=options.tolerance,
+        max_iterations=options.max_iterations,
+    )
+    written = [options.output]
+    if options.pc2:
+        from .point_cache import write_point_cache
+
+        written += write_point_cache(options.pc2, trajectory)
+    if not options.quiet:
+        from .summary import summary
+
+        _say(summary(trajectory, cloth, obstacle, frames=frames))
+        _say(f"wrote      {', '.join(map(str, written))}")
+    whole = trajectory.frames == frames and trajectory.status == "converged"
+    return DONE if whole else NOT_CONVERGED
+
+
+def _check_paths(options: Namespace) -> None:
+    """Refuse what could not be written, or would destroy an input, before any work."""
+    if options.output.suffix.lower() not in (".vtkhdf", ".hdf"):
+        raise InputError(f"{options.output}: the trajectory ends in .vtkhdf")
+    if options.output.exists() and not (options.resume or options.overwrite):
+        raise InputError(f"{options.output} exists: add --resume to go on with it, --overwrite to replace it")
+    outputs = [options.output]
+    if options.pc2:
+        if options.pc2.suffix.lower() != ".pc2":
+            raise InputError(f"{options.pc2}: a point cache ends in .pc2")
+        outputs += [options.pc2, options.pc2.with_suffix(".obj")]
+    inputs = [Path(p).resolve() for p in (options.garment, options.obstacle, options.obstacle_rest) if p]
+    for path in outputs:
+        if not path.parent.is_dir():
+            raise InputError(f"{path.parent}: no such folder to write {path.name} in")
+        if path.resolve() in inputs:
+            raise InputError(f"{path} would replace an input: choose another name")
+
+
+def _read_cloth(options: Namespace) -> Cloth:
+    from .cloth import Cloth, MeshError
+    from .exchange import read_mesh, to_metres_y_up
+
+    values = {parameter.name: getattr(options, parameter.name) for parameter in fields(Material)}
+    material = Material(**values)
+    surface = read_mesh(options.garment)
+    positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
+    if surface.quads:
+        _say(f"note: {options.garment}: {surface.quads} quads cut into triangles")
+    if options.up == "z":
+        _say("note: meshes turned from z up to y up, (x, y, z) -> (x, z, -y)")
+    size = float((positions.max(axis=0) - positions.min(axis=0)).max())
+    if not 0.02 < size < 20:
+        _say(f"note: {options.garment} measures {size:.3g} m: is --units {options.units} right?")
+    pins = choose_pins(options.pins, positions)
+    if len(pins) == len(positions):
+        raise InputError(f"--pins {options.pins!r} holds every vertex of {options.garment}: choose fewer")
+    try:
+        return Cloth(positions, surface.faces, material, pins=pins)
+    except MeshError as error:
+        raise InputError(f"{options.garment}: {error}") from None
+
+
+def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
+    """Indices of the vertices that `which` names among positions (V, 3) [m, y up].
+
+    "0,9,12" are indices; "top" is what lies within 1 % of the height from the highest vertex; anything else
+    is a box, comparisons joined by commas.
+
+    Raises:
+        InputError: not understood, an index out of range, or nothing chosen.
+    """
+    import numpy as np
+
+    if which is None:
+        return np.zeros(0, dtype=np.int64)
+    height = positions[:, 1]
+    if which == "top":
+        return np.flatnonzero(height >= height.max() - 0.01 * (height.max() - height.min()))
+    parts = [part.strip() for part in which.split(",")]
+    if all(re.fullmatch(r"\d+", part) for part in parts):
+        indices = np.array([int(part) for part in parts])
+        if indices.max() >= len(positions):
+            raise InputError(f"--pins {indices.max()}: the garment has vertices 0..{len(positions) - 1}")
+        return indices
+    chosen = np.ones(len(positions), dtype=bool)
+    for part in parts:
+        match = re.fullmatch(r"([xyz])\s*([<>])=?\s*(\S+)", part)
+        try:
+            axis, sign, bound = match.groups()  # type: ignore[union-attr]
+            value = float(bound)
+        except (AttributeError, ValueError):
+            raise InputError(
+                f"--pins {which!r}: give indices, 'top', or a box such as 'y>1.4,x<0.1'"
+            ) from None
+        along = positions[:, "xyz".index(axis)]
+        chosen &= along >= value if sign == ">" else along <= value
+    if not chosen.any():
+        low, high = positions.min(axis=0).round(3).tolist(), positions.max(axis=0).round(3).tolist()
+        raise InputError(
+            f"--pins {which!r}: no vertex in this box; the garment spans {low} to {high} m, y up"
+        )
+    return np.flatnonzero(chosen)
+
+
+def _read_obstacle(cloth: Cloth, options: Namespace) -> Obstacle | None:
+    if options.obstacle is None:
+        if options.obstacle_rest or options.friction:
+            raise InputError("--obstacle-rest and --friction need an --obstacle")
+        return None
+    from .cloth import MeshError
+    from .exchange import TRAJECTORY_SUFFIXES, read_mesh, read_sequence, to_metres_y_up
+    from .obstacle import Obstacle
+
+    axes = {"units": options.units, "up": options.up}
+    positions, surface = read_sequence(options.obstacle)
+    if not options.obstacle.lower().endswith(TRAJECTORY_SUFFIXES):
+        positions = to_metres_y_up(positions, **axes)
+    rest = None
+    if options.obstacle_rest:
+        rest_surface = read_mesh(options.obstacle_rest)
+        if rest_surface.faces.shape != surface.faces.shape or (rest_surface.faces != surface.faces).any():
+            raise InputError(
+                f"{options.obstacle_rest}: other faces than {options.obstacle}: export both from one mesh"
+            )
+        rest = to_metres_y_up(rest_surface.positions, **axes)
+    try:
+        obstacle = Obstacle(positions, surface.faces, rest_positions=rest, region=options.region)
+    except MeshError as error:
+        raise InputError(f"{options.obstacle}: {error}") from None
+    distance = obstacle.signed_distance(cloth.rest_positions, 0)
+    if distance.min() > FAR:
+        _say(f"note: the garment starts {distance.min():.2g} m from the obstacle: same units and up axis?")
+    elif (inside := distance < 0).any():
+        _say(
+            f"note: the garment starts with {inside.sum()} of {len(inside)} vertices inside the obstacle, vertex "
+            f"{distance.argmin()} {-1e3 * distance.min():.0f} mm deep"
+        )
+    return obstacle
+
+
+def _terms(cloth: Cloth, obstacle: Obstacle | None, options: Namespace) -> list[Energy]:
+    from .energies import BendHinge, Gravity, StretchStVK
+
+    angles = "rest" if options.rest_angles == "rest" else 0.0
+    terms: list[Energy] = [
+        StretchStVK(cloth),
+        BendHinge(cloth, scaling=options.bending_scaling, rest_angles=angles),
+        Gravity(cloth),
+    ]
+    if obstacle is not None:
+        from .energies import ContactFriction, ContactPenalty
+
+        contact = ContactPenalty(
+            cloth,
+            stiffness=options.contact_stiffness,
+            margin=options.contact_margin,
+            samples=options.contact_samples,
+        )
+        terms.append(contact)
+        if options.friction:
+            terms.append(ContactFriction(contact, coefficient=options.friction))
+    return terms
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)

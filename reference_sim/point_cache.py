@@ -1,0 +1,42 @@
+"""A trajectory as a PC2 point cache beside an OBJ: what Blender's Mesh Cache modifier reads.
+
+A 32-byte header (signature, version 1, number of points, first frame, frames per sample, number of samples),
+then float32 positions, sample by sample.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from pathlib import Path
+
+from .trajectory import Trajectory
+
+SIGNATURE = b"POINTCACHE2\0"
+
+
+def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, Path]:
+    """Write PC2 [m, y up, float32] at `path` and the first frame as OBJ beside it; returns both paths.
+
+    Each file is written whole or not at all.
+
+    Raises:
+        ValueError: the name does not end in .pc2.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".pc2":
+        raise ValueError(f"{path}: a point cache ends in .pc2")
+    mesh = path.with_suffix(".obj")
+    frames, points, _ = trajectory.positions.shape
+    header = SIGNATURE + struct.pack("<iiffi", 1, points, 0.0, 1.0, frames)
+    _write_whole(path, header + trajectory.positions.astype("<f4").tobytes())
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in trajectory.positions[0]]
+    lines += [f"f {a} {b} {c}\n" for a, b, c in trajectory.faces + 1]
+    _write_whole(mesh, "".join(["# metres, y up\n", *lines]).encode())
+    return path, mesh
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_bytes(data)
+    os.replace(part, path)
