@@ -174,6 +174,22 @@ def test_active_blocks_are_the_non_zero_ones(case):
 
 
 @every_case
+def test_convexity_takes_negative_curvature_out_in_proportion(case):
+    energy, x = case()
+    elements, true = energy.active_hessian_blocks(x)
+    again, half = energy.active_hessian_blocks(x, 0.5)
+    _, convex = energy.active_hessian_blocks(x, 1.0)
+    assert (again == elements).all() and (true == energy.hessian_blocks(x)[elements]).all()
+    size = np.abs(true).max(initial=0.0)
+    if size == 0:
+        assert np.abs(convex).max(initial=0.0) == 0
+        return
+    # Round-off of eigenvalues of the largest block, about 1e-15 of it each.
+    assert np.linalg.eigvalsh(convex).min() > -1e-12 * np.abs(convex).max()
+    assert np.abs(half - (true + convex) / 2).max() <= 1e-12 * np.abs(convex).max()
+
+
+@every_case
 def test_finite_differences_of_the_definition(case):
     """Central differences along random directions."""
     energy, x = case()
