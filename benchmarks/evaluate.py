@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .cell import Outcome
+from .methods import find_method
 from .metrics.curvature import CurvatureSeries, curvature_error, curvature_series
 from .metrics.energy import energy_series, mean_energy
 from .metrics.geometry import distance_rms, penetration
@@ -122,7 +123,7 @@ def rows_of(outcome: Outcome, metrics: Mapping[str, float], scene: BuiltScene | 
         base = Row(
             suite, cell.scene.name, cell.method, cell.seed, "cost/frame", "ms", None,
             outcome.status if outcome.status in ("failed", "skipped") else "failed", outcome.reason,
-            terms=terms,
+            terms=terms, dtype=find_method(cell.method).dtype,
         )  # fmt: skip
         if not metrics:
             rows.append(base)

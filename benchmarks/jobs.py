@@ -30,10 +30,11 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Trained:
-    """A trained network: wall seconds of training and size [MB]."""
+    """A trained network: wall seconds of training, size [MB] and the means of its last logged steps."""
 
     kind: str
     seed: int
+    recipe: str
     seconds: float
     megabytes: float
     steps: int
@@ -122,4 +123,4 @@ def train_network(
         )  # fmt: skip
     model.save(model_path(run.models, kind, seed))
     final = model.history[-1] if model.history else {}
-    return Trained(kind, seed, model.seconds, model.megabytes, model.steps, dict(final))
+    return Trained(kind, seed, model.recipe.name, model.seconds, model.megabytes, model.steps, dict(final))

@@ -30,6 +30,7 @@ class MethodEntry:
 
     needs_body: whether it works on dressed scenes alone. trained: the kind of network it needs, if any.
     seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
+    dtype: the numbers it computes with; trajectories and metrics are float64 in any case.
     """
 
     name: str
@@ -39,6 +40,7 @@ class MethodEntry:
     needs_body: bool = False
     trained: str | None = None
     seeded: bool = False
+    dtype: str = "float64"
 
     def skip(self, scene: Scene) -> str | None:
         """Why this method cannot do that scene, or None."""

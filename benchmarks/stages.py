@@ -153,20 +153,27 @@ class Stages:
         plan = self.plan
         assert self.wardrobe is not None
         todo = []
-        for kind, seed in plan.models:
+        # The longest first: two workers then end at about the same time.
+        models = sorted(plan.models, key=lambda model: -plan.preset.steps.get(model[0], 0))
+        for kind, seed in models:
             motions = self.targets if kind == "supervised" else list(plan.train)
             steps = plan.preset.steps.get(kind, 0)
             arguments = (kind, seed, steps, motions, plan.folder, plan.device)
             todo.append(Job(f"{kind} seed {seed}", jobs.train_network, arguments, steps))
         results = run_jobs(todo, self.wardrobe, title="training", unit="step")
         summary: dict[str, Any] = {"workers": worker_count()}
-        for (kind, seed), job, result in zip(plan.models, todo, results):
+        for (kind, seed), job, result in zip(models, todo, results):
             if isinstance(result, Failure):
                 self.untrained[kind, seed] = result.reason
                 summary[job.label] = {"failed": result.reason}
             else:
                 self.trained[kind, seed] = result
-                summary[job.label] = {"seconds": result.seconds, "steps": result.steps, "last": result.final}
+                summary[job.label] = {
+                    "recipe": result.recipe,
+                    "seconds": result.seconds,
+                    "steps": result.steps,
+                    "last": result.final,
+                }
         self.record.note("training", summary)
 
     def cells_and_metrics(self) -> list[Outcome]:

@@ -298,6 +298,9 @@ def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
     cell = Cell(SHEET, "newton-1", 0, ("garments", "speed"))
     rows = rows_of(Outcome(cell, "ok", recorded=True), {"energy/strain": 1.0, "distance/rms": np.nan}, None)
     assert [row.suite for row in rows] == ["garments", "garments", "speed", "speed"]
+    assert {row.dtype for row in rows} == {"float64"}
+    skinned = rows_of(Outcome(Cell(SHEET, "skinning", 0, ("speed",)), "ok"), {"energy/strain": 1.0}, None)
+    assert skinned[0].dtype == "float32"
     assert rows[0].value == 1.0 and rows[0].unit == "J" and rows[0].status == "ok"
     assert rows[1].value is None and rows[1].status == "failed" and "finite" in rows[1].reason
     skipped = rows_of(Outcome(cell, "skipped", "why"), {}, None)

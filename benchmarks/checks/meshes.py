@@ -13,13 +13,18 @@ def jittered_patch(cells: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     points = np.stack([i, j], -1).astype(float)
     points[1:-1, 1:-1] += random.uniform(-0.3, 0.3, (cells - 1, cells - 1, 2))
     points = points.reshape(-1, 2) / cells
+    return points, delaunay_faces(points)
+
+
+def delaunay_faces(points: np.ndarray) -> np.ndarray:
+    """Delaunay triangles (F,3) of points (V,2), counter-clockwise, without flat ones on straight borders."""
     faces = Delaunay(points).simplices.astype(np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
     signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces = faces[np.abs(signed) > 1e-9]  # Delaunay leaves flat triangles on straight borders
-    turned = signed[np.abs(signed) > 1e-9] < 0
-    faces[turned] = faces[turned][:, ::-1]
-    return points, faces
+    solid = np.abs(signed) > 1e-9
+    faces, signed = faces[solid], signed[solid]
+    faces[signed < 0] = faces[signed < 0][:, ::-1]
+    return faces
 
 
 def right_grid(rows: int, columns: int, height: float, width: float) -> tuple[np.ndarray, np.ndarray]:

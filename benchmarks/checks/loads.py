@@ -1,0 +1,38 @@
+"""A force that follows nothing: the term that loads a structure in a check."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reference_sim import Cloth
+from reference_sim.energies import Energy
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+class DeadLoad(Energy):
+    """E = -f . x for each vertex, with constant forces f (V, 3) [N]."""
+
+    name = "load"
+
+    def __init__(self, cloth: Cloth, forces: np.ndarray) -> None:
+        self.cloth = cloth
+        self.stencils = np.arange(cloth.vertex_count)[:, None]
+        self.forces = forces
+
+    def element_energy(self, u: Tensor) -> Tensor:
+        import torch
+
+        return -(torch.as_tensor(self.forces).to(u) * u[..., 0, :]).sum(-1)
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        return -float(np.vdot(self.forces, x)), -self.forces
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        return np.zeros((len(self.stencils), 3, 3))
+
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        return np.arange(0), np.zeros((0, 3, 3))
