@@ -196,6 +196,8 @@ def test_two_kinds_of_samples_do_not_disturb_each_other():
     assert again.points == pytest.approx(first.points, abs=1e-14)
     assert again.normals == pytest.approx(first.normals, abs=1e-9)
     assert np.linalg.norm(second.points - bent(rest), axis=1).max() < 1e-12
+    place = np.einsum("sa,sai->si", second.barycentric, bent(rest)[faces[second.faces]])
+    assert place == pytest.approx(second.points, abs=1e-12)
 
 
 def test_each_frame_has_its_own_surface_and_the_last_one_stays():

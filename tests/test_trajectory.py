@@ -149,6 +149,8 @@ def vtk_frames(path) -> tuple[list[float], list[np.ndarray], list[np.ndarray]]:
         mesh = reader.GetOutputDataObject(0)
         assert mesh.GetClassName() == "vtkPolyData" and mesh.GetNumberOfPolys() == len(FACES)
         assert mesh.GetNumberOfCells() == len(FACES)
+        offsets = vtk_to_numpy(mesh.GetPolys().GetOffsetsArray())
+        assert offsets.tolist() == list(range(0, 3 * len(FACES) + 1, 3))
         times.append(reader.GetTimeValue())
         points.append(vtk_to_numpy(mesh.GetPoints().GetData()).copy())
         faces.append(vtk_to_numpy(mesh.GetPolys().GetConnectivityArray()).reshape(-1, 3).copy())
