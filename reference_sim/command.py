@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 import sys
-import warnings
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -36,16 +35,14 @@ class InputError(ValueError):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     options = make_parser().parse_args(arguments)
-    with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: _say(f"note: {message}")  # type: ignore[assignment]
-        try:
-            return _run(options)
-        except (ValueError, OSError) as error:
-            print(f"simulate: {' '.join(str(error).split())}", file=sys.stderr)
-            return BAD_INPUT
-        except KeyboardInterrupt:
-            print(f"simulate: interrupted; --resume goes on from {options.output}", file=sys.stderr)
-            return INTERRUPTED
+    try:
+        return _run(options)
+    except (ValueError, OSError) as error:
+        print(f"simulate: {' '.join(str(error).split())}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print(f"simulate: interrupted; --resume goes on from {options.output}", file=sys.stderr)
+        return INTERRUPTED
 
 
 def _run(options: Namespace) -> int:
@@ -56,7 +53,11 @@ def _run(options: Namespace) -> int:
     if frames is None:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else DEFAULT_FRAMES
     from .simulator import simulate
+    from .summary import predicted_stretch, summary
 
+    stretch, note = predicted_stretch(cloth)
+    if note:
+        _say(f"note: {note}")
     if options.resume and not options.output.exists():
         _say(f"note: {options.output} does not exist yet: starting at the beginning")
     trajectory = simulate(
@@ -78,9 +79,8 @@ def _run(options: Namespace) -> int:
 
         written += write_point_cache(options.pc2, trajectory)
     if not options.quiet:
-        from .summary import summary
-
-        _say(summary(trajectory, cloth, obstacle, frames=frames))
+        _say(summary(trajectory, obstacle, frames=frames))
+        _say(stretch)
         _say(f"wrote      {', '.join(map(str, written))}")
     whole = trajectory.frames == frames and trajectory.status == "converged"
     return DONE if whole else NOT_CONVERGED
@@ -201,8 +201,8 @@ def _read_obstacle(cloth: Cloth, options: Namespace) -> Obstacle | None:
         _say(f"note: the garment starts {distance.min():.2g} m from the obstacle: same units and up axis?")
     elif (inside := distance < 0).any():
         _say(
-            f"note: the garment starts with {inside.sum()} of {len(inside)} vertices inside the obstacle, vertex "
-            f"{distance.argmin()} {-1e3 * distance.min():.0f} mm deep"
+            f"note: the garment starts with {inside.sum()} of {len(inside)} vertices inside the obstacle, "
+            f"vertex {distance.argmin()} {-1e3 * distance.min():.0f} mm deep"
         )
     return obstacle
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from .cloth import Cloth
@@ -9,37 +11,41 @@ from .obstacle import Obstacle
 from .trajectory import Trajectory
 
 
-def summary(trajectory: Trajectory, cloth: Cloth, obstacle: Obstacle | None, *, frames: int) -> str:
-    """Convergence, energies [J] and depth [mm] at the last frame, predicted stretch, time.
+def predicted_stretch(cloth: Cloth) -> tuple[str, str]:
+    """What its own weight does to a strip as long as this cloth, in words; and the warning, if one is due."""
+    size = np.ptp(cloth.rest_positions, axis=0)
+    length = float(size[1] or size.max())
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        stretch = cloth.material.self_weight_stretch(length)
+    line = f"stretch    {stretch:.2%} predicted at the top of {length:.3g} m of this cloth under its weight"
+    return line, "".join(str(warning.message) for warning in caught)
+
+
+def summary(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int) -> str:
+    """Convergence, energies [J] and depth [mm] at the last frame, time.
 
     Args:
         trajectory: of `simulate`.
+        obstacle: what it met.
         frames: how many were asked for.
     """
     fields = trajectory.frame_fields
-    converged = int(fields["converged"].sum())
-    lines = [f"frames     {converged} of {frames} converged"]
+    lines = [f"frames     {trajectory.frames} of {frames}"]
     if trajectory.frames > 1:
-        lines[0] += f"; worst gradient {np.nanmax(fields['gradient_norm']):.1e} mean vertex weights"
-        energies = [
-            f"{name.split('/')[1]} {values[-1]:.3g}"
-            for name, values in fields.items()
-            if name.startswith("energy/")
-        ]
-        lines.append(f"energies   {', '.join(energies)} J at the last frame")
+        converged, worst = int(fields["converged"][1:].sum()), np.nanmax(fields["gradient_norm"])
+        lines[0] += (
+            f"; {converged} of {frames - 1} steps converged, worst gradient {worst:.1e} vertex weights"
+        )
     if trajectory.status != "converged":
         lines.append(f"first not  {trajectory.status}: {trajectory.reason}")
-    height = float(np.ptp(cloth.rest_positions[:, 1])) or float(np.ptp(cloth.rest_positions, axis=0).max())
-    stretch = cloth.material.self_weight_stretch(height)
-    lines.append(
-        f"stretch    {stretch:.2%} predicted at the top of {height:.3g} m of this cloth under its weight"
-    )
+    if trajectory.frames > 1:
+        energies = [f"{name[7:]} {fields[name][-1]:.3g}" for name in fields if name.startswith("energy/")]
+        lines.append(f"energies   {', '.join(energies)} J at the last frame")
     if obstacle is not None:
         distance = obstacle.signed_distance(trajectory.positions[-1], trajectory.frames - 1)
-        deepest = 1e3 * max(-float(distance.min()), 0.0)
-        lines.append(
-            f"obstacle   {(distance < 0).mean():.2%} of vertices inside, deepest {deepest:.1f} mm, last frame"
-        )
+        share, depth = (distance < 0).mean(), 1e3 * max(-float(distance.min()), 0.0)
+        lines.append(f"obstacle   {share:.2%} of vertices inside, deepest {depth:.1f} mm, at the last frame")
     if trajectory.frames > 1:
         seconds = trajectory.frame_seconds[1:]
         lines.append(f"time       {seconds.sum():.1f} s, {1e3 * np.median(seconds):.0f} ms a frame (median)")
