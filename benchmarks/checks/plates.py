@@ -32,8 +32,8 @@ def plate_stiffness(family: str, scaling: str) -> float:
     if family == "delaunay":
         energy, area = _bent(family, scaling, 48, 1.0)
         return 2 * energy / area
-    small, middle, large = (_bent(family, scaling, n, height)[0] for n in (8, 12, 16))
-    return 2 * (small - 2 * middle + large) / 32 / height
+    small, middle, large = (_bent(family, scaling, n, height)[0] for n in (16, 24, 32))
+    return 2 * (small - 2 * middle + large) / 128 / height
 
 
 def _bent(family: str, scaling: str, cells: int, height: float) -> tuple[float, float]:
