@@ -42,7 +42,7 @@ class ContactFriction(Energy):
         self.anchors = np.zeros((count, 3))  # where each sample would be if it stuck to the skin
         self.normals = np.zeros((count, 3))
         self.threshold = self.speed / 30
-        self._last: tuple[np.ndarray, np.ndarray] | None = None
+        self._last: tuple[int, np.ndarray, np.ndarray] | None = None
 
     def parameters(self) -> dict[str, Any]:
         return {"coefficient": self.coefficient, "speed_m_per_s": self.speed}
@@ -52,8 +52,8 @@ class ContactFriction(Energy):
         planes = self.contact.planes
         samples = self.contact.sample_matrix @ step.previous
         depth = np.zeros(len(samples))
-        if self._last is not None:
-            points, normals = self._last
+        if self._last is not None and self._last[0] == step.frame - 1:  # not left over from another run
+            _, points, normals = self._last
             gap = np.einsum("si,si->s", normals, samples - points)
             depth = np.maximum(self.contact.margin - gap, 0.0)
         self.forces = self.coefficient * 3 * self.contact.stiffness * depth**2
@@ -61,7 +61,7 @@ class ContactFriction(Energy):
         skin_motion = planes.points - np.einsum("sa,sai->si", planes.barycentric, corners)
         self.anchors, self.normals = samples + skin_motion, planes.normals
         self.threshold = self.speed * step.dt
-        self._last = (planes.points, planes.normals)
+        self._last = (step.frame, planes.points, planes.normals)
 
     def element_energy(self, u: Tensor) -> Tensor:
         import torch
