@@ -38,17 +38,21 @@ class Cloth:
     rest_uv: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        positions = np.ascontiguousarray(self.rest_positions, dtype=np.float64)
+        # Copies: what is computed from them once must not change with the caller's arrays.
+        positions = np.array(self.rest_positions, dtype=np.float64, order="C")
         faces = np.asarray(self.faces)
         check_mesh(positions, faces)
-        faces = np.ascontiguousarray(faces, dtype=np.int64)
-        pins = np.unique(np.asarray(self.pins, dtype=np.int64))
+        faces = np.array(faces, dtype=np.int64, order="C")
+        pins = np.asarray(self.pins)
+        if pins.size and not np.issubdtype(pins.dtype, np.integer):
+            raise MeshError(f"pins are {pins.dtype}: give the indices of the pinned vertices")
+        pins = np.unique(pins).astype(np.int64)
         if pins.size and (pins[0] < 0 or pins[-1] >= len(positions)):
             bad = pins[0] if pins[0] < 0 else pins[-1]
             raise MeshError(f"pin {bad} is no vertex of 0..{len(positions) - 1}")
         uv = self.rest_uv
         if uv is not None:
-            uv = np.ascontiguousarray(uv, dtype=np.float64)
+            uv = np.array(uv, dtype=np.float64, order="C")
             if uv.shape != (len(positions), 2) or not np.isfinite(uv).all():
                 raise MeshError(f"rest_uv has shape {uv.shape}: expected finite ({len(positions)}, 2)")
         for name, value in (("rest_positions", positions), ("faces", faces), ("pins", pins), ("rest_uv", uv)):

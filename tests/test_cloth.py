@@ -93,6 +93,19 @@ def test_pins_are_sorted_and_single():
     assert Cloth(x, faces, pins=[5, 0, 5]).pins.tolist() == [0, 5]
 
 
+def test_a_cloth_keeps_its_rest_state_when_the_callers_arrays_change():
+    x, faces = grid(2, 2)
+    uv = x[:, [0, 2]].copy()
+    cloth, plain = Cloth(x, faces, rest_uv=uv), Cloth(x.copy(), faces.copy())
+    x += 1.0
+    uv *= 2.0
+    faces[:] = 0
+    assert (cloth.rest_positions == plain.rest_positions).all() and (cloth.faces == plain.faces).all()
+    assert cloth.areas == pytest.approx(plain.areas) and cloth.edge_lengths == pytest.approx(
+        plain.edge_lengths
+    )
+
+
 def moved(index: int, to: tuple[float, float, float]) -> np.ndarray:
     x = KITE.copy()
     x[index] = to
@@ -120,6 +133,8 @@ REFUSED = [
     ("winding", KITE, np.array([(0, 1, 2), (0, 1, 3)]), {}, "faces 0 and 1 walk edge (0, 1) the same way"),
     ("pin too high", KITE, KITE_FACES, {"pins": [1, 4]}, "pin 4 is no vertex"),
     ("negative pin", KITE, KITE_FACES, {"pins": [-1]}, "pin -1 is no vertex"),
+    ("pins as a mask", KITE, KITE_FACES, {"pins": [True, False, False, True]}, "pins are bool"),
+    ("pins as numbers", KITE, KITE_FACES, {"pins": [0.5]}, "pins are float64"),
     ("shape of uv", KITE, KITE_FACES, {"rest_uv": KITE}, "rest_uv has shape (4, 3)"),
     ("uv not finite", KITE, KITE_FACES, {"rest_uv": NAN_UV}, "rest_uv"),
     ("uv of zero area", KITE, KITE_FACES, {"rest_uv": FLAT_UV}, "face 1"),
