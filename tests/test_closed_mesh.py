@@ -35,7 +35,10 @@ def test_closed_surfaces_pass():
     check_closed(np.stack([BALL, 2 * BALL]), FACES)
     two = np.concatenate([BALL, BALL + np.array([5, 0, 0])])
     check_closed(two[None], np.concatenate([FACES, FACES + len(BALL)]))
-    check_closed(BALL[None] + 1e4, FACES)  # far from the origin the volume must not drown
+    far = (0.001 * BALL + 1e5 * np.array([1.0, 2.0, 3.0]))[None]
+    check_closed(far, FACES)  # a small volume far from the origin must not drown in round-off
+    with pytest.raises(MeshError, match="inside out"):
+        check_closed(far, FACES[:, ::-1])
 
 
 @pytest.mark.parametrize(
