@@ -60,6 +60,6 @@ def _check_shape(corner: np.ndarray, frame: int) -> None:
     if not area.min() > SLIVER * area.mean():
         raise MeshError(f"obstacle face {int(area.argmin())} has no area in frame {frame}: remove it")
     if frame == 0:
-        volume = np.einsum("fi,fi->", corner[:, 0] - corner[0, 0], normal) / 6
+        volume = np.einsum("fi,fi->", corner[:, 0], normal) / 6
         if not volume > 0:
             raise MeshError(f"obstacle is inside out (volume {volume:.3g} m^3): reverse its faces")
