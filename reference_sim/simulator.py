@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,7 +43,7 @@ def simulate(
     path: str | Path | None = None,
     resume: bool = False,
     progress: str | None = None,
-    **options: float,
+    **options: Any,
 ) -> Trajectory:
     """Simulate `frames` frames, the start included.
 
@@ -66,7 +66,7 @@ def simulate(
             frames may be asked for); without such a file start at the beginning. The same bits come out as
             without the interruption.
         progress: label of a progress bar with time left; None for silence.
-        options: of the minimiser (tolerance, max_iterations, timeout).
+        options: of the minimiser: method ("newton", the default, or "lbfgs"), tolerance, max_iterations, ...
 
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the first other status; a

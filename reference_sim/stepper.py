@@ -11,7 +11,7 @@ import numpy as np
 
 from .cloth import Cloth
 from .energies.energy import Energy, Step
-from .minimise import Newton, Result
+from .minimise import Minimiser, Result, make_minimiser
 from .potential import Potential
 from .resume import Past, fingerprint
 from .trajectory import TrajectoryError
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from .obstacle import Obstacle
 
 GUESSES = ("previous", "extrapolated", "carried")
-MAX_APPROACHES = 30  # minimisations on the way of an obstacle within one step
+MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
+LEAST_GAIN = 2e-3  # of that way, by three of them together; less is no way
+PART = 0.8  # of the way to the next touch: closer, a barrier grows stiff
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ class Stepper:
         self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refined(substeps)
         self.quasi_static, self.options = quasi_static, options
         self.potential = Potential([*energies, Inertia(cloth, self.dt)])
-        self.newton = Newton(self.potential, **options)
+        self.minimiser = make_minimiser(self.potential, **options)
         self._started = False
 
     def advance(self, frame: int, state: State, pins: np.ndarray | None) -> tuple[State | None, list[Result]]:
@@ -137,7 +139,8 @@ class Stepper:
                 raise ValueError(f"simulate: the start is not free of intersections: {objection}")
             self._started = True
         motion, goal, progress = guess - x, guess, 0.0
-        for _ in range(MAX_APPROACHES):
+        reached = [0.0]
+        while len(reached) <= MAX_APPROACHES:
             shares: list[float] = []
             for free_too in (True, False):
                 if not free_too:
@@ -146,25 +149,29 @@ class Stepper:
                 share = potential.clear_way(x, goal, progress)
                 if share == 1:
                     potential.set_progress(1.0)
-                    return self.newton.minimise(goal)
+                    return self.minimiser.minimise(goal)
                 if share >= max(shares, default=0.0):
-                    x, progress = x + share * (goal - x), progress + share * (1 - progress)
+                    part = PART * share
+                    x, progress = x + part * (goal - x), progress + part * (1 - progress)
                 shares.append(share)
             potential.set_progress(progress)
             x = self.rough.minimise(x).positions
             goal = x + (1 - progress) * motion
             goal[pins] = guess[pins]
-        result = self.newton.minimise(x)
+            reached.append(progress)
+            if progress - reached[max(len(reached) - 4, 0)] < LEAST_GAIN and len(reached) > 3:
+                break
+        result = self.minimiser.minimise(x)
         if result.status == "diverged":
             return result
         reason = f"no way without intersection: pins and obstacle came {progress:.1%} of theirs"
         return replace(result, status="stalled", reason=reason)
 
     @cached_property
-    def rough(self) -> Newton:
+    def rough(self) -> Minimiser:
         """What makes room half-way: a few iterations."""
         options: dict[str, Any] = self.options | {"max_iterations": 8, "tolerance": 1e-2}
-        return Newton(self.potential, **options)
+        return make_minimiser(self.potential, **options)
 
     def first_fields(self, x: np.ndarray) -> dict[str, float]:
         """The fields of frame 0, which nobody minimised."""
@@ -180,7 +187,7 @@ class Stepper:
     def provenance(self) -> dict[str, Any]:
         cloth, obstacle = self.cloth, self.obstacle
         return {
-            "method": "backward Euler, Newton",
+            "method": "backward Euler",
             "dt_s": self.frame_dt,
             "substeps": self.substeps,
             "guess": self.guess,

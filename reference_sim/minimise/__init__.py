@@ -1,6 +1,6 @@
 """Minimisers of a Potential: same call, same result type, one file each."""
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -22,14 +22,14 @@ class Minimiser(Protocol):
         ...
 
 
-def make_minimiser(potential: Potential, method: str = "newton", **options: float) -> Minimiser:
+def make_minimiser(potential: Potential, method: str = "newton", **options: Any) -> Minimiser:
     """A minimiser by name ("newton" or "lbfgs") with its options; raises ValueError for an unknown name."""
     if method not in METHODS:
         raise ValueError(f"unknown minimiser {method!r}: choose one of {', '.join(METHODS)}")
-    return METHODS[method](potential, **options)  # type: ignore[arg-type]
+    return METHODS[method](potential, **options)
 
 
-def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **options: float) -> Result:
+def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **options: Any) -> Result:
     """Minimise `potential` from x0 (V, 3) [m]; pinned vertices stay where x0 has them.
 
     Options are those of the method's class. Failure is a status in the result, not an exception.

@@ -1,0 +1,1 @@
+"""How fast the reference simulator is, and what of: one command, `python -m benchmarks.solver_speed`."""
