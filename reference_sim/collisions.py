@@ -17,6 +17,7 @@ import numpy as np
 from .cloth import Cloth
 
 ROOM = 0.05  # [m] between the cloth and the sides of the box
+NO_OBSTACLE = (np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
 
 
 @dataclass(frozen=True)
@@ -60,17 +61,16 @@ class Collisions:
         self.cloth, self.distance, self.self_contact = cloth, float(distance), self_contact
         self._slack = self.distance / 2  # how far vertices may move before candidates are searched again
         self._ccd = self.package.AdditiveCCD()
-        self._obstacle_faces = np.zeros((0, 3), dtype=np.int64)
-        self._before = self._after = np.zeros((0, 3))
-        self._near: NearMesh | None = None
-        self.place(1.0)
+        self.begin(*NO_OBSTACLE)
 
-    def set_obstacle(self, faces: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
-        """An obstacle with faces (Fb, 3) that moves from before to after (B, 3) [m]; it is put at the end."""
-        old = (self._obstacle_faces, self._before, self._after)
+    def begin(self, faces: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
+        """Begin a step in which an obstacle (faces (Fb, 3)) moves from before to after (B, 3) [m].
+
+        It is put at the end. Nothing is kept from the step before, so that sums have one order, whatever
+        was asked earlier, and a run taken up again gives the same bits.
+        """
         self._obstacle_faces, self._before, self._after = faces, before, after
-        if not all(map(np.array_equal, (faces, before, after), old)):
-            self._near = None
+        self._near: NearMesh | None = None
         self.place(1.0)
 
     def place(self, progress: float) -> None:

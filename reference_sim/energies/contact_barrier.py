@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..cloth import Cloth
-from ..collisions import Collisions
+from ..collisions import NO_OBSTACLE, Collisions
 from .energy import Energy, Step
 
 if TYPE_CHECKING:
@@ -94,13 +94,13 @@ class ContactBarrier(Energy):
         way to its place goes on from where it stopped.
         """
         if step.obstacle is None:
-            self.collisions.place(1.0)
+            self.collisions.begin(*NO_OBSTACLE)
             return
         after = step.obstacle.at(step.frame)
         before = step.obstacle.at(max(step.frame - 1, 0))
         if self._seen == (step.obstacle, step.frame - 1) and self.collisions.progress < 1:
             before = self.collisions.obstacle_at(self.collisions.progress)
-        self.collisions.set_obstacle(step.obstacle.faces, before, after)
+        self.collisions.begin(step.obstacle.faces, before, after)
         self._seen = (step.obstacle, step.frame)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
