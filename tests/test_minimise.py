@@ -217,6 +217,17 @@ def test_an_unpinned_cloth_finds_its_rest_shape_somewhere(rest_angles):
 
 
 @both
+def test_both_methods_bring_an_unpinned_cloth_to_a_minimum(method):
+    x, faces = patch(1)
+    cloth = Cloth(x, faces)
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth)])
+    x0 = x + np.random.default_rng(1).normal(0, 0.02, x.shape)
+    result = minimise(potential, x0, method)
+    assert_minimum(potential, x0, result)
+    assert result.energy < 1e-9 * potential.value(x0)
+
+
+@both
 def test_at_rest_there_is_nothing_to_do(method):
     cloth = Cloth(SHEET, FACES, pins=SIDES)
     result = minimise(Potential([StretchStVK(cloth), BendHinge(cloth)]), SHEET, method)

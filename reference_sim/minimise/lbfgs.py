@@ -16,7 +16,7 @@ import numpy as np
 from ..linear_solver import analyse
 from ..material import GRAVITY
 from ..potential import Potential
-from .newton import SUFFICIENT_DECREASE, Newton
+from .newton import FIRST_SHIFT, SUFFICIENT_DECREASE, Newton
 from .result import Result
 
 
@@ -58,6 +58,8 @@ class LBFGS:
             raise ValueError("LBFGS: no term of this potential has a scalar stiffness to precondition with")
         self._pattern = potential.pattern(free, block=1)
         self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
+        # Without inertia and pins rigid motions would leave the preconditioner singular.
+        self._floor = FIRST_SHIFT * cloth.masses[self._free] * 30**2
         self._weight = float(cloth.masses.mean() * GRAVITY)
         self._newton = Newton(potential, tolerance=tolerance, timeout=timeout) if finish else None
 
@@ -120,6 +122,7 @@ class _Run:
     def precondition(self) -> bool:
         start = time.perf_counter()
         data = self.o._pattern.assemble(self.x)
+        data[self.o._pattern.diagonal] += self.o._floor
         middle = time.perf_counter()
         done = self.o._solver.factorise(data)
         self.factorisations += 1
