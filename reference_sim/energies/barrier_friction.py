@@ -60,7 +60,13 @@ class BarrierFriction(Energy):
         )
 
     def prepare(self, step: Step) -> None:
-        """Pairs, forces and places at the start of the step."""
+        """Pairs, forces and places at the start of the step.
+
+        Raises:
+            ValueError: the barrier was not prepared for this step: it must come first among the terms.
+        """
+        if self.barrier.step is not step:
+            raise ValueError("BarrierFriction comes before its ContactBarrier: list the barrier first")
         collisions = self.barrier.collisions
         collisions.place(0.0)
         pairs, self._near, self._start = collisions.pairs(step.previous)

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
     from torch import Tensor
 
-    from ..obstacle import Obstacle
-
 DEFAULT_DISTANCE = 2e-3  # [m]
 DEFAULT_STIFFNESS = 1e2  # [Pa]; measured: a tenth of it saves nothing, a hundred times it doubles Newton
 
@@ -71,7 +69,7 @@ class ContactBarrier(Energy):
         self.collisions = Collisions(cloth, distance, self_contact=self_contact)
         ipctk = self.collisions.package
         self.potential = ipctk.BarrierPotential(self.distance, self.stiffness, use_physical_barrier=True)
-        self._seen: tuple[Obstacle | None, int] = (None, -1)
+        self.step: Step | None = None
 
     def parameters(self) -> dict[str, Any]:
         return {
@@ -93,15 +91,15 @@ class ContactBarrier(Energy):
         Its start is where the step before left it, if that was the frame before: an obstacle that found no
         way to its place goes on from where it stopped.
         """
+        last, self.step = self.step, step
         if step.obstacle is None:
             self.collisions.begin(*NO_OBSTACLE)
             return
         after = step.obstacle.at(step.frame)
         before = step.obstacle.at(max(step.frame - 1, 0))
-        if self._seen == (step.obstacle, step.frame - 1) and self.collisions.progress < 1:
+        if last and last.obstacle is step.obstacle and last.frame == step.frame - 1:
             before = self.collisions.obstacle_at(self.collisions.progress)
         self.collisions.begin(step.obstacle.faces, before, after)
-        self._seen = (step.obstacle, step.frame)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         if not np.isfinite(x).all():
