@@ -70,6 +70,8 @@ class ContactBarrier(Energy):
         ipctk = self.collisions.package
         self.potential = ipctk.BarrierPotential(self.distance, self.stiffness, use_physical_barrier=True)
         self.step: Step | None = None
+        self._hessians_of: tuple | None = None
+        self._hessians: dict[str, sp.csc_matrix] = {}
 
     def parameters(self) -> dict[str, Any]:
         return {
@@ -109,14 +111,23 @@ class ContactBarrier(Energy):
         return self.potential(pairs, near.mesh, positions), gradient.reshape(-1, 3)[: len(x)]
 
     def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
-        pairs, near, positions = self.collisions.pairs(x)
-        method = self.collisions.package.PSDProjectionMethod
-        hessian = self.potential.hessian(pairs, near.mesh, positions, method.NONE)
-        if convexity > 0:
-            convex = self.potential.hessian(pairs, near.mesh, positions, method.CLAMP)
-            hessian = (1 - convexity) * hessian + convexity * convex
-        size = 3 * len(x)
-        return hessian[:, :size][:size]
+        if convexity == 0:
+            return self._hessian(x, "NONE")
+        if convexity == 1:
+            return self._hessian(x, "CLAMP")
+        return (1 - convexity) * self._hessian(x, "NONE") + convexity * self._hessian(x, "CLAMP")
+
+    def _hessian(self, x: np.ndarray, projection: str) -> sp.csc_matrix:
+        """(3V, 3V), with the negative eigenvalues of each pair or without; kept while x stays."""
+        found = self.collisions.pairs(x)
+        if self._hessians_of is not found:
+            self._hessians_of, self._hessians = found, {}
+        if projection not in self._hessians:
+            pairs, near, positions = found
+            method = getattr(self.collisions.package.PSDProjectionMethod, projection)
+            hessian, size = self.potential.hessian(pairs, near.mesh, positions, method), 3 * len(x)
+            self._hessians[projection] = hessian[:, :size][:size]
+        return self._hessians[projection]
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
         return self.collisions.free_share(x, direction) if np.isfinite(direction).all() else 1.0
