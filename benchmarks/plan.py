@@ -171,7 +171,8 @@ def choose_cells(
                     key = (scene, method, seed)
                     before = found[key].suites if key in found else ()
                     found[key] = Cell(declared[scene], method, seed, (*before, suite))
-    checks = _matching(CHECKS, scenes, "validation" in suites and _named(VALIDATION_METHOD, methods))
+    known = [check for check in CHECKS if check.smoke or scenes or preset.name != "smoke"]
+    checks = _matching(known, scenes, "validation" in suites and _named(VALIDATION_METHOD, methods))
     cases = _matching(CASES, scenes, "extremes" in suites and _named(EXTREMES_METHOD, methods))
     if not (found or checks or cases):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")

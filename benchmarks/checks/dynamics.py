@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
-from reference_sim import Cloth, Material, Potential, Trajectory, simulate
-from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
+from reference_sim import Cloth, Material, Potential, Trajectory, minimise, simulate
+from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 
 from ..presets import find_preset
 from ..scenes import free_fall as fall
@@ -13,6 +15,7 @@ from ..scenes import hanging_sheet
 from .meshes import in_space, jittered_patch, right_grid
 
 DT = 1.0 / 30.0
+SPACING = 0.015  # [m] of the sheet that takes one step
 
 
 def free_fall() -> float:
@@ -54,6 +57,31 @@ def momentum_balance() -> float:
 
     Strain and bending are internal: their forces sum to zero.
     """
+    trajectory, cloth = _thrown_sheet()
+    velocities = np.diff(trajectory.positions, axis=0) / DT
+    momentum = np.einsum("v,tvi->ti", cloth.masses, velocities)
+    weight = Gravity(cloth).weights.sum()
+    errors = np.diff(momentum, axis=0) - [0.0, -DT * weight, 0.0]
+    return float(np.abs(errors).max() / (DT * weight))
+
+
+def angular_momentum_balance() -> float:
+    """Largest error of L' = L - dt sum m v x v' + dt tau(x') over the same steps, over the largest |L|.
+
+    Backward Euler loses angular momentum by the second term; strain and bending have no torque.
+    """
+    trajectory, cloth = _thrown_sheet()
+    x, m = trajectory.positions, cloth.masses
+    v = np.diff(x, axis=0) / DT
+    L = np.einsum("v,tvi->ti", m, np.cross(x[1:], v))
+    lost = np.einsum("v,tvi->ti", m, np.cross(v[:-1], v[1:]))
+    torque = np.cross(x[2:], [0.0, -1.0, 0.0]) * Gravity(cloth).weights[:, None]
+    errors = np.diff(L, axis=0) + DT * lost - DT * torque.sum(axis=1)
+    return float(np.abs(errors).max() / np.abs(L).max())
+
+
+@cache
+def _thrown_sheet() -> tuple[Trajectory, Cloth]:
     points, faces = jittered_patch(6)
     cloth = Cloth(0.3 * in_space(points), faces, Material())
     random = np.random.default_rng(2)
@@ -67,11 +95,46 @@ def momentum_balance() -> float:
         velocity=random.normal(0, 0.5, start.shape),
     )
     _require_converged(trajectory)
-    velocities = np.diff(trajectory.positions, axis=0) / DT
-    momentum = np.einsum("v,tvi->ti", cloth.masses, velocities)
-    weight = Gravity(cloth).weights.sum()
-    errors = np.diff(momentum, axis=0) - [0.0, -DT * weight, 0.0]
-    return float(np.abs(errors).max() / (DT * weight))
+    return trajectory, cloth
+
+
+def unique_step() -> float:
+    """Largest distance [m] between the ends of one step from two random starts, under the convexity bound.
+
+    The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter than
+    h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
+    """
+    first, second = _step_from_random_starts(0.9)
+    return float(np.linalg.norm(first - second, axis=1).max())
+
+
+def ambiguous_step() -> float:
+    """The same distance [m] at 1/30 s, far above the bound: how much two honest solvers may differ."""
+    material = Material()
+    bound = SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
+    first, second = _step_from_random_starts(DT / bound)
+    return float(np.linalg.norm(first - second, axis=1).max())
+
+
+def _step_from_random_starts(share: float) -> list[np.ndarray]:
+    """Ends of one step of `share` times the bound, thrown into disorder, from two guesses far off."""
+    material = Material()
+    cells = 12
+    points, faces = right_grid(cells, cells, cells * SPACING, cells * SPACING)
+    cloth = Cloth(in_space(points), faces, material)
+    dt = share * SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
+    inertia = Inertia(cloth, dt)
+    random = np.random.default_rng(5)
+    inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)
+    potential = Potential([StretchStVK(cloth), inertia])
+    ends = []
+    for _ in range(2):
+        start = random.uniform(-SPACING * cells, SPACING * cells, cloth.rest_positions.shape)
+        result = minimise(potential, start, tolerance=1e-12)
+        if result.status != "converged":
+            raise RuntimeError(f"the step did not converge: {result.reason}")
+        ends.append(result.positions)
+    return ends
 
 
 def energy_inequality() -> float:
@@ -86,9 +149,7 @@ def energy_inequality() -> float:
     return _largest_rise(trajectory, scene.cloth, scene.energies, scene.dt)
 
 
-def _largest_rise(
-    trajectory: Trajectory, cloth: Cloth, energies: tuple[Energy, ...], dt: float
-) -> float:
+def _largest_rise(trajectory: Trajectory, cloth: Cloth, energies: tuple[Energy, ...], dt: float) -> float:
     potential = Potential(energies)
     x = trajectory.positions
     phi = np.array([potential.value(frame) for frame in x])

@@ -31,7 +31,7 @@ SYMMETRIC = ("cross", "union_jack", "equilateral", "delaunay")
 
 @dataclass(frozen=True)
 class Strip:
-    """A horizontal strip of 1 m, clamped at x = 0: its cloth, the cell size [m] and its plate stiffness D [J]."""
+    """A horizontal strip of 1 m, clamped at x = 0; cell and width [m], plate stiffness D [J]."""
 
     cloth: Cloth
     cell: float
@@ -41,7 +41,7 @@ class Strip:
 
 @cache
 def strip(family: str) -> Strip:
-    """The two pinned columns lie half a cell to each side of the clamp: there the first hinge's share begins."""
+    """Two pinned columns, half a cell to each side of the clamp: there the first hinge's share begins."""
     h = 1 / (COLUMNS - 0.5)
     width = ROWS * h * (ROW if family == "equilateral" else 1.0)
     points, faces = rectangle(family, COLUMNS, ROWS, COLUMNS * h, width)
@@ -130,7 +130,7 @@ def end_loaded(load: float) -> float:
 
 
 def one_sided_diagonals(gamma: float) -> float:
-    """The same for the family whose diagonals all lean one way: as it bends it twists, so it is no elastica."""
+    """The same where all diagonals lean one way: such a strip twists as it bends, so it is no elastica."""
     return _miss("right", gamma, 0.0)
 
 
