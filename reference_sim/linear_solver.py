@@ -21,7 +21,7 @@ class LinearSolver(Protocol):
         ...
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the last successful factorisation: b (n,) or (n, k), same shape back."""
+        """Solve with the last factorisation, which succeeded: b (n,) or (n, k), same shape back."""
         ...
 
 

@@ -42,7 +42,7 @@ class Obstacle:
         faces: (F, 3) outward wound.
         rest_positions: (B, 3) [m], the obstacle in the pose in which the cloth was made. With it, a cloth
             sample only ever meets faces whose rest centroid lies within `region` of the sample's own rest
-            position: without that rule arms grab the shirt and legs catch the hem.
+            position (the whole mesh, where there is none): without that rule arms grab the shirt and legs catch the hem.
         region: radius of that rule [m].
 
     Raises:
@@ -147,6 +147,9 @@ class Obstacle:
             far = np.flatnonzero(np.einsum("si,si->s", offset, offset) > self.region**2)
             rest = (rest_points, self.rest_centroids, self.region)
             _closest_allowed(points, far, *rest, vertices, self.faces, face, nearest)
+            lost = np.flatnonzero(face < 0)
+            if lost.size:
+                face[lost], nearest[lost] = self._closest(points[lost], frame, reachable=False)
         return face, nearest, _barycentric(nearest, vertices[self.faces[face]])
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
@@ -218,12 +221,13 @@ def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 def _closest_allowed(points, which, rest_points, rest_centroids, region, vertices, faces, face, nearest):
     """For the samples `which`, replace face and nearest by the closest among allowed faces.
 
-    A sample with no allowed face at all keeps its global answer.
+    A sample with no allowed face at all gets face -1.
     """
     best_point = np.empty(3)
     q = np.empty(3)
     for s in which:
         best = np.inf
+        face[s] = -1
         for f in range(faces.shape[0]):
             dx = rest_centroids[f, 0] - rest_points[s, 0]
             dy = rest_centroids[f, 1] - rest_points[s, 1]

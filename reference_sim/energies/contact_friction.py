@@ -48,7 +48,8 @@ class ContactFriction(Energy):
         return {"coefficient": self.coefficient, "speed_m_per_s": self.speed}
 
     def prepare(self, step: Step) -> None:
-        assert step.obstacle is not None and self.contact.planes is not None
+        if step.obstacle is None or self.contact.planes is None:
+            raise ValueError("ContactFriction needs an obstacle, and its ContactPenalty before it in the terms")
         planes = self.contact.planes
         samples = self.contact.sample_matrix @ step.previous
         depth = np.zeros(len(samples))
