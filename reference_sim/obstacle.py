@@ -42,7 +42,8 @@ class Obstacle:
         faces: (F, 3) outward wound.
         rest_positions: (B, 3) [m], the obstacle in the pose in which the cloth was made. With it, a cloth
             sample only ever meets faces whose rest centroid lies within `region` of the sample's own rest
-            position (the whole mesh, where there is none): without that rule arms grab the shirt and legs catch the hem.
+            position (the whole mesh, where there is none): without that rule arms grab the shirt and legs
+            catch the hem.
         region: radius of that rule [m].
 
     Raises:
