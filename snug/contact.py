@@ -89,12 +89,12 @@ class Patch:
         """Closest allowed body point of each sample in one frame.
 
         points (S, 3), positions (P, 3) of the patch [m], anchor_faces (S,) where to look first
-        -> faces (S,) int32, barycentric (S, 3) float32. The search starts at the nearest of the old anchor
-        and of the sample's seeds and walks down the surface; it is exact but for local minima between two
-        seeds.
+        -> faces (S,) int32, barycentric (S, 2) float32 of the second and third corner.
+        The search starts at the nearest of the old anchor and of the sample's seeds and walks down the
+        surface; it is exact but for local minima between two seeds.
         """
         faces = np.empty(len(points), np.int32)
-        barycentric = np.empty((len(points), 3), np.float32)
+        barycentric = np.empty((len(points), 2), np.float32)
         _search(
             points, positions, self.sample_rest, self.rest, self.centroids, self.faces, anchor_faces,
             *self.neighbours, *self.incident, *self.seeds, self.region**2, faces, barycentric,
@@ -102,8 +102,12 @@ class Patch:
         return faces, barycentric
 
     def normals(self, positions: np.ndarray) -> np.ndarray:
-        """Area-weighted vertex normals, unit length: positions (N, P, 3) float32 -> (N, P, 3)."""
-        normals = np.zeros_like(positions)
+        """Area-weighted vertex normals: positions (N, P, 3) float32 -> (N, P, 3) int8, 127 times unit length.
+
+        A byte is enough (0.3 degrees): planes interpolate them and make the result unit length again. With
+        thousands of frames remembered, memory counts.
+        """
+        normals = np.empty(positions.shape, np.int8)
         _vertex_normals(positions, self.faces, normals)
         return normals
 
@@ -125,7 +129,7 @@ class Anchors:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Planes of frames (N,), whose patch positions and normals are rows (N,) of (R, P, 3) arrays.
 
-        -> points, normals (N, S, 3) float32
+        -> points, unit normals (N, S, 3) float32
         """
         shape = (len(frames), self.faces.shape[1], 3)
         points, directions = np.empty(shape, np.float32), np.empty(shape, np.float32)
@@ -252,13 +256,15 @@ def _best_face(
         if distance < best:
             best = distance
             out_faces[s] = face
-            out_barycentric[s, 0], out_barycentric[s, 1], out_barycentric[s, 2] = 1.0 - v - w, v, w
+            out_barycentric[s, 0], out_barycentric[s, 1] = v, w
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _vertex_normals(positions, faces, normals):
+    out = np.empty(positions.shape[1:], np.float32)
     for n in range(len(positions)):
-        x, out = positions[n], normals[n]
+        x = positions[n]
+        out[:] = 0.0
         for f in range(len(faces)):
             i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
             a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
@@ -270,9 +276,8 @@ def _vertex_normals(positions, faces, normals):
                 out[v, 2] += n2
         for v in range(out.shape[0]):
             length = np.sqrt(out[v, 0] ** 2 + out[v, 1] ** 2 + out[v, 2] ** 2) + np.float32(1e-30)
-            out[v, 0] /= length
-            out[v, 1] /= length
-            out[v, 2] /= length
+            for c in range(3):
+                normals[n, v, c] = np.int8(np.rint(np.float32(127.0) * out[v, c] / length))
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -282,7 +287,8 @@ def _planes(frames, rows, positions, normals, faces, anchor_faces, barycentric, 
         anchors, weights = anchor_faces[frames[n]], barycentric[frames[n]]
         for s in range(anchors.shape[0]):
             i, j, k = faces[anchors[s], 0], faces[anchors[s], 1], faces[anchors[s], 2]
-            u, v, w = weights[s, 0], weights[s, 1], weights[s, 2]
+            v, w = weights[s, 0], weights[s, 1]
+            u = np.float32(1.0) - v - w
             length = np.float32(0.0)
             for c in range(3):
                 out_points[n, s, c] = u * x[i, c] + v * x[j, c] + w * x[k, c]

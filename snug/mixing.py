@@ -3,8 +3,9 @@
 Self-supervision needs no simulation, so a training set is not bound to what was recorded. Fourteen clips show
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
 clip takes the root, the legs, the spine and each arm from five random places of the training clips (mirrored
-half of the time), scales legs and spine, and adds to each joint of the trunk a slow turn about a random axis.
-Every part stays continuous in time, so velocities keep their meaning.
+half of the time), scales legs and spine, adds to each joint of the trunk a slow turn about a random axis, and
+spreads the arms where they come too near to the torso. Every part stays continuous in time, so velocities keep
+their meaning.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from snug.motion import Motion
+from snug.motion import Motion, arm_clearance, spread_arms
 from snug.skeleton import JOINT, axis_angles, rotation_matrices
 
 PARTS: tuple[tuple[str, ...], ...] = (
@@ -32,8 +33,8 @@ PARTS: tuple[tuple[str, ...], ...] = (
     ("left_collar", "left_shoulder", "left_elbow", "left_wrist", "left_hand"),
     ("right_collar", "right_shoulder", "right_elbow", "right_wrist", "right_hand"),
 )
-SCALED = (1, 2)  # legs and spine: an arm swung further might enter the torso
-SCALE = (0.6, 1.3)
+SCALE = {1: (0.6, 1.3), 2: (0.6, 1.3)}  # of legs and spine; an arm swung further might enter the torso
+CLEARANCE = 30.0  # degrees between upper arm and spine: nearer, a sleeve is pinched and no shape is good
 # Turn of each joint, relative to the recipe's; the collar bone turns little.
 TURNED = {
     "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,
@@ -81,12 +82,11 @@ def _mixed(motions: Sequence[Motion], random: np.random.Generator, turn: float, 
         if random.random() < 0.5:
             source = mirrored(source)
         start = random.integers(max(1, source.frames - FRAMES + 1))
-        taken = np.minimum(
-            np.arange(start, start + FRAMES), source.frames - 1
-        )  # a short clip rests at its end
-        scale = random.uniform(*SCALE) if number in SCALED else 1.0
+        # A clip that is too short rests at its end.
+        taken = np.minimum(np.arange(start, start + FRAMES), source.frames - 1)
+        scale = random.uniform(*SCALE.get(number, (1.0, 1.0)))
         joints = [JOINT[joint] for joint in part]
-        poses[:, joints] = scale * source.poses[np.ix_(taken, joints)]
+        poses[:, joints] = scale * source.poses[taken][:, joints]
         if number == 0:
             translations = source.translations[taken]
     seconds = np.arange(FRAMES)[:, None] / fps
@@ -95,4 +95,5 @@ def _mixed(motions: Sequence[Motion], random: np.random.Generator, turn: float, 
         phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
         added = rotation_matrices(stays + swings * np.sin(phase))
         poses[:, JOINT[joint]] = axis_angles(rotation_matrices(poses[:, JOINT[joint]]) @ added)
-    return Motion(name, poses, translations, fps=fps, kind="mixed")
+    mixed = Motion(name, poses, translations, fps=fps, kind="mixed")
+    return spread_arms(mixed, max(0.0, CLEARANCE - float(np.rad2deg(arm_clearance(mixed).min()))))

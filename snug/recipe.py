@@ -63,7 +63,7 @@ class Recipe:
     contact_stiffness: float | None = None
     contact_margin: float | None = None
     contact_refresh: float = 0.03
-    mixed: float = 2.0
+    mixed: float = 4.0
     mixed_turn: float = 0.1
     terms: tuple[str, ...] = TERMS
     spike: float = 2.0

@@ -16,7 +16,6 @@ from snug.recipe import Recipe
 from snug.skinning import joint_transforms, skin
 
 STD_FLOOR = 0.05  # an input that hardly moved in training must not explode on a motion where it does
-CHUNK = 64  # frames posed at once
 
 
 class TrainingError(ValueError):
@@ -141,11 +140,12 @@ class TrainingContact:
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
         """Patch positions and normals (F, P, 3) of every frame: one body shape, computed once."""
         rest = torch.as_tensor(self.patch.rest)
-        parts = [
-            skin(rest, self.weights, self.data.transforms[start : start + CHUNK]).numpy()
-            for start in range(0, self.data.frames, CHUNK)
-        ]
-        positions = np.concatenate(parts)
+        corners = torch.cat([rest, torch.ones(len(rest), 1)], 1)  # (P, 4)
+        # sum_j w_pj T_j (p, 1) as one matrix product over (j, 4): several times faster than blending first.
+        spread = (self.weights[:, :, None] * corners[:, None]).flatten(1)  # (P, 96)
+        positions = np.empty((self.data.frames, *rest.shape), np.float32)
+        for frame, transform in enumerate(self.data.transforms):
+            positions[frame] = (spread @ transform.transpose(-1, -2).flatten(0, 1)).numpy()
         return positions, self.patch.normals(positions)
 
     def posed(self, batch: Batch, betas: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

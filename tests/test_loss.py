@@ -91,7 +91,8 @@ def test_paper_recipe_has_the_papers_contact():
 
 
 def found(patch: Patch, anchors: np.ndarray, weights: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    return (positions[patch.faces[anchors]] * weights[..., None]).sum(1)
+    corners = positions[patch.faces[anchors]]
+    return corners[:, 0] + np.einsum("sc,sci->si", weights, corners[:, 1:] - corners[:, :1])
 
 
 def test_contact_search_finds_the_closest_allowed_point():
@@ -106,7 +107,7 @@ def test_contact_search_finds_the_closest_allowed_point():
     for body, x in zip(positions, garment):
         samples = (contact.sample_matrix @ x).astype(np.float32)
         faces, barycentric = patch.search(samples, body, anchors)
-        assert np.allclose(barycentric.sum(1), 1, atol=1e-5) and barycentric.min() > -1e-5
+        assert barycentric.sum(1).max() < 1 + 1e-5 and barycentric.min() > -1e-5
         distance = np.linalg.norm(found(patch, faces, barycentric, body) - samples, axis=1)
         squared, nearest, _ = igl.point_mesh_squared_distance(
             samples.astype(float), body.astype(float), patch.faces.astype(np.int64)

@@ -11,7 +11,7 @@ from dressing import swaying, tube_dress
 
 from snug.baselines.supervised import TargetError, vertex_loss
 from snug.mixing import mirrored, mixed_motions
-from snug.motion import Motion, make_motion
+from snug.motion import Motion, arm_clearance, make_motion
 from snug.recipe import DEFAULT, PAPER, Recipe
 from snug.rollout import roll_out
 from snug.skeleton import joint_positions
@@ -226,6 +226,7 @@ def test_mixed_motions_are_continuous_and_repeat():
     assert mixed_motions(clips, 0, turn=0.1, seed=3) == []
     from snug.motion import joint_speeds
 
+    assert np.rad2deg(min(arm_clearance(clip).min() for clip in mixed)) > 25.0
     fastest = max(joint_speeds(clip).max() for clip in clips)
     assert max(joint_speeds(clip).max() for clip in mixed) < 2 * fastest + 2.0
 
