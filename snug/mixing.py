@@ -4,8 +4,8 @@ Self-supervision needs no simulation, so a training set is not bound to what was
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
 clip takes the root, the legs, the spine and each arm from five random places of the training clips (mirrored
 half of the time), scales legs and spine, adds to each joint of the trunk a slow turn about a random axis, and
-spreads the arms where they come too near to the torso. Every part stays continuous in time, so velocities keep
-their meaning.
+spreads the arms where they come too near to the torso. Every part stays continuous in time, so velocities
+keep their meaning.
 """
 
 from __future__ import annotations
