@@ -1,0 +1,87 @@
+"""Sparse Cholesky packages on one and the same Hessian: what each of the three calls costs.
+
+The Hessian is that of a stretched and wrinkled sheet with inertia, positive definite; analyse includes the
+fill-reducing order. qdldl and cholespy cannot analyse without values: qdldl's analyse holds a factorisation
+too, cholespy's factorise holds the analysis.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import scipy.sparse as sp
+
+from reference_sim import Cloth, Potential
+from reference_sim.energies import BendHinge, Gravity, Inertia, StretchStVK
+from reference_sim.hessian_pattern import HessianPattern
+
+from .child import Row
+from .cholesky_packages import PACKAGES, Build
+from .sheet import DT, regular_sheet
+
+CASES = ("32 x 32 cells", "64 x 64 cells", "128 x 128 cells")
+
+
+def hessians(cells: int) -> tuple[HessianPattern, np.ndarray, np.ndarray]:
+    """Pattern of a sheet of cells x cells squares, and values (nnz,) of two Hessians on it.
+
+    The first belongs to a sheet pulled by 5 % with wrinkles of 4 mm across it, and is positive definite; the
+    second to the same sheet pressed to 70 %, and is not.
+    """
+    cloth = regular_sheet(cells + 1)
+    free = np.ones(cloth.vertex_count, dtype=bool)
+    free[cloth.pins] = False
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), Inertia(cloth, DT)])
+    pattern = potential.pattern(free)
+    return pattern, pattern.assemble(_wrinkled(cloth, 1.05)), pattern.assemble(_wrinkled(cloth, 0.7))
+
+
+def _wrinkled(cloth: Cloth, stretch: float) -> np.ndarray:
+    x = stretch * cloth.rest_positions
+    x[:, 1] = 4e-3 * np.sin(14 * np.pi * x[:, 0]) * np.cos(10 * np.pi * x[:, 2])
+    return x + np.random.default_rng(0).normal(0, 1e-3 * cloth.edge_lengths.mean(), x.shape)
+
+
+def measure(case: str, repeats: int) -> list[Row]:
+    """ms of each call (medians), backward error, and what becomes of an indefinite matrix."""
+    pattern, definite, indefinite = hessians(int(case.split()[0]))
+    rows: list[Row] = [("unknowns", pattern.size, "")]
+    rows.append(("stored entries", len(pattern.indices), ""))
+    for name, (install, build) in PACKAGES.items():
+        try:
+            rows += [
+                (f"{name}: {metric}", value, unit)
+                for metric, value, unit in _one(build, pattern, definite, indefinite, repeats)
+            ]
+        except ImportError:
+            rows.append((name, f"absent: pip install {install}", ""))
+    return rows
+
+
+def _one(
+    build: Build, pattern: HessianPattern, definite: np.ndarray, indefinite: np.ndarray, repeats: int
+) -> list[Row]:
+    b = np.random.default_rng(1).normal(size=pattern.size)
+    seconds: dict[str, list[float]] = {"analyse": [], "factorise": [], "solve": []}
+    # The first round warms up and is not counted.
+    for counted in [False] + [True] * repeats:
+        clock = [time.perf_counter()]
+        solver = build(pattern.indptr, pattern.indices)
+        clock.append(time.perf_counter())
+        done = solver.factorise(definite)
+        clock.append(time.perf_counter())
+        if not done:
+            raise ArithmeticError("the positive definite Hessian was refused")
+        x = solver.solve(b)
+        clock.append(time.perf_counter())
+        if counted:
+            for part, spent in zip(seconds, np.diff(clock)):
+                seconds[part].append(spent)
+    H = pattern.symmetric(definite)
+    scale = sp.linalg.norm(H, np.inf) * np.abs(x).max() + np.abs(b).max()
+    rows: list[Row] = [(part, 1e3 * float(np.median(spent)), "ms") for part, spent in seconds.items()]
+    rows.append(("backward error", float(np.abs(H @ x - b).max() / scale), "1"))
+    refused = not solver.factorise(indefinite)
+    rows.append(("not positive definite", "reported" if refused else "NOT reported", ""))
+    return rows
