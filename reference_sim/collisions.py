@@ -59,7 +59,7 @@ class Collisions:
     def __init__(self, cloth: Cloth, distance: float, *, self_contact: bool = True) -> None:
         self.package = _load()
         self.cloth, self.distance, self.self_contact = cloth, float(distance), self_contact
-        self._slack = self.distance / 2  # how far vertices may move before candidates are searched again
+        self._slack = self.distance / 4  # how far vertices may move before candidates are searched again
         self._ccd = self.package.AdditiveCCD()
         self.begin(*NO_OBSTACLE)
 
