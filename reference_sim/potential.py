@@ -73,6 +73,16 @@ class Potential:
         for energy in self.energies:
             energy.set_progress(progress)
 
+    def foresee(self, x: np.ndarray, step: np.ndarray) -> None:
+        """Let every term's Hessian use what `step` from x (V, 3) predicts of its stresses; see `Energy`."""
+        for energy in self.energies:
+            energy.foresee(x, step)
+
+    def forget(self) -> None:
+        """Back to the true second derivatives."""
+        for energy in self.energies:
+            energy.forget()
+
     def objection(self, x: np.ndarray) -> str:
         """The first objection of a term to x (V, 3); "" if there is none."""
         return next(filter(None, (energy.objection(x) for energy in self.energies)), "")

@@ -43,8 +43,8 @@ def test_one_sample_per_vertex_rests_at_the_depth_of_the_formula():
     k = 1e5 * cloth.vertex_areas
     depth = np.sqrt(cloth.masses * GRAVITY / (3 * k))
     assert 1e-3 < depth.max() < 0.01 and np.ptp(depth) < 1e-15
-    # Gradient 1e-10 weights; the slope of the force is 2 m g / delta: 5e-11 delta.
-    assert result.positions[:, 1] == pytest.approx(0.01 - depth, abs=1e-12)
+    # Gradient 1e-10 mean weights, up to 6e-10 of a corner's; slope of the force 2 m g / delta: 3e-10 delta.
+    assert result.positions[:, 1] == pytest.approx(0.01 - depth, abs=3e-12)
 
 
 def test_the_papers_stiffness_per_vertex_depends_on_the_mass_of_the_vertex():

@@ -139,6 +139,16 @@ class Energy:
     def set_progress(self, progress: float) -> None:
         """Put the obstacle at `progress` of its motion in this step; `prepare` puts it at the end, 1."""
 
+    def foresee(self, x: np.ndarray, step: np.ndarray) -> None:
+        """Let the Hessian take, until `forget`, the stresses that linear strain predicts at x + step (V, 3).
+
+        Energy and gradient know nothing of it. For stiff terms whose Hessian holds stress: computed from the
+        strain after a long step, it would be false by orders of magnitude.
+        """
+
+    def forget(self) -> None:
+        """Let the Hessian be the true second derivatives again."""
+
     def objection(self, x: np.ndarray) -> str:
         """What makes x (V, 3) impossible for this term, in words with the elements; "" if nothing does."""
         return ""

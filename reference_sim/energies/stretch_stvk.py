@@ -34,6 +34,7 @@ class StretchStVK(Energy):
         self.areas = cloth.areas
         self.lam = cloth.material.lame_lambda
         self.mu = cloth.material.lame_mu
+        self._foreseen: np.ndarray | None = None  # (F, 3) stresses S00, S11, S01 [N/m]
 
     def parameters(self) -> dict[str, Any]:
         return {"lambda_N_per_m": self.lam, "mu_N_per_m": self.mu}
@@ -60,11 +61,29 @@ class StretchStVK(Energy):
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Negative curvature comes from compressive stress alone, so only that is reduced by `convexity`."""
         blocks = np.empty((len(self.stencils), 9, 9))
-        _hessian(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, convexity, blocks)
+        stress = self._foreseen
+        if stress is None:
+            stress = self._stress(x, np.zeros_like(x))
+        _hessian(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, convexity, stress, blocks)
         return np.arange(len(blocks)), blocks
 
+    def foresee(self, x: np.ndarray, step: np.ndarray) -> None:
+        self._foreseen = self._stress(x, step)
+
+    def forget(self) -> None:
+        self._foreseen = None
+
+    def _stress(self, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+        stress = np.empty((len(self.stencils), 3))
+        _linear_stress(x, step, self.stencils, self.Dm_inverse, self.lam, self.mu, stress)
+        return stress
+
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(mu + lambda/2) times the cotangent Laplacian: the mean over directions of the Hessian at rest."""
+        """(mu + lambda/2) times the cotangent Laplacian.
+
+        At rest the Hessian's mean over directions is (lambda + 3 mu)/2 of it in the plane of the cloth and
+        lambda/3 + mu of it in space; this lies between the two.
+        """
         b = np.concatenate([-self.Dm_inverse.sum(axis=1, keepdims=True), self.Dm_inverse], axis=1)
         scale = (self.mu + 0.5 * self.lam) * self.areas
         return np.arange(len(self.areas)), scale[:, None, None] * (b @ b.transpose(0, 2, 1))
@@ -124,15 +143,28 @@ def _less_compressed(S00, S11, S01, keep):
 
 
 @njit(cache=True)
-def _hessian(x, faces, Dm_inverse, areas, lam, mu, convexity, blocks):
+def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
+    """S00, S11, S01 of S = lambda tr(G) I + 2 mu G with G(x) + sym(F(x)^T dF), linear in the step."""
+    for f in range(faces.shape[0]):
+        fa, fb, G00, G11, G01 = _deformation(x, faces[f], Dm_inverse[f])
+        da, db, _, _, _ = _deformation(step, faces[f], Dm_inverse[f])
+        for i in range(3):
+            G00 += fa[i] * da[i]
+            G11 += fb[i] * db[i]
+            G01 += 0.5 * (fa[i] * db[i] + fb[i] * da[i])
+        trace = lam * (G00 + G11)
+        stress[f, 0], stress[f, 1], stress[f, 2] = trace + 2 * mu * G00, trace + 2 * mu * G11, 2 * mu * G01
+
+
+@njit(cache=True)
+def _hessian(x, faces, Dm_inverse, areas, lam, mu, convexity, stress, blocks):
     """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)]."""
     b = np.empty((3, 2))
     Fb = np.empty((3, 3))
     for f in range(faces.shape[0]):
         D = Dm_inverse[f]
-        fa, fb, G00, G11, G01 = _deformation(x, faces[f], D)
-        trace = G00 + G11
-        S00, S11, S01 = lam * trace + 2 * mu * G00, lam * trace + 2 * mu * G11, 2 * mu * G01
+        fa, fb, _, _, _ = _deformation(x, faces[f], D)
+        S00, S11, S01 = stress[f, 0], stress[f, 1], stress[f, 2]
         if convexity > 0.0:
             S00, S11, S01 = _less_compressed(S00, S11, S01, 1.0 - convexity)
         for k in range(2):
