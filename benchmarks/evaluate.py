@@ -13,7 +13,7 @@ from .cell import Outcome
 from .methods import find_method
 from .metrics.curvature import CurvatureSeries, curvature_error, curvature_series
 from .metrics.energy import energy_series, mean_energy
-from .metrics.geometry import distance_rms, penetration
+from .metrics.geometry import Penetration, distance_rms, hem_drift, own_part_depth, penetration
 from .metrics.optimality import relative_gap
 from .results import Row, RunFolder
 
@@ -24,11 +24,12 @@ if TYPE_CHECKING:
     from .scene import BuiltScene
 
 MM = 1e3
+DEEP = 5e-3  # [m] below the skin: what an eye sees
 REFERENCE = "simulation"
 UNITS = {
     "energy": "J", "curvature": "1/m", "distance": "mm", "penetration/vertices": "%",
-    "penetration/depth_p99": "mm", "dynamics": "mm", "cost/frame": "ms", "cost/data": "s",
-    "cost/train": "s", "cost/memory": "MB", "exact": "m", "gap": "1",
+    "penetration/deep": "%", "penetration": "mm", "drift": "mm", "dynamics": "mm",
+    "cost/frame": "ms", "cost/data": "s", "cost/train": "s", "cost/memory": "MB", "exact": "m", "gap": "1",
 }  # fmt: skip
 
 
@@ -74,8 +75,7 @@ def measure_scene(
         if reference is not None and outcome.cell.method != REFERENCE:
             metrics |= _against(positions[k], curvatures[k], reference)
         if inside:
-            metrics["penetration/vertices"] = 100.0 * float(inside[k].share.mean())
-            metrics["penetration/depth_p99"] = MM * float(np.percentile(inside[k].depth, 99))
+            metrics |= _contact(scene, positions[k], inside[k])
         if "speed" in outcome.cell.suites:
             metrics["gap/relative"] = relative_gap(scene, positions[k], samples=gap_samples)
         if scene.exact is not None:
@@ -138,6 +138,21 @@ def rows_of(outcome: Outcome, metrics: Mapping[str, float], scene: BuiltScene | 
                 )
             )  # fmt: skip
     return rows
+
+
+def _contact(scene: BuiltScene, x: np.ndarray, inside: Penetration) -> dict[str, float]:
+    """How well the cloth keeps out of the obstacle and stays where it belongs."""
+    assert scene.obstacle is not None
+    own = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)
+    found = {
+        "penetration/vertices": 100.0 * float(inside.share.mean()),
+        "penetration/deep": 100.0 * float((inside.depth > DEEP).mean()),
+        "penetration/depth_p99": MM * float(np.percentile(inside.depth, 99)),
+        "penetration/own_part_p999": MM * float(np.percentile(own, 99.9)),
+    }
+    if scene.dressed is not None and scene.origin_heights is not None:
+        found["drift/hem"] = MM * hem_drift(x, scene.dressed.garment.hem, scene.origin_heights)
+    return found
 
 
 def _against(x: np.ndarray, curvature: CurvatureSeries, reference: Reference) -> dict[str, float]:

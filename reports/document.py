@@ -193,6 +193,7 @@ def _definitions(rows: Sequence[Row]) -> list[str]:
         "curvature_difference": "curvature/mean_difference",
         "distance": "distance/rms",
         "penetration": "penetration/vertices",
+        "own_part": "penetration/own_part_p999",
         "gap": "gap/relative",
         "held": "dynamics/held_difference",
         "cost": "cost/frame",

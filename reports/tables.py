@@ -94,7 +94,9 @@ def geometry(rows: Sequence[Row]) -> Table | None:
         rows,
         [
             ("penetration/vertices", Column("vertices", "Below the skin", "%")),
-            ("penetration/depth_p99", Column("depth_p99", "99 % depth", "mm")),
+            ("penetration/deep", Column("deep", "Deeper than 5 mm", "%")),
+            ("penetration/own_part_p999", Column("own_part_p999", "99.9 % own-part depth", "mm")),
+            ("drift/hem", Column("hem_drift", "Hem drift", "mm")),
             ("distance/rms", Column("distance_rms", "Distance", "mm")),
             ("dynamics/held_difference", Column("held_difference", "Held-pose difference", "mm")),
         ],

@@ -15,11 +15,11 @@ from benchmarks.metrics.curvature import (
     mean_curvature,
 )
 from benchmarks.metrics.energy import energy_series, mean_energy
-from benchmarks.metrics.geometry import distance_rms, penetration
+from benchmarks.metrics.geometry import distance_rms, hem_drift, own_part_depth, penetration
 from benchmarks.metrics.optimality import first_guess, relative_gap
 from benchmarks.presets import find_preset
 from benchmarks.scenes import hanging_sheet, sheet_on_sphere
-from reference_sim import simulate
+from reference_sim import Obstacle, simulate
 
 
 def test_curvature_of_a_sphere_holds_at_its_five_valent_vertices_too():
@@ -164,3 +164,22 @@ def test_the_gap_is_zero_for_the_reference_one_for_the_guess_and_falls_between(m
         x.append(first_guess(scene, x[-1], (x[-1] - x[-2]) / scene.dt, frame))
     assert relative_gap(scene, np.array(x), samples=3) == pytest.approx(1.0)
     assert np.isnan(relative_gap(scene, np.array(x[:2]), samples=3))
+
+
+def test_own_part_depth_does_not_see_the_limb_beside():
+    """Two balls: a vertex that belongs to the left one lies deep in the right one, outside its own."""
+    points, faces = icosphere(3, 0.1)
+    body = np.concatenate([points, points + np.array([0.25, 0, 0])])
+    rest = np.concatenate([points, points + np.array([1.0, 0, 0])])  # far apart where the cloth was made
+    obstacle = Obstacle(body, np.concatenate([faces, faces + len(points)]), rest_positions=rest)
+    x = np.array([[[0.2, 0.0, 0.0], [0.09, 0.0, 0.0]]])  # 10 cm off the left ball; 1 cm inside it
+    belongs = np.array([[0.11, 0.0, 0.0], [0.101, 0.0, 0.0]])
+    # The ball is a mesh: its faces lie up to 1 % of the radius below the sphere.
+    assert own_part_depth(x, obstacle, belongs)[0] == pytest.approx([0.0, 0.01], abs=1e-3)
+    assert penetration([x], obstacle)[0].depth[0] == pytest.approx([0.05, 0.01], abs=1e-3)
+
+
+def test_hem_drift_follows_the_hem_against_the_pelvis():
+    x = np.zeros((3, 4, 3))
+    x[:, 2:, 1] = np.array([0.5, 0.6, 0.8])[:, None]
+    assert hem_drift(x, np.array([2, 3]), np.array([1.0, 1.1, 1.1])) == pytest.approx(0.2, abs=1e-15)

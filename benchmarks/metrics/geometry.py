@@ -46,3 +46,26 @@ def penetration(trajectories: Sequence[Floats], obstacle: Obstacle) -> list[Pene
         for k, part in zip(present, np.split(inside, ends[:-1])):
             depths[k][frame] = part
     return [Penetration(share=(depth > 0.0).mean(1), depth=depth) for depth in depths]
+
+
+def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats) -> Floats:
+    """(T,V) depth [m] of positions (T,V,3) under the part of the body that each vertex belongs to.
+
+    The true signed distance also counts cloth in the fold of a hip or between arm and chest, which no eye
+    sees; this one measures against the faces near a vertex's own rest position (V,3) alone.
+    """
+    depth = np.empty(positions.shape[:2])
+    for frame, x in enumerate(positions):
+        planes = obstacle.planes(np.ascontiguousarray(x), frame, rest_positions)
+        gap = np.einsum("vi,vi->v", planes.normals, x - planes.points)
+        depth[frame] = np.maximum(0.0, -gap)
+    return depth
+
+
+def hem_drift(positions: Floats, hem: NDArray[np.int64], origin_heights: Floats) -> float:
+    """How far the hem's mean height above the pelvis has risen from the first frame to the last [m].
+
+    positions (T,V,3) [m], hem: vertex indices, origin_heights (T,) [m]. A shirt that crept up stays up.
+    """
+    heights = positions[:, hem, 1].mean(1) - origin_heights[: len(positions)]
+    return float(heights[-1] - heights[0])
