@@ -94,6 +94,14 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
 
+def test_whoever_is_reading_the_old_rows_reads_them_to_their_end(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.write_rows(ROWS[:1])
+    with folder.rows_path.open() as reader:
+        folder.write_rows(ROWS)
+        assert len(reader.readlines()) == 2
+
+
 def test_replacing_keeps_the_suffix_for_writers_that_look_at_it(tmp_path):
     with replacing(tmp_path / "a.vtkhdf") as temporary:
         assert temporary.suffix == ".vtkhdf" and temporary.parent == tmp_path
