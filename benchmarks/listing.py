@@ -8,7 +8,7 @@ from .methods import METHODS
 from .presets import PRESETS
 from .scenes import PREFIX, SMALL_SCENES
 from .suites import SUITES
-from .suites.extremes import CASES
+from .suites.extremes import MAPS, REFUSALS, STEPS
 from .suites.validation import CHECKS
 
 
@@ -24,9 +24,14 @@ def listing() -> str:
         ("training motions", ((name, "") for name in TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
         ("validation checks", ((c.name, c.description) for c in CHECKS)),
-        ("extreme cases", ((c.name, c.description) for c in CASES)),
+        ("extreme cases", [*((c.name, c.description) for c in (*STEPS, *REFUSALS)), *map(_map, MAPS)]),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
+
+
+def _map(name: str) -> tuple[str, str]:
+    cases = MAPS[name]
+    return f"{name}/*", f"{len(cases)} points over stiffness and time step, {cases[0].name} the first"
 
 
 def _section(title: str, rows: Iterable[tuple[str, str]]) -> str:

@@ -173,7 +173,8 @@ def choose_cells(
                     found[key] = Cell(declared[scene], method, seed, (*before, suite))
     known = [check for check in CHECKS if check.smoke or scenes or preset.name != "smoke"]
     checks = _matching(known, scenes, "validation" in suites and _named(VALIDATION_METHOD, methods))
-    cases = _matching(CASES, scenes, "extremes" in suites and _named(EXTREMES_METHOD, methods))
+    hard = [case for case in CASES if case.smoke or scenes or preset.name != "smoke"]
+    cases = _matching(hard, scenes, "extremes" in suites and _named(EXTREMES_METHOD, methods))
     if not (found or checks or cases):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
     # The reference first: an error against it can be said as soon as another cell is done.

@@ -31,6 +31,7 @@ LIGHT = (
     "benchmarks/results.py", "benchmarks/provenance.py", "benchmarks/scenes/__init__.py",
     "benchmarks/methods/__init__.py", "benchmarks/suites/__init__.py", "benchmarks/suites/garments.py",
     "benchmarks/suites/speed.py", "benchmarks/suites/validation.py", "benchmarks/suites/extremes.py",
+    "benchmarks/suites/extreme_cases.py", "benchmarks/guarded.py",
     "benchmarks/check.py", "benchmarks/suites/validation_exact.py", "benchmarks/suites/validation_orders.py",
     "benchmarks/suites/validation_references.py",
 )  # fmt: skip

@@ -24,7 +24,7 @@ from benchmarks.scenes import SMALL_SCENES, dressed_scene
 from benchmarks.stages import accepted
 from benchmarks.suites import extremes, validation
 from benchmarks.workers import Failure, Job, run_jobs
-from reference_sim import Result, Trajectory
+from reference_sim import Trajectory
 
 ROOT = Path(__file__).resolve().parent.parent
 SMOKE = find_preset("smoke")

@@ -1,100 +1,146 @@
-"""One time step each, in a state that breaks solvers. All start from a sheet of 0.4 m with 81 vertices."""
+"""One time step of a small sheet in a state that breaks solvers: 0.4 m wide, 81 vertices, unless said.
+
+A step is named by a start (`starts.py`) and by factors on the material, the weight and the time step. What
+stands in a case's options is all that differs from an ordinary step at 1/30 s.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import dataclass
 
 import numpy as np
 
 from reference_sim import Cloth, Material, Obstacle, Potential
-from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Inertia, Step, StretchStVK
+from reference_sim.energies import (
+    AreaBarrier,
+    BendHinge,
+    ContactPenalty,
+    Energy,
+    Gravity,
+    Inertia,
+    Step,
+    StretchStVK,
+)
 from reference_sim.material import GRAVITY
 
 from ..scenes.sheet import square_sheet
 from ..scenes.sheet_on_sphere import sphere
-from ..suites.extremes import HardStep
+from . import starts
 
 CELLS, SIZE, DT = 8, 0.4, 1.0 / 30.0
-NOISE = 0.002  # [m]
+PINS = {"corners": (0, CELLS), "none": (), "side": tuple(range(CELLS + 1))}
+MARGIN = 4e-3  # [m] of the contact penalty
 
 
-def stiffness_up() -> HardStep:
-    """E x 1000 from a noisy start: membrane forces of 1e4 vertex weights."""
-    return _step(_cloth(young_modulus=70e6), _noisy)
+@dataclass(frozen=True)
+class HardStep:
+    """A prepared potential, the guess (V, 3) [m] to start from, pins and the mean weight of a vertex [N].
 
-
-def stiffness_down() -> HardStep:
-    """E / 1000: the sheet can hardly carry itself."""
-    return _step(_cloth(young_modulus=70.0), _noisy)
-
-
-def long_step() -> HardStep:
-    """dt = 1 s: next to nothing is left of inertia."""
-    return _step(_cloth(), _noisy, dt=1.0)
-
-
-def heavy() -> HardStep:
-    """1000 g: stretches of several hundred percent."""
-    return _step(_cloth(), _noisy, gravity=1000 * GRAVITY)
-
-
-def random_start() -> HardStep:
-    """Each vertex anywhere: inverted, crossing, stretched twentyfold."""
-    return _step(_cloth(), lambda rest, random: random.uniform(-SIZE / 2, SIZE / 2, rest.shape))
-
-
-def compressed() -> HardStep:
-    """30 % of the width. A perfectly flat sheet would be a saddle by symmetry: a micrometre breaks it."""
-    return _step(_cloth(), lambda rest, random: rest * [0.3, 1.0, 1.0] + random.normal(0, 1e-6, rest.shape))
-
-
-def one_point() -> HardStep:
-    """F = 0 everywhere: the membrane's force is zero there, its Hessian negative definite.
-
-    The hinge angle has no value on a collapsed triangle, so bending is not declared. Nothing is pinned.
+    `weight` is that under Earth's gravity, whatever the step's own.
     """
-    cloth = _cloth(pins=())
-    return _step(cloth, lambda rest, random: np.zeros_like(rest), bending=False, still=True)
+
+    potential: Potential
+    guess: np.ndarray
+    pins: np.ndarray
+    weight: float
 
 
-def teleport() -> HardStep:
-    """A sphere of 8 cm stands at once where the sheet rests: vertices start up to 8 cm deep."""
-    cloth = _cloth()
-    points, faces = sphere(0.08, 12)
-    obstacle = Obstacle(points + np.array([0.003, -0.02, 0.002]), faces)
-    return _step(cloth, _noisy, obstacle=obstacle)
-
-
-def _cloth(*, pins: tuple[int, ...] = (0, CELLS), **material: float) -> Cloth:
-    positions, faces = square_sheet(CELLS, SIZE)
-    return Cloth(positions, faces, dataclasses.replace(Material(), **material), pins=pins)
-
-
-def _noisy(rest: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    return rest + random.normal(0, NOISE, rest.shape)
-
-
-def _step(
-    cloth: Cloth,
-    make_start,
+def sheet(
     *,
-    dt: float = DT,
-    gravity: float = GRAVITY,
-    bending: bool = True,
-    still: bool = False,
-    obstacle: Obstacle | None = None,
+    stiffness: float = 1.0,
+    bending: float = 1.0,
+    ratio: float | None = None,
+    mass: float = 1.0,
+    gravity: float = 1.0,
+    dt: float | None = DT,
+    pins: str = "corners",
+    start: str = "noisy",
+    speed: float | str = 1.0,
+    scaling: str = "none",
+    rest_angles: float | str = 0.0,
+    shape: str = "even",
+    size: float = 1.0,
+    terms: str = "membrane+bending",
+    body: str = "",
+    contact: float = 1.0,
 ) -> HardStep:
-    """The step from make_start(rest, random) with velocities of 1 m/s, started at the previous positions."""
+    """A step of a sheet.
+
+    Args:
+        stiffness, bending, mass, gravity, contact: factors on Young's modulus, hinge stiffness, density,
+            g and contact stiffness.
+        ratio: hinge stiffness over membrane modulus and squared mean edge, instead of `bending`.
+        dt: time step [s]; None leaves inertia out.
+        pins: "corners", "side" or "none".
+        start: name of a function of `starts`.
+        speed: scale [m/s] of random velocities, or the name of a field in `starts.VELOCITIES`.
+        rest_angles: [rad] of every hinge, or "random" within half a turn.
+        shape: name in `starts.SHAPES`: how the mesh at rest differs from an even one.
+        size: factor on the width of the sheet.
+        terms: which of "membrane", "bending" and "area" (the barrier against collapse), joined by "+".
+        body: name in `BODIES`; "" for none.
+    """
     random = np.random.default_rng(11)
-    x = make_start(cloth.rest_positions, random)
-    x[cloth.pins] = cloth.rest_positions[cloth.pins]
-    v = np.zeros_like(x) if still else random.normal(0, 1.0, x.shape)
-    v[cloth.pins] = 0.0
-    energies: list[Energy] = [StretchStVK(cloth), Gravity(cloth, acceleration=gravity), Inertia(cloth, dt)]
-    if bending:
-        energies.insert(1, BendHinge(cloth))
-    if obstacle is not None:
-        energies.insert(-1, ContactPenalty(cloth))
-    potential = Potential(energies)
-    potential.prepare(Step(previous=x, velocity=v, guess=x, dt=dt, obstacle=obstacle, frame=0))
-    return HardStep(potential, x, np.asarray(cloth.pins), float(cloth.masses.mean() * GRAVITY))
+    rest, faces = square_sheet(CELLS, SIZE)
+    rest = size * starts.SHAPES[shape](rest)
+    material = dataclasses.replace(
+        Material(), young_modulus=70e3 * stiffness, bending_stiffness=3.96e-5 * bending, density=426.0 * mass
+    )
+    cloth = Cloth(rest, faces, material, pins=PINS[pins])
+    if ratio is not None:
+        hinge = ratio * material.membrane_modulus * float(cloth.edge_lengths.mean()) ** 2
+        cloth = dataclasses.replace(cloth, material=dataclasses.replace(material, bending_stiffness=hinge))
+    x = starts.START[start](rest.copy(), random)
+    v = starts.velocity(speed, x, rest, random)
+    x[cloth.pins], v[cloth.pins] = rest[cloth.pins], 0.0
+    energies: list[Energy] = [StretchStVK(cloth)] if "membrane" in terms else []
+    if "bending" in terms:
+        angles = random.uniform(-np.pi, np.pi, len(cloth.hinges)) if rest_angles == "random" else rest_angles
+        energies.append(BendHinge(cloth, scaling=scaling, rest_angles=angles))
+    if "area" in terms:
+        energies.append(AreaBarrier(cloth, stiffness=100.0 * stiffness))
+    energies.append(Gravity(cloth, acceleration=gravity * GRAVITY))
+    if body:
+        energies.append(ContactPenalty(cloth, stiffness=contact * 3.4e6, margin=MARGIN))
+    return prepared(cloth, energies, dt, x, v, obstacle=BODIES[body]() if body else None)
+
+
+def prepared(
+    cloth: Cloth,
+    energies: list[Energy],
+    dt: float | None,
+    previous: np.ndarray,
+    velocity: np.ndarray,
+    *,
+    guess: np.ndarray | None = None,
+    obstacle: Obstacle | None = None,
+    frame: int = 0,
+) -> HardStep:
+    """The step from `previous` with `velocity`; the guess is the previous positions unless given."""
+    guess = previous if guess is None else guess
+    potential = Potential([*energies, Inertia(cloth, dt)] if dt else energies)
+    potential.prepare(Step(previous, velocity, guess, dt or DT, obstacle, frame))
+    return HardStep(potential, guess, np.asarray(cloth.pins), float(cloth.masses.mean() * GRAVITY))
+
+
+def _ball(radius: float, *, centre: tuple[float, float, float], cells: int = 10) -> Obstacle:
+    points, faces = sphere(radius, cells)
+    return Obstacle(points + np.array(centre), faces)
+
+
+def _box(half: tuple[float, float, float], centre: tuple[float, float, float]) -> Obstacle:
+    """A box with edges of the given half lengths: sharp edges, and thin where one is small."""
+    points, faces = sphere(1.0, 6)
+    points = points / np.abs(points).max(axis=1, keepdims=True)
+    return Obstacle(points * np.array(half) + np.array(centre), faces)
+
+
+BODIES = {
+    "ball": lambda: _ball(0.08, centre=(0.003, -0.02, 0.002)),  # vertices start up to 6 cm deep
+    "big ball": lambda: _ball(1.0, centre=(0.05, 0.05, 0.02)),  # the whole sheet is deep inside
+    "pea": lambda: _ball(0.006, centre=(0.003, 0.0, 0.002), cells=6),  # an eighth of a cell wide
+    "plate": lambda: _box((0.3, 0.002, 0.3), (0.01, 0.0, 0.013)),  # thinner than the contact margin
+    "blade": lambda: _box((0.001, 0.1, 0.3), (0.012, -0.02, 0.0)),  # an edge across the sheet
+    "ball far below": lambda: _ball(0.08, centre=(0.003, -3.0, 0.002)),  # reached within one fast step
+}

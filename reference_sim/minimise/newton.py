@@ -20,6 +20,7 @@ therefore judges by slopes (Hager and Zhang 2005, approximate Wolfe conditions).
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,7 @@ class Newton:
             was kept, whatever the number of factorisations on the way to it.
         timeout: seconds before giving up with status timeout.
         reference_dt: time [s] in the shift M/dt^2 where the potential has no inertia of its own.
+        observe: called with every point (V, 3) [m] that was kept, the start included.
     """
 
     def __init__(
@@ -61,9 +63,10 @@ class Newton:
         max_iterations: int = 300,
         timeout: float = float("inf"),
         reference_dt: float = 1 / 30,
+        observe: Callable[[np.ndarray], object] | None = None,
     ) -> None:
         cloth = potential.cloth
-        self.potential = potential
+        self.potential, self.observe = potential, observe
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
         free = np.ones(cloth.vertex_count, dtype=bool)
         free[cloth.pins] = False
@@ -128,6 +131,8 @@ class _Run:
 
     def iterate(self) -> Result:
         while True:
+            if self.n.observe is not None:
+                self.n.observe(self.x.copy())
             # Wrinkled cloth stays wrinkled for a while: start near the rung that the last step needed.
             rung = self.rung if self.climbed else max(self.rung - 1, 0)
             data = self.assemble(rung)
