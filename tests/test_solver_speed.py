@@ -158,7 +158,7 @@ def test_newton_descends_the_energy_that_we_say_it_does(solver, iterations, dt):
         fall.step()
     judge = peers.Judge(fall)
     x, v = (a.astype(np.float32).astype(np.float64) for a in (fall.x, fall.v))
-    potential: Potential = judge.vbd if solver == "VBD" else judge.xpbd(dt)
+    potential: Potential = judge.own(solver, dt)
     problem = peers.Problem(potential, x, v, dt)
     problem.descend(problem.guess)
     at_start = problem.gap(problem.guess)
