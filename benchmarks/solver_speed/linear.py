@@ -20,9 +20,10 @@ milliseconds on one thread of a 2-core machine, analyse / factorise / solve:
 
 Every package reports an indefinite matrix (qdldl only through the signs of D), all with backward errors below
 2e-15. A factorisation is what Newton's method repeats: CHOLMOD with METIS has the cheapest at every size, a
-third under PARDISO, whose solve costs twice as much besides and which brings hundreds of megabytes of MKL.
-AMD analyses faster, which happens once a scene. The price of cvxopt is its licence, GPLv3; where that or the
-package is unwelcome, SuperLU from scipy gives the same answers at four to seven times the cost.
+quarter to a third under PARDISO, whose solve takes two to three times as long besides and which brings
+hundreds of megabytes of MKL. AMD analyses faster, which happens once a scene. The price of cvxopt is its
+licence, GPLv3; where that or the package is unwelcome, SuperLU from scipy gives the same answers at four to
+seven times the cost.
 """
 
 from __future__ import annotations
