@@ -32,6 +32,7 @@ CAPTIONS = {
     "speed": "The points of the plots: run time of one frame and errors against the simulation.",
     "validation": "Measured and expected value of every check.",
     "extremes": "Every extreme case and how it ended.",
+    "refusals": "Inputs that have to be refused before anything is solved, and what each was told.",
     "unfinished": "Cells that failed or were skipped, with the reason each gave.",
 }
 
@@ -90,7 +91,9 @@ def document(
         },
         {
             "title": "Extremes: where it breaks",
-            "blocks": _figures(rest, "extremes", "outcomes") + _tables(tables, "extremes"),
+            "blocks": _figures(rest, "extremes", "maps")
+            + _figures(rest, "extremes", "outcomes")
+            + _tables(tables, "extremes", "refusals"),
         },
         {"title": "What did not run to its end", "blocks": _trouble(tables, problems)},
     ]

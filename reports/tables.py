@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from benchmarks.results import Row
+from reports.stability import refusals
 from reports.summary import (
     EXTRA_TERMS,
     TERMS,
@@ -235,6 +236,7 @@ MAKERS = (
     speed,
     validation,
     extremes,
+    refusals,
     unfinished,
     metrics,
 )
