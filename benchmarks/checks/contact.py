@@ -6,6 +6,7 @@ import numpy as np
 
 from reference_sim import Cloth, Material, Obstacle, Potential, minimise
 from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
+from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
 from reference_sim.material import GRAVITY
 
 from .meshes import in_space, jittered_patch
@@ -17,9 +18,15 @@ def penalty_depth() -> float:
     A vertex of area a carries rho_a a g and is pushed by 3 k a depth^2: the area cancels.
     """
     contact, x, areal_density = _sheet_at_rest("vertices")
-    stiffness = contact.stiffness / contact.sample_areas  # k [J/m^5]
-    exact = np.sqrt(areal_density * GRAVITY / (3 * stiffness))
+    exact = np.sqrt(areal_density * GRAVITY / (3 * DEFAULT_STIFFNESS))
     return float(((contact.margin - x[:, 1]) / exact).mean())
+
+
+def sampled_area() -> float:
+    """Area of all contact samples of a sheet over its own: vertices, edges and faces carry it once each."""
+    points, faces = jittered_patch(8)
+    contact = ContactPenalty(Cloth(in_space(points), faces, Material()))
+    return float(contact.sample_areas.sum())  # the sheet has unit area
 
 
 def contact_force() -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference_sim import Cloth, Material, Potential
-from reference_sim.energies import BendHinge, StretchStVK
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
 
 from .meshes import in_space, jittered_patch, random_rotation
 
@@ -59,10 +59,15 @@ def uniaxial_pull() -> tuple[float, float]:
     return float(force[points[:, 0] > 1 - 1e-9, 0].sum()), exact
 
 
-def units_of_the_paper() -> float:
-    """lambda + mu [N/m] of E = 70 kPa, nu = 0.485, t = 0.47 mm: the paper prints 20.9 and 11.1."""
-    material = Material()
-    return material.lame_lambda + material.lame_mu
+def constant(name: str) -> float:
+    """A number of the default cotton, E = 70 kPa, nu = 0.485, t = 0.47 mm, rho = 426 kg/m^3."""
+    return float(getattr(Material(), name))
+
+
+def weight_of_a_square_metre() -> float:
+    """[N]"""
+    cloth, _ = _turned_patch()
+    return float(Gravity(cloth).value_and_gradient(cloth.rest_positions)[1][:, 1].sum())
 
 
 def scikit_fem_energy() -> float:

@@ -30,11 +30,20 @@ CLOSED_FORMS = (
         unit="N", tolerance=1e-11, reason="round-off of a sum of ten forces of 1 N",
         module="membrane", function="uniaxial_pull", smoke=True,
     ),
+    *(
+        Check(
+            name=f"constant_{name}",
+            description=f"{title} of the default cotton, as the paper prints it",
+            unit="N/m", expected=printed, tolerance=0.051, reason="three printed digits",
+            module="membrane", function="constant", arguments=(name,), smoke=True,
+        )
+        for name, title, printed in (("lame_lambda", "lambda", 20.9), ("lame_mu", "mu", 11.1))
+    ),
     Check(
-        name="membrane_constants",
-        description="lambda + mu of the default cotton: the paper prints 20.9 and 11.1",
-        unit="N/m", expected=32.0, tolerance=0.1, reason="three printed digits of each",
-        module="membrane", function="units_of_the_paper", smoke=True,
+        name="weight_of_a_square_metre",
+        description="of the default cotton: 426 kg/m^3 times 0.47 mm times 9.81 m/s^2",
+        unit="N", expected=426.0 * 0.47e-3 * 9.81, tolerance=1e-12, reason="round-off",
+        module="membrane", function="weight_of_a_square_metre", smoke=True,
     ),
     *(
         Check(
@@ -71,12 +80,30 @@ CLOSED_FORMS = (
     ),
 )  # fmt: skip
 
+DERIVATIVES = tuple(
+    Check(
+        name=f"{kind}_of_{term}",
+        description=f"{kind} of the term {term} beside differences of {of}, relative error",
+        expected=0.0, tolerance=1e-7, reason="round-off over a step of 1e-3, and its fourth power",
+        module="derivatives", function=f"{kind}_error", arguments=(term,), smoke=True,
+    )
+    for kind, of in (("gradient", "the energy"), ("hessian", "the gradient"))
+    for term in ("strain", "spring", "bending", "gravity", "inertia", "collision", "area_barrier")
+    if (kind, term) != ("hessian", "gravity")  # it is zero
+)  # fmt: skip
+
 DISCRETE = (
     Check(
         name="free_fall",
         description="largest distance to backward Euler's own discrete fall over 45 frames",
         unit="m", expected=0.0, tolerance=1e-12, reason="round-off over a fall of 11 m",
         module="dynamics", function="free_fall", smoke=True,
+    ),
+    Check(
+        name="free_fall_in_substeps",
+        description="the same with four steps a frame, 10 frames",
+        unit="m", expected=0.0, tolerance=1e-12, reason="round-off over a fall of half a metre",
+        module="dynamics", function="free_fall_in_substeps", smoke=True,
     ),
     Check(
         name="stretched_membrane_vibration",
@@ -145,6 +172,12 @@ DISCRETE = (
         module="contact", function="penalty_depth", smoke=True,
     ),
     Check(
+        name="contact_sampled_area",
+        description="area of all contact samples of a cloth over its own",
+        expected=3.0, tolerance=1e-12, reason="vertices, edges and faces carry it once each; round-off",
+        module="contact", function="sampled_area", smoke=True,
+    ),
+    Check(
         name="contact_force_is_weight",
         description="total contact force over weight of a sheet at rest on a plane",
         expected=1.0, tolerance=2e-6, reason="the residual gradient that the solver may leave",
@@ -152,4 +185,43 @@ DISCRETE = (
     ),
 )  # fmt: skip
 
-CHECKS = (*SCIKIT_FEM, *CLOSED_FORMS, *DISCRETE)
+MINIMISERS = (
+    Check(
+        name="newton_quadratic",
+        description="factorisations for inertia and weight alone: one step, and one to confirm the minimum",
+        expected=2.0, tolerance=0.0, reason="Newton's method ends a quadratic in one step",
+        module="minimisers", function="work_on_a_quadratic", smoke=True,
+    ),
+    Check(
+        name="newton_order",
+        description="order of the last steps of Newton's method on a stretched sheet",
+        expected=2.0, tolerance=0.4, reason="three steps are left between 1e-3 m and round-off",
+        module="minimisers", function="newton_order", smoke=True,
+    ),
+    Check(
+        name="newton_never_rises",
+        description="largest rise of the energy from one kept point to the next, from random places",
+        expected=0.0, tolerance=1e-12, reason="round-off of the energy",
+        module="minimisers", function="largest_rise", smoke=True,
+    ),
+    Check(
+        name="newton_wants_small_steps",
+        description="edge lengths from rest at which a strip so soft that its forces are nothing is left",
+        expected=0.0, tolerance=1e-3, reason="what Newton's method calls a negligible step",
+        module="minimisers", function="small_gradient", smoke=True,
+    ),
+    Check(
+        name="newton_leaves_saddles",
+        description="negative eigenvalues where a flat start under compression is said to have come to rest",
+        expected=0.0, tolerance=0.0, reason="a minimum has none",
+        module="minimisers", function="negative_curvature", smoke=True,
+    ),
+    Check(
+        name="lbfgs_distance",
+        description="distance of the end of 60 steps of L-BFGS to Newton's, where there is one minimiser",
+        unit="m", expected=0.0, tolerance=1e-6, reason="2e-7, and 15 times that without its memory",
+        module="minimisers", function="lbfgs_distance", smoke=True,
+    ),
+)  # fmt: skip
+
+CHECKS = (*SCIKIT_FEM, *CLOSED_FORMS, *DERIVATIVES, *DISCRETE, *MINIMISERS)

@@ -1,0 +1,252 @@
+"""One-line faults in the physics, in its minimisers and in a metric: tests/test_mutations.py plants them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One line of `file` in which `right`, at its first place, becomes `wrong`."""
+
+    title: str
+    file: str
+    right: str
+    wrong: str
+    fast: tuple[str, ...] = ()  # checks that notice it without compiling anything anew
+
+
+MATERIAL, CLOTH, STEPPER = (f"reference_sim/{name}.py" for name in ("material", "cloth", "stepper"))
+STVK, HINGE, GRAVITY, INERTIA, CONTACT = (
+    f"reference_sim/energies/{name}.py"
+    for name in ("stretch_stvk", "bend_hinge", "gravity", "inertia", "contact_penalty")
+)
+NEWTON, LBFGS = (f"reference_sim/minimise/{name}.py" for name in ("newton", "lbfgs"))
+PATTERN, CURVATURE = "reference_sim/hessian_pattern.py", "benchmarks/metrics/curvature.py"
+KERNEL = "P0 * D[0, 0] + P1 * D[0, 1]"
+
+FAULTS = (
+    # material and rest state
+    Fault(
+        "mu without the thickness",
+        MATERIAL,
+        "self.thickness * self.young_modulus / (2",
+        "self.young_modulus / (2",
+        fast=("constant_lame_mu",),
+    ),
+    Fault(
+        "lambda of plane strain",
+        MATERIAL,
+        "(1 - self.poisson_ratio**2)",
+        "((1 + self.poisson_ratio) * (1 - 2 * self.poisson_ratio))",
+    ),
+    Fault(
+        "areal density without the thickness",
+        MATERIAL,
+        "return self.density * self.thickness",
+        "return self.density",
+    ),
+    Fault("gravity of 9.8", MATERIAL, "GRAVITY = 9.81", "GRAVITY = 9.8"),
+    Fault("membrane modulus of lambda + mu", MATERIAL, "/ (lam + 2 * mu)\n", "/ (lam + mu)\n"),
+    Fault("areas doubled", CLOTH, "0.5 * np.abs(np.linalg.det", "1.0 * np.abs(np.linalg.det"),
+    Fault(
+        "half a face's mass to each corner",
+        CLOTH,
+        "np.repeat(self.areas / 3, 3), minlength",
+        "np.repeat(self.areas / 2, 3), minlength",
+        fast=("weight_of_a_square_metre",),
+    ),
+    Fault(
+        "rest frame transposed",
+        CLOTH,
+        "np.stack([zero, across], -1)], axis=1)",
+        "np.stack([zero, across], -1)], axis=2)",
+    ),
+    Fault(
+        "mean instead of sum of hinge areas",
+        CLOTH,
+        ".sum(axis=1)\n\n    @cached_property\n    def boundary",
+        ".mean(axis=1)\n\n    @cached_property\n    def boundary",
+    ),
+    # membrane
+    Fault(
+        "lambda and mu swapped",
+        STVK,
+        "self.lam = cloth.material.lame_lambda",
+        "self.lam = cloth.material.lame_mu",
+        fast=("membrane_equibiaxial",),
+    ),
+    Fault("energy of the trace doubled", STVK, "(0.5 * lam * trace * trace", "(1.0 * lam * trace * trace"),
+    Fault("shear counted once", STVK, "2 * G01 * G01", "G01 * G01"),
+    Fault(
+        "F transposed in its first column", STVK, "e1 * D[0, 0] + e2 * D[1, 0]", "e1 * D[0, 0] + e2 * D[0, 1]"
+    ),
+    Fault("force by the transposed Dm", STVK, KERNEL, KERNEL.replace("D[0, 1]", "D[1, 0]")),
+    Fault(
+        "half the shear stress in the force",
+        STVK,
+        "lam * trace + 2 * mu * G11, 2 * mu * G01",
+        "lam * trace + 2 * mu * G11, mu * G01",
+    ),
+    Fault("first vertex feels one neighbour", STVK, "-= g1 + g2", "-= g1"),
+    Fault("geometric stiffness with the wrong sign", STVK, "value += bSb", "value -= bSb"),
+    Fault("material stiffness with swapped vertices", STVK, "Fb[c, i] * Fb[a, j]", "Fb[a, i] * Fb[c, j]"),
+    # hinges
+    Fault("hinge energy doubled", HINGE, "total += 0.5 * stiffness", "total += stiffness"),
+    Fault("hinge angle with the wrong sign", HINGE, "np.arctan2(sine,", "np.arctan2(-sine,"),
+    Fault(
+        "angle wrapped to [0, 2 pi)",
+        HINGE,
+        "np.floor((theta + np.pi) / (2 * np.pi))",
+        "np.floor(theta / (2 * np.pi))",
+    ),
+    Fault(
+        "angle not wrapped",
+        HINGE,
+        "return theta - 2 * np.pi * np.floor((theta + np.pi) / (2 * np.pi))",
+        "return theta",
+    ),
+    Fault("second tip pushed the wrong way", HINGE, "gradient[i3, i] -= s", "gradient[i3, i] += s"),
+    Fault("ends of the hinge swapped", HINGE, "length - t, t, -length", "t, length - t, -length"),
+    Fault(
+        "length-area scale twice too large",
+        HINGE,
+        "/ (4 * cloth.hinge_areas)",
+        "/ (2 * cloth.hinge_areas)",
+        fast=("hinges_folded_scaled",),
+    ),
+    Fault(
+        "curvature of theta with the wrong sign",
+        HINGE,
+        "s = (1.0 - convexity) * stiffness[h]",
+        "s = -(1.0 - convexity) * stiffness[h]",
+    ),
+    # weight and inertia
+    Fault(
+        "weight upwards in the force",
+        GRAVITY,
+        "gradient[:, 1] = self.weights",
+        "gradient[:, 1] = -self.weights",
+        fast=("gradient_of_gravity",),
+    ),
+    Fault("weight along x", GRAVITY, "gradient[:, 1] = self.weights", "gradient[:, 0] = self.weights"),
+    Fault(
+        "inertia over dt in the force",
+        INERTIA,
+        "gradient = (self.masses / self.dt**2)",
+        "gradient = (self.masses / self.dt)",
+    ),
+    Fault(
+        "inertia over dt in the Hessian",
+        INERTIA,
+        "return (self.masses / self.dt**2)",
+        "return (self.masses / self.dt)",
+    ),
+    Fault("inertia's energy doubled", INERTIA, "return 0.5 * float(np.vdot", "return 1.0 * float(np.vdot"),
+    Fault(
+        "velocity forgets dt",
+        INERTIA,
+        "step.previous + step.dt * step.velocity",
+        "step.previous + step.velocity",
+    ),
+    Fault(
+        "velocity backwards",
+        INERTIA,
+        "step.previous + step.dt * step.velocity",
+        "step.previous - step.dt * step.velocity",
+        fast=("free_fall",),
+    ),
+    Fault("velocity over the square of dt", STEPPER, "(x - before) / self.dt", "(x - before) / self.dt**2"),
+    Fault(
+        "sub-steps of a whole frame",
+        STEPPER,
+        "self.frame_dt, self.dt = dt, dt / substeps",
+        "self.frame_dt, self.dt = dt, dt",
+    ),
+    # contact
+    Fault("contact dropped from the force", CONTACT, "if depth > 0.0:", "if depth > 1e9:"),
+    Fault("contact force of a square", CONTACT, "force = -3.0 *", "force = -2.0 *"),
+    Fault("contact that pulls", CONTACT, "force = -3.0 *", "force = 3.0 *"),
+    Fault("margin beneath the skin", CONTACT, "max(margin - distance, 0.0)", "max(-margin - distance, 0.0)"),
+    Fault(
+        "contact stiffness without the area",
+        CONTACT,
+        "stiffness * self.sample_areas",
+        "stiffness * np.ones_like(self.sample_areas)",
+    ),
+    Fault(
+        "edges carry half as much again",
+        CONTACT,
+        "np.repeat(cloth.areas / 3, 3), len(edges))",
+        "np.repeat(cloth.areas / 2, 3), len(edges))",
+    ),
+    Fault("half the contact stiffness", CONTACT, "curvature = 6.0 *", "curvature = 3.0 *"),
+    # minimisers
+    Fault(
+        "Newton uphill",
+        NEWTON,
+        "        p = self.solve(-self.g)\n        return p, rung",
+        "        p = self.solve(self.g)\n        return p, rung",
+    ),
+    Fault("any step will do", NEWTON, "return after <= before + SUFFICIENT_DECREASE * slope", "return True"),
+    Fault(
+        "Armijo with the wrong sign",
+        NEWTON,
+        "return after <= before + SUFFICIENT_DECREASE * slope",
+        "return after <= before - SUFFICIENT_DECREASE * slope",
+    ),
+    Fault(
+        "convergence ignores the gradient",
+        NEWTON,
+        "if self.gradient_norm() <= self.target(data):",
+        "if True:",
+    ),
+    Fault("convergence ignores the step", NEWTON, "if step <= self.n._step_tolerance or", "if True or"),
+    Fault(
+        "tolerance a hundred thousand times too loose",
+        NEWTON,
+        "return max(self.n.tolerance, min(",
+        "return max(1e5 * self.n.tolerance, min(",
+    ),
+    Fault(
+        "gradient of one vertex only",
+        NEWTON,
+        "float(np.abs(self.g).max(initial=0.0))",
+        "float(np.abs(self.g[:3]).max(initial=0.0))",
+    ),
+    Fault("pinned vertices move", NEWTON, "free[cloth.pins] = False", "free[cloth.pins[:1]] = False"),
+    Fault(
+        "saddles pass for minima",
+        NEWTON,
+        "if self.factorise(data, tiny):",
+        "if self.factorise(data, tiny) or True:",
+    ),
+    Fault(
+        "shift in place of the Hessian",
+        NEWTON,
+        "data[self.n._pattern.diagonal] += shift * self.n._metric",
+        "data[self.n._pattern.diagonal] = shift * self.n._metric",
+    ),
+    Fault(
+        "half Newton steps",
+        NEWTON,
+        "step[self.n._free] = p.reshape(-1, 3)",
+        "step[self.n._free] = 0.5 * p.reshape(-1, 3)",
+    ),
+    Fault("L-BFGS adds what it should take away", LBFGS, "q = q - alpha * y", "q = q + alpha * y"),
+    Fault(
+        "L-BFGS pairs the gradient alone",
+        LBFGS,
+        "s, y = alpha * p, gradient - self.g",
+        "s, y = alpha * p, gradient",
+    ),
+    Fault(
+        "block transposed in the sparse matrix", PATTERN, "key = column * n + row", "key = row * n + column"
+    ),
+    Fault("lower half only", PATTERN, "lower + sp.tril(lower, -1).T", "lower"),
+    # the metric that judges
+    Fault("curvature over 2 A", CURVATURE, "np.divide(norm, 4.0 * area", "np.divide(norm, 2.0 * area"),
+    Fault(
+        "barycentric cells at half weight", CURVATURE, "cotangents[:, m]) / 8.0", "cotangents[:, m]) / 6.0"
+    ),
+)

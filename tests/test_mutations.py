@@ -1,0 +1,90 @@
+"""Faults planted in the physics, one line each: the validation suite has to notice every one of them.
+
+Each fault goes into a copy of the packages in a temporary folder, whose checks run in a process of their own.
+`pytest -m slow -s tests/test_mutations.py` prints the table of faults and of what caught them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from faults import FAULTS, Fault
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ("reference_sim", "benchmarks")
+ENOUGH = 2  # checks that fail before the others are left out
+RUNNER = """
+import json, sys
+from benchmarks.suites.validation import CHECKS, run_check
+names, enough = json.loads(sys.argv[1]), int(sys.argv[2])
+caught, ran = [], 0
+for check in CHECKS:
+    if check.name in names if names else check.smoke:
+        ran += 1
+        row = run_check(check)
+        if row.status != "ok":
+            caught.append([check.name, row.reason])
+        if len(caught) == enough:
+            break
+print(json.dumps([ran, caught]))
+"""
+
+
+def planted(fault: Fault | None, folder: Path) -> Path:
+    """A copy of the packages, compiled kernels included, with the fault in it."""
+    for package in PACKAGES:
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("*.tmp*"))
+    if fault is not None:
+        path = folder / fault.file
+        source = path.read_text(encoding="utf-8")
+        assert fault.right in source, f"{fault.title}: {fault.file} no longer holds {fault.right!r}"
+        path.write_text(source.replace(fault.right, fault.wrong, 1), encoding="utf-8")
+    return folder
+
+
+def outcome(folder: Path, names: tuple[str, ...] = (), enough: int = ENOUGH) -> tuple[int, list[list[str]]]:
+    """How many checks ran in the copy, and which of them failed and why."""
+    environment = os.environ | {"PYTHONPATH": str(folder), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", RUNNER, json.dumps(names), str(enough)]
+    try:
+        done = subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return 0, [["-", "no end within 300 s"]]
+    assert done.returncode == 0, done.stderr
+    ran, caught = json.loads(done.stdout.splitlines()[-1])
+    return ran, caught
+
+
+@pytest.mark.slow
+def test_nothing_is_caught_where_nothing_is_planted(tmp_path):
+    ran, caught = outcome(planted(None, tmp_path))
+    assert ran >= 30 and caught == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.title)
+def test_a_fault_is_caught(fault, tmp_path):
+    _, caught = outcome(planted(fault, tmp_path))
+    print(f"\n{fault.title:45s} {fault.file:32s} {', '.join(name for name, _ in caught)}")
+    assert caught, f"{fault.title}: the validation suite does not notice"
+
+
+@pytest.mark.parametrize("fault", [f for f in FAULTS if f.fast], ids=lambda fault: fault.title)
+def test_a_fault_is_caught_by_the_check_made_for_it(fault, tmp_path):
+    _, caught = outcome(planted(fault, tmp_path), fault.fast)
+    assert [name for name, _ in caught] == list(fault.fast)
+
+
+def test_there_are_enough_faults_and_each_still_has_its_line():
+    assert len({fault.title for fault in FAULTS}) == len(FAULTS) >= 20
+    lost = [f.title for f in FAULTS if f.right not in (ROOT / f.file).read_text(encoding="utf-8")]
+    assert not lost
+    assert all(fault.right != fault.wrong for fault in FAULTS)
