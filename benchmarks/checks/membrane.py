@@ -149,6 +149,15 @@ def rigid_motion() -> float:
     return float(np.abs(potential.gradient(x)).max())
 
 
+def rigid_invariance() -> float:
+    """Relative change of the forces on a patch in disorder as it moves and turns, seen from the patch."""
+    potential, x = _moved_patch()
+    x = x + np.random.default_rng(6).normal(0, 0.03, x.shape)
+    turn = random_rotation(9)
+    before, after = potential.gradient(x), potential.gradient(x @ turn.T + [0.5, -1.0, 2.0])
+    return float(np.linalg.norm(after @ turn - before) / np.linalg.norm(before))
+
+
 def zero_modes() -> float:
     """Number of eigenvalues of the Hessian under 1e-9 of the largest, at rest after a rigid motion."""
     potential, x = _moved_patch()
