@@ -91,7 +91,7 @@ def _cell(axes: Axes, column: int, line: int, row: Row) -> None:
     text = axes.text(column, line, word, ha="center", va="center", fontsize=7.5)
     text.set_color("white" if dark else "#222222")
     if word == "✕":
-        text.set_family("DejaVu Sans")  # the serif has no cross
+        text.set_fontfamily("DejaVu Sans")  # the serif has no cross
 
 
 def shade(iterations: float | None) -> tuple[float, float, float]:
