@@ -20,6 +20,11 @@ What is comparable and what is not:
 - XPBD, and VBD with sub-steps, by their own potential: of the last sub-step alone, whose energies are other
   ones than those of a frame; for XPBD not exactly, as its bending has no energy.
 - newton computes in float32: what is left of VBD's gap after many iterations may be round-off.
+
+Seen with newton 1.8.0, processor time of one thread: on VBD's own potential our Newton is done after 8
+iterations and 0.83 s; VBD has closed 25 % of its gap after 0.05 s (10 iterations), 66 % after 0.52 s (100)
+and 98.5 % after 5.1 s (1000). On ours, Newton closes 98 % in 0.04 s and ends in 0.35 s. Left to fall by
+itself with 10 or 100 iterations a frame, VBD is so far from converged that the sheet runs away downwards.
 """
 
 from __future__ import annotations
