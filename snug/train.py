@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snug.recipe import DEFAULT, RECIPES, Recipe, find_recipe
+from snug.recipe import DEFAULT, RECIPES, SUPERVISED, Recipe, find_recipe
 
 if TYPE_CHECKING:
     from snug.dresser import DressedBody
@@ -24,7 +24,7 @@ def train(
     steps: int,
     seed: int,
     trajectories: Mapping[str, np.ndarray] | None = None,
-    recipe: Recipe = DEFAULT,
+    recipe: Recipe | None = None,
     log: Callable[[dict[str, float]], None] | None = None,
     progress: bool = True,
     every: int = 50,
@@ -33,11 +33,14 @@ def train(
 
     model_kind: `snug` (physics), `supervised` (same network, vertices of a simulation), `pbns` (static).
     trajectories: for `supervised`, motion name -> simulated world vertices (T, V, 3) [m].
+    recipe: None takes DEFAULT, or SUPERVISED for that kind.
     log: called with each row of the history, every `every` steps. progress: a bar on standard error.
     Raises ValueError (TrainingError, TargetError, RecipeError) naming what is missing or diverged.
     """
     from snug.trainer import Trainer
 
+    if recipe is None:
+        recipe = SUPERVISED if model_kind == "supervised" else DEFAULT
     trainer = Trainer(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories
     )

@@ -50,3 +50,10 @@ def swaying(frames: int = 24, *, name: str = "sway", degrees: float = 25.0, fps:
     poses[:, 6, 1] = np.deg2rad(degrees) * np.sin(2 * np.pi * 0.7 * t)
     translations = np.stack([0 * t, 0.05 * np.abs(np.sin(3 * t)), 1.2 * t], axis=1)
     return Motion(name, poses, translations, fps=fps)
+
+
+def leaning(motion: Motion) -> Motion:
+    """The same motion with the root bent forward and to a side."""
+    poses = motion.poses.copy()
+    poses[:, 0] += [0.3, 0.0, 0.2]
+    return Motion(motion.name, poses, motion.translations, fps=motion.fps)

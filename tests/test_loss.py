@@ -98,26 +98,32 @@ def found(patch: Patch, anchors: np.ndarray, weights: np.ndarray, positions: np.
 def test_contact_search_finds_the_closest_allowed_point():
     dressed, motion = tube_dress(), swaying()
     contact = ContactPenalty(dressed.cloth)
-    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
-    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
-    transforms = dressed.transforms(motion.poses[[8, 16]])
-    positions = skin(torch.as_tensor(patch.rest), weights, transforms).numpy()
-    garment = skin(dressed.rest(), dressed.weights(5), transforms).numpy()
-    anchors = np.zeros(len(patch.sample_rest), np.int32)
-    for body, x in zip(positions, garment):
-        samples = (contact.sample_matrix @ x).astype(np.float32)
-        faces, barycentric = patch.search(samples, body, anchors)
-        assert barycentric.sum(1).max() < 1 + 1e-5 and barycentric.min() > -1e-5
-        distance = np.linalg.norm(found(patch, faces, barycentric, body) - samples, axis=1)
-        squared, nearest, _ = igl.point_mesh_squared_distance(
-            samples.astype(float), body.astype(float), patch.faces.astype(np.int64)
-        )
-        allowed = np.linalg.norm(patch.centroids[nearest] - patch.sample_rest, axis=1) < patch.region
-        wrong = np.abs(distance - np.sqrt(squared))[allowed] > 5e-4
-        # The walk down the surface may end in a dent between two seeds: rarely, and only there.
-        assert allowed.mean() > 0.9 and wrong.mean() < 0.01
-        taken = np.linalg.norm(patch.centroids[faces] - patch.sample_rest, axis=1)
-        assert taken.max() < patch.region
+    body = dressed.body
+    # A region this small leaves many a sample's nearest skin out of bounds when the trunk bends.
+    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces, region=0.07)
+    weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(motion.poses[[8]])
+    skin_now = skin(torch.as_tensor(patch.rest), weights, transforms)[0].numpy()
+    garment = skin(dressed.rest(), dressed.weights(5), transforms)[0].numpy()
+    samples = (contact.sample_matrix @ garment + [0.0, 0.05, 0.0]).astype(np.float32)
+    faces, barycentric = patch.search(samples, skin_now, np.zeros(len(samples), np.int32))
+    assert barycentric.sum(1).max() < 1 + 1e-5 and barycentric.min() > -1e-5
+    distance = np.linalg.norm(found(patch, faces, barycentric, skin_now) - samples, axis=1)
+    reach = np.linalg.norm(patch.centroids[None] - patch.sample_rest[:, None], axis=2)  # (S, Q)
+    gaps, moved = [], 0
+    for s in range(0, len(samples), 7):
+        allowed = np.flatnonzero(reach[s] < patch.region)
+        if len(allowed) == 0:
+            continue
+        assert reach[s, faces[s]] < patch.region
+        point, mesh = samples[s : s + 1].astype(float), skin_now.astype(float)
+        exact = igl.point_mesh_squared_distance(point, mesh, patch.faces[allowed].astype(np.int64))[0]
+        free = igl.point_mesh_squared_distance(point, mesh, patch.faces.astype(np.int64))[0]
+        gaps.append(distance[s] - float(np.sqrt(exact[0])))
+        moved += bool(free[0] < exact[0] - 1e-6)
+    # The walk down the surface may end in a dent between two seeds: rarely, and only there.
+    assert len(gaps) > 50 and moved > 10
+    assert min(gaps) > -1e-5 and np.mean(np.array(gaps) > 1e-3) < 0.03
 
 
 def test_anchors_follow_the_body_and_forget_nothing_but_what_is_renewed():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from dressing import swaying, tube_dress
+from dressing import leaning, swaying, tube_dress
 
 from snug.baselines.pbns import PoseSpaceDeformation
 from snug.motion import Motion
@@ -41,6 +41,16 @@ def test_state_carries_a_sequence_over_a_cut():
     assert (forgotten - second).abs().max() > 1e-3
 
 
+@pytest.mark.parametrize("kind", ["snug", "pbns"])
+def test_inputs_are_normalised_inside(kind):
+    network, plain = (make_network(kind, 12, 5, PAPER, seed=1) for _ in range(2))
+    mean, std = torch.randn(12), torch.rand(12) + 0.5
+    network.normalise_by(mean.numpy(), std.numpy())
+    features = torch.randn(2, 3, 12)
+    expected, _ = plain((features - mean) / std)
+    assert torch.allclose(network(features)[0], expected, atol=1e-6)
+
+
 def test_zero_last_layer_starts_at_the_template():
     for kind in ("snug", "pbns"):
         network = make_network(kind, 12, 5, DEFAULT, seed=1)
@@ -73,7 +83,7 @@ def test_pbns_is_one_matrix_per_activation():
 
 
 def test_default_inputs_know_no_heading_and_no_place():
-    dressed, motion = tube_dress(), swaying()
+    dressed, motion = tube_dress(), leaning(swaying())
     moved = turned(motion, 1.1, np.array([3.0, 0.5, -2.0]))
     plain, other = (dressed.features(m, DEFAULT) for m in (motion, moved))
     assert torch.allclose(plain, other, atol=1e-6)
@@ -84,8 +94,7 @@ def test_default_inputs_know_no_heading_and_no_place():
 def test_default_inputs_know_lean_speed_and_shape():
     dressed, motion = tube_dress(), swaying()
     plain = dressed.features(motion, DEFAULT)
-    leaning = Motion("lean", motion.poses + np.eye(24)[:, :1] * [0.3, 0, 0], motion.translations)
-    assert (dressed.features(leaning, DEFAULT) - plain).abs().max() > 0.1
+    assert (dressed.features(leaning(motion), DEFAULT) - plain).abs().max() > 0.1
     velocity = plain[:, -13:-10]
     assert (velocity[0] == 0).all() and np.allclose(velocity[1:, 2], 1.2, atol=1e-5)
     betas = np.linspace(-1, 1, 10)
