@@ -37,13 +37,20 @@ class DressedBody:
         self._rest_directions: Tensor | None = None
 
     def weights(self, smoothing: int) -> Tensor:
-        """Skinning weights (V, 24), borrowed from the nearest body vertex and averaged `smoothing` times."""
+        """Skinning weights (V, 24), borrowed from the nearest body vertex and averaged over neighbours.
+
+        smoothing: sweeps on a garment of 1000 vertices. A sweep reaches as far as an edge is long, so other
+        garments get sweeps in proportion to their vertices and are smoothed over the same length: with 20
+        for all, a shirt of 300 vertices is drawn into the body and one of 4400 keeps half of its skinning
+        noise.
+        """
         if smoothing not in self._weights:
             weights = self.garment.skinning_weights
             if smoothing:
                 from snug.garments import smooth_weights
 
-                weights = smooth_weights(weights, self.garment.faces, smoothing)
+                sweeps = max(1, round(smoothing * self.vertices / 1000))
+                weights = smooth_weights(weights, self.garment.faces, sweeps)
             self._weights[smoothing] = torch.as_tensor(np.asarray(weights), dtype=torch.float32)
         return self._weights[smoothing]
 

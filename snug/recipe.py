@@ -25,7 +25,8 @@ class Recipe:
     pose_input: `six` (two columns of each joint's rotation matrix, the root by its up direction alone, so
         that the direction a person walks in does not matter) or `axis_angle` (the 72 numbers of the pose).
     velocity_frame: axes of the root velocity, `root` or `world`.
-    smoothing: sweeps of neighbour averaging over the borrowed skinning weights.
+    smoothing: sweeps of neighbour averaging over the borrowed skinning weights, at 1000 vertices (see
+        DressedBody.weights).
     zero_last_layer: start at the skinned template instead of at centimetres of noise.
     output_scale: factor on the predicted offsets.
     learning_rate, drop_at, drop_factor: Adam, divided by `drop_factor` after the fraction `drop_at` of the

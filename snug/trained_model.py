@@ -70,7 +70,7 @@ class TrainedModel:
 
     def save(self, path: str | Path) -> Path:
         """Write weights and metadata to one safetensors file, whole or not at all."""
-        from safetensors.torch import save_file
+        from safetensors.torch import save
 
         path = Path(path)
         metadata = {
@@ -89,7 +89,7 @@ class TrainedModel:
         unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
         try:
             tensors = {name: tensor.contiguous() for name, tensor in self.network.state_dict().items()}
-            save_file(tensors, unfinished, metadata={"snug": json.dumps(metadata)})
+            unfinished.write_bytes(save(tensors, metadata={"snug": json.dumps(metadata)}))
             os.replace(unfinished, path)
         finally:
             unfinished.unlink(missing_ok=True)

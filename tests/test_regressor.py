@@ -6,6 +6,7 @@ import torch
 from dressing import leaning, swaying, tube_dress
 
 from snug.baselines.pbns import PoseSpaceDeformation
+from snug.garments import smooth_weights
 from snug.motion import Motion
 from snug.recipe import DEFAULT, PAPER, RECIPES, Recipe, RecipeError, find_recipe
 from snug.regressor import Regressor, parameter_megabytes
@@ -114,6 +115,13 @@ def test_dresser_agrees_with_the_body_in_the_world():
     rest = torch.as_tensor(body.shaped(betas)[::97]).float()
     posed = skin(rest, weights, dressed.transforms(motion.poses, betas)).double().numpy()
     assert np.abs(posed + dressed.pelvis(motion, betas)[:, None] - expected).max() < 1e-5
+
+
+def test_smoothing_reaches_as_far_on_every_mesh():
+    dressed = tube_dress()  # 150 vertices: 20 sweeps at 1000 are 3 here
+    expected = smooth_weights(dressed.garment.skinning_weights, dressed.garment.faces, 3)
+    assert np.abs(dressed.weights(20).numpy() - expected).max() < 1e-6
+    assert np.abs(dressed.weights(0).numpy() - dressed.garment.skinning_weights).max() < 1e-6
 
 
 def test_rest_follows_the_body_shape():
