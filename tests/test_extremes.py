@@ -235,7 +235,7 @@ def test_refused_inputs_have_a_table():
 # --- the solver's part ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("factor", "most"), [(1e3, 40), (1e4, 40), (1e5, 40)])
+@pytest.mark.parametrize(("factor", "most"), [(1e3, 40), (1e4, 40), (1e6, 40)])
 def test_stiff_cloth_converges_in_tens_of_iterations(factor, most):
     """Without predicted stresses and excursions: 99 iterations at x1e3, more than 300 beyond."""
     verdict = attempt(sheet(stiffness=factor))

@@ -38,7 +38,7 @@ CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
 FIRST_SHIFT = 1e-4
 MAX_SHIFT = 1e12  # beyond it a step is shorter than round-off
 STEP_TOLERANCE = 1e-3  # of a mean edge length
-EXCURSION = 14  # full steps in a row before the energy has to be below its start
+EXCURSION = 40  # full steps in a row before the energy has to be below its start
 FORESEEN = 0.9  # share of the predicted decrease from which on the quadratic model needs no help
 ROUND_OFF = 1e-2  # [vertex weights] what round-off may at most excuse in the gradient
 
