@@ -22,6 +22,7 @@ from reports.canvas import (
     save,
     wrapped,
 )
+from reports.stability import outcome_columns
 from reports.summary import suite_rows
 from reports.tables import check_name
 from reports.vtkhdf import MeshSeries
@@ -126,6 +127,8 @@ def extremes_outcomes(folder: Path, rows: Sequence[Row]) -> list[Picture]:
     found = [row for row in suite_rows(rows, "extremes") if row.metric == "outcome"]
     cases = list(dict.fromkeys(row.scene for row in found))
     methods = palette.ordered(row.method for row in found)
+    if len(methods) == 1 and len(cases) == len(found):
+        return [outcome_columns(folder, found)]
     pictures = []
     for part, first in enumerate(range(0, len(cases), CASES_PER_FIGURE)):
         shown = cases[first : first + CASES_PER_FIGURE]

@@ -102,6 +102,41 @@ def shade(iterations: float | None) -> tuple[float, float, float]:
     return red, green, blue
 
 
+def outcome_columns(folder: Path, found: Sequence[Row]) -> Picture:
+    """The cases of a single method in columns on one page, each worded and coloured by how it ended."""
+    columns = 1 if len(found) <= 12 else 3
+    lines = -(-len(found) // columns)
+    figure = new_figure(PAGE_WIDTH if columns > 1 else 0.5 * PAGE_WIDTH, 0.2 + 0.21 * lines)
+    axes = figure.subplots()
+    for number, row in enumerate(found):
+        _case(axes, number // lines, number % lines, row)
+    axes.set_xlim(-0.01, columns - 0.02)
+    axes.set_ylim(lines - 0.5, -0.5)
+    axes.axis("off")
+    caption = (
+        f"How each extreme case ended for {palette.label(found[0].method)}. Blue: converged. The number is "
+        "the largest gradient left, in vertex weights. The table says why the others did not."
+    )
+    return save(figure, folder, "extremes_1", caption=caption, section="extremes", kind="outcomes")
+
+
+def _case(axes: Axes, column: int, line: int, row: Row) -> None:
+    """A pale cell with a strip of the status's full colour at its left."""
+    from matplotlib.colors import to_rgb
+    from matplotlib.patches import Rectangle
+
+    colour = to_rgb(palette.STATUS_COLOURS[row.status])
+    pale = tuple(1.0 - 0.28 * (1.0 - part) for part in colour)
+    axes.add_patch(Rectangle((column, line - 0.43), 0.97, 0.86, facecolor=pale, linewidth=0))
+    axes.add_patch(Rectangle((column, line - 0.43), 0.02, 0.86, facecolor=colour, linewidth=0))
+    name = row.scene.replace("_", " ")
+    axes.text(column + 0.035, line, name, ha="left", va="center", fontsize=7.2)
+    known = row.value is not None and math.isfinite(row.value)
+    words = [] if row.status == "ok" else [row.status]
+    words += [power_text(row.value)] if known and row.value is not None else []
+    axes.text(column + 0.955, line, "  ".join(words), ha="right", va="center", fontsize=7.2)
+
+
 def refusals(rows: Sequence[Row]) -> Table | None:
     """Each bad input and the message that refused it."""
     lines = [
