@@ -17,9 +17,12 @@ class Fault:
 
 
 MATERIAL, CLOTH, STEPPER = (f"reference_sim/{name}.py" for name in ("material", "cloth", "stepper"))
-STVK, HINGE, GRAVITY, INERTIA, CONTACT = (
+STVK, SPRING, BARRIER, HINGE = (
     f"reference_sim/energies/{name}.py"
-    for name in ("stretch_stvk", "bend_hinge", "gravity", "inertia", "contact_penalty")
+    for name in ("stretch_stvk", "stretch_spring", "area_barrier", "bend_hinge")
+)
+GRAVITY, INERTIA, CONTACT = (
+    f"reference_sim/energies/{name}.py" for name in ("gravity", "inertia", "contact_penalty")
 )
 NEWTON, LBFGS = (f"reference_sim/minimise/{name}.py" for name in ("newton", "lbfgs"))
 PATTERN, CURVATURE = "reference_sim/hessian_pattern.py", "benchmarks/metrics/curvature.py"
@@ -91,7 +94,14 @@ FAULTS = (
     Fault("first vertex feels one neighbour", STVK, "-= g1 + g2", "-= g1"),
     Fault("geometric stiffness with the wrong sign", STVK, "value += bSb", "value -= bSb"),
     Fault("material stiffness with swapped vertices", STVK, "Fb[c, i] * Fb[a, j]", "Fb[a, i] * Fb[c, j]"),
+    Fault("strain as seen from above", STVK, " + fa[2] * fa[2] - 1.0", " - 1.0"),
+    Fault("half a spring's force", SPRING, "s = 2 * stiffness * stretch", "s = stiffness * stretch"),
+    Fault("slack springs stiff across", SPRING, "slack = (1 - self", "slack = (1 + self"),
+    Fault("half the barrier's first slope", BARRIER, "(2 * (q - q0) * log +", "(1 * (q - q0) * log +"),
+    Fault("half the barrier's middle curvature", BARRIER, "(2 * log + 4 *", "(2 * log + 2 *"),
     # hinges
+    Fault("rest angle added", HINGE, "theta -= rest", "theta += rest"),
+    Fault("half the hinge stiffness", HINGE, "B[i, j] = stiffness[h] *", "B[i, j] = 0.5 * stiffness[h] *"),
     Fault("hinge energy doubled", HINGE, "total += 0.5 * stiffness", "total += stiffness"),
     Fault("hinge angle with the wrong sign", HINGE, "np.arctan2(sine,", "np.arctan2(-sine,"),
     Fault(

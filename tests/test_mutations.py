@@ -15,6 +15,9 @@ from pathlib import Path
 
 import pytest
 from faults import FAULTS, Fault
+from witnesses import WITNESSES
+
+from benchmarks.suites.validation import CHECKS
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("reference_sim", "benchmarks")
@@ -75,6 +78,19 @@ def test_a_fault_is_caught(fault, tmp_path):
     _, caught = outcome(planted(fault, tmp_path))
     print(f"\n{fault.title:45s} {fault.file:32s} {', '.join(name for name, _ in caught)}")
     assert caught, f"{fault.title}: the validation suite does not notice"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("title", WITNESSES)
+def test_a_check_fails_where_it_should(title, tmp_path):
+    fault = next(fault for fault in FAULTS if fault.title == title)
+    _, caught = outcome(planted(fault, tmp_path), WITNESSES[title], len(CHECKS))
+    assert {name for name, _ in caught} == set(WITNESSES[title])
+
+
+def test_every_judged_check_has_a_fault_that_it_notices():
+    witnessed = [name for names in WITNESSES.values() for name in names]
+    assert sorted(witnessed) == sorted(check.name for check in CHECKS if check.tolerance is not None)
 
 
 @pytest.mark.parametrize("fault", [f for f in FAULTS if f.fast], ids=lambda fault: fault.title)
