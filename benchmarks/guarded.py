@@ -7,6 +7,7 @@ takes the interpreter down with it, has to be stopped from outside.
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable
 from typing import Any
 
@@ -69,10 +70,11 @@ class Guarded:
 
 
 def _serve(pipe: Any) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent alone answers an interrupt
     while True:
         try:
             function, arguments = pipe.recv()
-        except (EOFError, KeyboardInterrupt):
+        except EOFError:
             return
         try:
             answer = (True, function(*arguments))

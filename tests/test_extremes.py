@@ -125,6 +125,31 @@ def test_the_judge_uses_no_kernel(solved, monkeypatch):
     assert examine(step, result.positions) == before
 
 
+def test_a_minimiser_that_lies_is_caught_by_what_the_suite_runs(solved):
+    """The same way that run_case goes, with fakes in the place of the solver."""
+    step, _ = solved
+    point = sheet(start="point", terms="membrane", pins="none", speed=0.0, gravity=0.0)
+
+    def standing(potential, x0, *, tolerance, timeout, observe):
+        observe(x0)
+        return claiming(x0)
+
+    def vanishing(potential, x0, **options):
+        return claiming(np.full_like(x0, np.nan), "stalled")
+
+    def climbing(potential, x0, *, tolerance, timeout, observe):
+        truth = minimise(potential, x0, tolerance=tolerance)
+        for share in (0.0, 1.0, 0.9, 1.0):
+            observe(x0 + share * (truth.positions - x0))
+        return truth
+
+    lies = [(point, standing, "saddle"), (step, standing, "claims convergence"),
+            (step, vanishing, "not finite"), (step, climbing, "rose")]  # fmt: skip
+    for case, solve, words in lies:
+        verdict = attempt(case, solve)
+        assert verdict.status == "failed" and words in verdict.reason, (solve, verdict)
+
+
 # --- hangs and crashes ----------------------------------------------------------------------------------
 
 
