@@ -190,7 +190,9 @@ class _Run:
         first, foreseen = rung, self.foreseeing
         p, rung = first_p, first_rung = self.direction(data, rung)
         slope = float(g @ p)
-        for k in range(self.patience + 1 if slope < 0 else 0):  # none if it is nan
+        # Every direction is an iteration, also one that is taken back: the loop counts the first.
+        patience = min(self.patience, self.n.max_iterations - self.iterations - 1)
+        for k in range(patience + 1 if slope < 0 else 0):  # none if it is nan
             step = np.zeros_like(start)
             step[self.n._free] = p.reshape(-1, 3)
             if not np.isfinite(p).all() or self.n.potential.largest_step(self.x, step) < 1:
@@ -207,8 +209,9 @@ class _Run:
                 self.rung, self.climbed = rung, rung > first
                 self.patience = EXCURSION
                 return True
-            if k < self.patience:
+            if k < patience:
                 p, rung = self.direction(self.assemble(rung), rung)
+                self.iterations += 1
         self.n.potential.forget()
         self.foreseeing = False
         self.patience //= 2
