@@ -141,9 +141,7 @@ class HessianPattern:
             if energy.dynamic:
                 continue
             elements, blocks = (
-                energy.active_hessian_blocks(x, convexity)
-                if self.block == 3
-                else energy.scalar_stiffness(x)
+                energy.active_hessian_blocks(x, convexity) if self.block == 3 else energy.scalar_stiffness(x)
             )
             k = energy.stencils.shape[1]
             _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)

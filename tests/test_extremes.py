@@ -156,8 +156,10 @@ def test_a_minimiser_that_lies_is_caught_by_what_the_suite_runs(solved):
 def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():
     with Guarded() as guarded:
         assert guarded.call(operator.mul, 2, 4, seconds=60) == 8
+        began = time.monotonic()
         with pytest.raises(Broken, match=r"no answer within 0\.2 s"):
             guarded.call(time.sleep, 1000, seconds=0.2)
+        assert time.monotonic() - began < 4.0
         with pytest.raises(Broken, match="ended with status 7"):
             guarded.call(os._exit, 7, seconds=60)
         with pytest.raises(ValueError, match="invalid literal"):
@@ -260,7 +262,7 @@ def test_refused_inputs_have_a_table():
 # --- the solver's part ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("factor", "most"), [(1e3, 40), (1e4, 40), (1e6, 40)])
+@pytest.mark.parametrize(("factor", "most"), [(1e3, 60), (1e4, 60), (1e6, 80)])
 def test_stiff_cloth_converges_in_tens_of_iterations(factor, most):
     """Without predicted stresses and excursions: 99 iterations at x1e3, more than 300 beyond."""
     verdict = attempt(sheet(stiffness=factor))
@@ -312,7 +314,7 @@ def test_every_kept_point_is_observed_and_lower_than_the_one_before():
     kept = []
     result = minimise(step.potential, step.guess, observe=kept.append)
     assert np.array_equal(kept[0], step.guess) and np.array_equal(kept[-1], result.positions)
-    assert len(kept) == result.iterations + 1
+    assert 2 < len(kept) <= result.iterations + 1  # an excursion's way is not kept, only its end
     values = np.array([step.potential.value(x) for x in kept])
     assert (np.diff(values) < 1e-13 * values[0]).all()
 

@@ -49,7 +49,9 @@ class ContactFriction(Energy):
 
     def prepare(self, step: Step) -> None:
         if step.obstacle is None or self.contact.planes is None:
-            raise ValueError("ContactFriction needs an obstacle, and its ContactPenalty before it in the terms")
+            raise ValueError(
+                "ContactFriction needs an obstacle, and its ContactPenalty before it in the terms"
+            )
         planes = self.contact.planes
         samples = self.contact.sample_matrix @ step.previous
         depth = np.zeros(len(samples))
