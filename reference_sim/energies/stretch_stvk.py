@@ -90,9 +90,8 @@ class StretchStVK(Energy):
 
 
 @njit(cache=True, inline="always")
-def _deformation(x, face, D):
-    """F as two columns (fa, fb), and the second Piola stress factors of G: (G00, G11, G01)."""
-    fa, fb = np.empty(3), np.empty(3)
+def _deformation(x, face, D, fa, fb):
+    """Strain (G00, G11, G01); the columns of F are written into fa and fb."""
     for i in range(3):
         e1 = x[face[1], i] - x[face[0], i]
         e2 = x[face[2], i] - x[face[0], i]
@@ -101,16 +100,17 @@ def _deformation(x, face, D):
     G00 = 0.5 * (fa[0] * fa[0] + fa[1] * fa[1] + fa[2] * fa[2] - 1.0)
     G11 = 0.5 * (fb[0] * fb[0] + fb[1] * fb[1] + fb[2] * fb[2] - 1.0)
     G01 = 0.5 * (fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2])
-    return fa, fb, G00, G11, G01
+    return G00, G11, G01
 
 
 @njit(cache=True)
 def _gradient(x, faces, Dm_inverse, areas, lam, mu, gradient):
     """dE/dx_a = A F S b_a with S = lambda tr(G) I + 2 mu G and b_a the gradient of the hat function."""
     total = 0.0
+    fa, fb = np.empty(3), np.empty(3)
     for f in range(faces.shape[0]):
         D = Dm_inverse[f]
-        fa, fb, G00, G11, G01 = _deformation(x, faces[f], D)
+        G00, G11, G01 = _deformation(x, faces[f], D, fa, fb)
         trace = G00 + G11
         total += areas[f] * (0.5 * lam * trace * trace + mu * (G00 * G00 + G11 * G11 + 2 * G01 * G01))
         S00, S11, S01 = lam * trace + 2 * mu * G00, lam * trace + 2 * mu * G11, 2 * mu * G01
@@ -145,9 +145,10 @@ def _less_compressed(S00, S11, S01, keep):
 @njit(cache=True)
 def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
     """S00, S11, S01 of S = lambda tr(G) I + 2 mu G with G(x) + sym(F(x)^T dF), linear in the step."""
+    fa, fb, da, db = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for f in range(faces.shape[0]):
-        fa, fb, G00, G11, G01 = _deformation(x, faces[f], Dm_inverse[f])
-        da, db, _, _, _ = _deformation(step, faces[f], Dm_inverse[f])
+        G00, G11, G01 = _deformation(x, faces[f], Dm_inverse[f], fa, fb)
+        _deformation(step, faces[f], Dm_inverse[f], da, db)
         for i in range(3):
             G00 += fa[i] * da[i]
             G11 += fb[i] * db[i]
@@ -161,9 +162,10 @@ def _hessian(x, faces, Dm_inverse, areas, lam, mu, convexity, stress, blocks):
     """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)]."""
     b = np.empty((3, 2))
     Fb = np.empty((3, 3))
+    fa, fb = np.empty(3), np.empty(3)
     for f in range(faces.shape[0]):
         D = Dm_inverse[f]
-        fa, fb, _, _, _ = _deformation(x, faces[f], D)
+        _deformation(x, faces[f], D, fa, fb)
         S00, S11, S01 = stress[f, 0], stress[f, 1], stress[f, 2]
         if convexity > 0.0:
             S00, S11, S01 = _less_compressed(S00, S11, S01, 1.0 - convexity)
