@@ -38,6 +38,7 @@ CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
 FIRST_SHIFT = 1e-4
 MAX_SHIFT = 1e12  # beyond it a step is shorter than round-off
 STEP_TOLERANCE = 1e-3  # of a mean edge length
+CALM = 20  # iterations before the first excursion: most steps of a garment are done by then, and sooner so
 EXCURSION = 40  # full steps in a row before the energy has to be below its start
 FORESEEN = 0.9  # share of the predicted decrease from which on the quadratic model needs no help
 ROUND_OFF = 1e-2  # [vertex weights] what round-off may at most excuse in the gradient
@@ -74,6 +75,7 @@ class Newton:
         self._free = self._pattern.free
         self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
         dt = next((e.dt for e in potential.energies if isinstance(e, Inertia)), reference_dt)
+        self._static = not any(isinstance(e, Inertia) for e in potential.energies)
         self._metric = np.repeat(cloth.masses[self._free] / dt**2, 3)
         self._weight = float(cloth.masses.mean() * GRAVITY)
         # Curvature that gains less than the tolerance over the width of the cloth is none.
@@ -191,7 +193,8 @@ class _Run:
         p, rung = first_p, first_rung = self.direction(data, rung)
         slope = float(g @ p)
         # Every direction is an iteration, also one that is taken back: the loop counts the first.
-        patience = min(self.patience, self.n.max_iterations - self.iterations - 1)
+        bold = self.iterations >= CALM
+        patience = min(self.patience, self.n.max_iterations - self.iterations - 1) if bold else 0
         for k in range(patience + 1 if slope < 0 else 0):  # none if it is nan
             step = np.zeros_like(start)
             step[self.n._free] = p.reshape(-1, 3)
@@ -203,7 +206,7 @@ class _Run:
             if not (np.isfinite(self.value) and np.isfinite(self.g).all()):
                 break
             if fallen(value, self.value, slope) or (k == 0 and level(value, self.value, slope, self.g @ p)):
-                self.foreseeing = k > 0 or self.value - value > FORESEEN * 0.5 * slope
+                self.foreseeing = bold and (k > 0 or self.value - value > FORESEEN * 0.5 * slope)
                 if not self.foreseeing:
                     self.n.potential.forget()
                 self.rung, self.climbed = rung, rung > first
@@ -214,7 +217,7 @@ class _Run:
                 self.iterations += 1
         self.n.potential.forget()
         self.foreseeing = False
-        self.patience //= 2
+        self.patience = self.patience // 2 if bold else EXCURSION
         self.x, self.value, self.g = start, value, g
         self.rung, self.climbed = first_rung, first_rung > first
         return not foreseen and slope < 0 and self.line_search(first_p, slope)
@@ -222,7 +225,8 @@ class _Run:
     def direction(self, data: np.ndarray, rung: int) -> tuple[np.ndarray, int]:
         """-H^-1 g on the first rung, then shift, on which H is positive definite, and that rung."""
         shift = 0.0
-        while not self.factorise(data, shift):
+        # A singular Hessian, as of a cloth that may move rigidly, is no reason to climb. Inertia excludes it.
+        while not self.factorise(data, shift or (self.tiny(data) if self.n._static else 0.0)):
             if rung + 1 < len(CONVEXITY):
                 rung += 1
                 data = self.assemble(rung)
@@ -272,8 +276,7 @@ class _Run:
         The gradient is small. What is left to ask is whether the true Hessian is positive definite (up to
         round-off, so that rigid motions of an unpinned cloth do not count) and its step negligible.
         """
-        stiffest = float(np.abs(data[self.n._pattern.diagonal]).max(initial=0.0))
-        tiny = max(self.n._flat, 1e-13 * stiffest) / self.n._metric
+        tiny = self.tiny(data)
         if self.factorise(data, tiny):
             step = float(np.abs(self.solve(-self.g)).max(initial=0.0))
             if step <= self.n._step_tolerance or self.gradient_norm() == 0.0:
@@ -283,6 +286,11 @@ class _Run:
             self.iterations += 1
             return None
         return self.result("stalled", "a saddle: negative curvature, and no step along it lowers the energy")
+
+    def tiny(self, data: np.ndarray) -> np.ndarray:
+        """The shift below which curvature counts as none."""
+        stiffest = float(np.abs(data[self.n._pattern.diagonal]).max(initial=0.0))
+        return max(self.n._flat, 1e-13 * stiffest) / self.n._metric
 
     def escape_saddle(self, data: np.ndarray) -> bool:
         """Step along the most negative curvature direction, found by inverse iteration."""
