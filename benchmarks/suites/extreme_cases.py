@@ -146,6 +146,8 @@ STEPS = (
     _sheet("stiffness_x0.01_barrier", "stiffness x0.01 with the area barrier", stiffness=1e-2, terms=ALL),
     _sheet("hinge_stiff_through_pi_barrier", "hinges x1e4 through 180 degrees with the area barrier",
            start="folded by 180", speed="closing at 30 rad/s", bending=1e4, terms=ALL),
+    _sheet("rest_angle_90_barrier", "every hinge wants 90 degrees, with the area barrier",
+           rest_angles=1.5707963, bending=100.0, terms=ALL),
     _sheet("rest_angle_180_barrier", "every hinge wants to be shut, with the area barrier",
            rest_angles=3.1415, bending=100.0, terms=ALL),
     _sheet("rest_angles_random_barrier", "random rest angles with the area barrier", rest_angles="random",

@@ -281,6 +281,8 @@ class _Run:
             step = float(np.abs(self.solve(-self.g)).max(initial=0.0))
             if step <= self.n._step_tolerance or self.gradient_norm() == 0.0:
                 return self.result("converged", f"gradient within tolerance, Newton step {step:.1e} m")
+            if not self.factorise(data, 0.0):  # no step along such a direction can be told from another
+                return self.result("converged", "gradient within tolerance, a direction without curvature")
             return None
         if self.escape_saddle(data):
             self.iterations += 1
