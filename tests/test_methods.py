@@ -18,7 +18,7 @@ from benchmarks.scenes import SMALL_SCENES, dressed_scene
 from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from reference_sim import Trajectory
 
-TINY = dataclasses.replace(find_preset("smoke"), frames=5, settle_frames=4, sheet_cells=4, sheet_frames=5)
+TINY = dataclasses.replace(find_preset("smoke"), frames=16, settle_frames=4, sheet_cells=4, sheet_frames=5)
 TRAIN, TEST = "arm_raise", "kick"
 KINDS = ("untrained", "snug", "supervised", "pbns")
 
