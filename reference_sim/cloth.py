@@ -70,6 +70,13 @@ class Cloth:
         return len(self.rest_positions)
 
     @cached_property
+    def free(self) -> np.ndarray:
+        """(V,) True for vertices that are not pinned."""
+        free = np.ones(self.vertex_count, dtype=bool)
+        free[self.pins] = False
+        return free
+
+    @cached_property
     def _frames(self) -> np.ndarray:
         """(F, 2, 2) matrices Dm = [X1 - X0, X2 - X0] in a local orthonormal frame of the face [m]."""
         if self.rest_uv is not None:

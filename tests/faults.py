@@ -24,7 +24,7 @@ STVK, SPRING, BARRIER, HINGE = (
 GRAVITY, INERTIA, CONTACT = (
     f"reference_sim/energies/{name}.py" for name in ("gravity", "inertia", "contact_penalty")
 )
-NEWTON, LBFGS = (f"reference_sim/minimise/{name}.py" for name in ("newton", "lbfgs"))
+NEWTON, LBFGS, DESCENT = (f"reference_sim/minimise/{name}.py" for name in ("newton", "lbfgs", "descent"))
 PATTERN, CURVATURE = "reference_sim/hessian_pattern.py", "benchmarks/metrics/curvature.py"
 KERNEL = "P0 * D[0, 0] + P1 * D[0, 1]"
 
@@ -220,11 +220,11 @@ FAULTS = (
     ),
     Fault(
         "gradient of one vertex only",
-        NEWTON,
+        DESCENT,
         "float(np.abs(self.g).max(initial=0.0))",
         "float(np.abs(self.g[:3]).max(initial=0.0))",
     ),
-    Fault("pinned vertices move", NEWTON, "free[cloth.pins] = False", "free[cloth.pins[:1]] = False"),
+    Fault("pinned vertices move", CLOTH, "free[self.pins] = False", "free[self.pins[:1]] = False"),
     Fault(
         "saddles pass for minima",
         NEWTON,
@@ -239,9 +239,9 @@ FAULTS = (
     ),
     Fault(
         "half Newton steps",
-        NEWTON,
-        "step[self.n._free] = p.reshape(-1, 3)",
-        "step[self.n._free] = 0.5 * p.reshape(-1, 3)",
+        DESCENT,
+        "step[self.free] = p.reshape(-1, 3)",
+        "step[self.free] = 0.5 * p.reshape(-1, 3)",
     ),
     Fault("L-BFGS adds what it should take away", LBFGS, "q = q - alpha * y", "q = q + alpha * y"),
     Fault(

@@ -14,8 +14,8 @@ from collections import deque
 import numpy as np
 
 from ..linear_solver import analyse
-from ..material import GRAVITY
 from ..potential import Potential
+from .descent import Descent
 from .newton import FIRST_SHIFT, SUFFICIENT_DECREASE, Newton
 from .result import Result
 
@@ -51,21 +51,17 @@ class LBFGS:
         self.potential, self.memory, self.timeout = potential, memory, timeout
         self.max_iterations = max_iterations
         self.switch = max(switch, tolerance) if finish else tolerance
-        free = np.ones(cloth.vertex_count, dtype=bool)
-        free[cloth.pins] = False
-        self._free = np.flatnonzero(free)
         if not any(energy.has_scalar_stiffness for energy in potential.energies):
             raise ValueError("LBFGS: no term of this potential has a scalar stiffness to precondition with")
-        self._pattern = potential.pattern(free, block=1)
+        self._pattern = potential.pattern(cloth.free, block=1)
         self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
         # Without inertia and pins rigid motions would leave the preconditioner singular.
-        self._floor = FIRST_SHIFT * cloth.masses[self._free] * 30**2
-        self._weight = float(cloth.masses.mean() * GRAVITY)
+        self._floor = FIRST_SHIFT * cloth.masses[cloth.free] * 30**2
         self._newton = Newton(potential, tolerance=tolerance, timeout=timeout) if finish else None
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]."""
-        run = _Run(self, np.array(x0, dtype=np.float64, order="C"))
+        run = _Run(self, x0)
         status, reason = run.to_the_end()
         if self._newton is None or status in ("diverged", "timeout"):
             return run.result(status, reason)
@@ -83,41 +79,28 @@ class LBFGS:
         )
 
 
-class _Run:
-    """State of one minimisation."""
+class _Run(Descent):
+    """State of one minimisation by L-BFGS."""
 
     def __init__(self, owner: LBFGS, x: np.ndarray) -> None:
-        self.o, self.x = owner, x
-        self.iterations = self.factorisations = 0
-        self.seconds = dict.fromkeys(("assemble", "factorise", "solve", "evaluate"), 0.0)
-        self.started = time.perf_counter()
+        super().__init__(owner.potential, x)
+        self.o = owner
         self.pairs: deque[tuple[np.ndarray, np.ndarray, float]] = deque(maxlen=owner.memory)
-        self.value, self.g = self.evaluate(x)
-
-    def evaluate(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        start = time.perf_counter()
-        with np.errstate(all="ignore"):
-            value, gradient = self.o.potential.value_and_gradient(x)
-        self.seconds["evaluate"] += time.perf_counter() - start
-        return value, gradient[self.o._free]
 
     def to_the_end(self) -> tuple[str, str]:
-        if not (np.isfinite(self.value) and np.isfinite(self.g).all()):
+        if not self.finite:
             return "diverged", "energy or gradient is not finite at the starting point"
         if not self.precondition():
             return "diverged", "the preconditioner is not positive definite"
         while self.gradient_norm() > self.o.switch:
             if self.iterations >= self.o.max_iterations:
                 return "max_iterations", f"gave up after {self.iterations} iterations"
-            if time.perf_counter() - self.started > self.o.timeout:
+            if self.late(self.o.timeout):
                 return "timeout", f"gave up after {self.o.timeout:g} s"
             if not self.step():
                 return "stalled", "no step along the quasi-Newton direction lowers the energy"
             self.iterations += 1
         return "max_iterations", "gradient within tolerance; curvature not checked"
-
-    def gradient_norm(self) -> float:
-        return float(np.abs(self.g).max(initial=0.0)) / self.o._weight
 
     def precondition(self) -> bool:
         start = time.perf_counter()
@@ -139,7 +122,7 @@ class _Run:
             alpha = rho * float(np.vdot(s, q))
             alphas.append(alpha)
             q = q - alpha * y
-        p = self.o._solver.solve(q)
+        p = self.o._solver.solve(q.reshape(-1, 3)).ravel()  # x, y and z share one matrix
         for (s, y, rho), alpha in zip(self.pairs, reversed(alphas)):
             p += (alpha - rho * float(np.vdot(y, p))) * s
         self.seconds["solve"] += time.perf_counter() - start
@@ -157,9 +140,8 @@ class _Run:
             self.pairs.clear()
 
     def line_search(self, p: np.ndarray, slope: float) -> bool:
-        step = np.zeros_like(self.x)
-        step[self.o._free] = p
-        alpha = self.o.potential.largest_step(self.x, step)
+        step = self.spread(p)
+        alpha = self.potential.largest_step(self.x, step)
         for _ in range(24):
             trial = self.x + alpha * step
             value, gradient = self.evaluate(trial)
@@ -173,16 +155,3 @@ class _Run:
                 return True
             alpha *= 0.5
         return False
-
-    def result(self, status: str, reason: str) -> Result:
-        return Result(
-            positions=self.x,
-            status=status,
-            reason=reason,
-            iterations=self.iterations,
-            factorisations=self.factorisations,
-            gradient_norm=self.gradient_norm(),
-            energy=self.value,
-            terms=self.o.potential.terms(self.x),
-            seconds=self.seconds,
-        )

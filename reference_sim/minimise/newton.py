@@ -27,8 +27,8 @@ import numpy as np
 
 from ..energies.inertia import Inertia
 from ..linear_solver import analyse
-from ..material import GRAVITY
 from ..potential import Potential
+from .descent import Descent, mean_weight
 from .result import Result
 
 SUFFICIENT_DECREASE = 1e-4
@@ -49,8 +49,8 @@ class Newton:
 
     Args:
         tolerance: largest gradient component at the end, in mean vertex weights.
-        max_iterations: iterations before giving up with status max_iterations; an iteration is a point that
-            was kept, whatever the number of factorisations on the way to it.
+        max_iterations: iterations before giving up with status max_iterations; every direction solved for is
+            one, also one that is taken back.
         timeout: seconds before giving up with status timeout.
         reference_dt: time [s] in the shift M/dt^2 where the potential has no inertia of its own.
         observe: called with every point (V, 3) [m] that was kept, the start included.
@@ -69,22 +69,18 @@ class Newton:
         cloth = potential.cloth
         self.potential, self.observe = potential, observe
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
-        free = np.ones(cloth.vertex_count, dtype=bool)
-        free[cloth.pins] = False
-        self._pattern = potential.pattern(free)
-        self._free = self._pattern.free
+        self._pattern = potential.pattern(cloth.free)
         self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
         dt = next((e.dt for e in potential.energies if isinstance(e, Inertia)), reference_dt)
         self._static = not any(isinstance(e, Inertia) for e in potential.energies)
-        self._metric = np.repeat(cloth.masses[self._free] / dt**2, 3)
-        self._weight = float(cloth.masses.mean() * GRAVITY)
+        self._metric = np.repeat(cloth.masses[cloth.free] / dt**2, 3)
         # Curvature that gains less than the tolerance over the width of the cloth is none.
-        self._flat = tolerance * self._weight / float(np.sqrt(cloth.areas.sum()))
+        self._flat = tolerance * mean_weight(potential) / float(np.sqrt(cloth.areas.sum()))
         self._step_tolerance = STEP_TOLERANCE * float(cloth.edge_lengths.mean())
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]."""
-        result = _Run(self, np.array(x0, dtype=np.float64, order="C")).to_the_end()
+        result = _Run(self, x0).to_the_end()
         objection = self.potential.objection(result.positions)
         return replace(result, status="diverged", reason=objection) if objection else result
 
@@ -101,35 +97,23 @@ class Newton:
         return pattern.assemble(x, changing, convexity=convexity)
 
 
-class _Run:
-    """State of one minimisation."""
+class _Run(Descent):
+    """State of one minimisation by Newton's method."""
 
     def __init__(self, newton: Newton, x: np.ndarray) -> None:
+        super().__init__(newton.potential, x)
         self.n = newton
-        self.x = x
         self.rung, self.climbed = 0, False  # of CONVEXITY at the last step; whether it had to climb there
         self.foreseeing = False  # whether the Hessian takes stresses that the last step predicted
         self.patience = EXCURSION  # for the next excursion: less after one that came to nothing
-        self.iterations = self.factorisations = 0
-        self.seconds = dict.fromkeys(("assemble", "factorise", "solve", "evaluate"), 0.0)
-        self.started = time.perf_counter()
-        self.value, self.g = self.evaluate(x)
-
-    def evaluate(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Value and gradient over the free vertices, flat."""
-        start = time.perf_counter()
-        with np.errstate(all="ignore"):  # a hopeless trial point is judged by its value, not by a warning
-            value, gradient = self.n.potential.value_and_gradient(x)
-        self.seconds["evaluate"] += time.perf_counter() - start
-        return value, gradient[self.n._free].ravel()
 
     def to_the_end(self) -> Result:
-        if not (np.isfinite(self.value) and np.isfinite(self.g).all()):
+        if not self.finite:
             return self.result("diverged", "energy or gradient is not finite at the starting point")
         try:
             return self.iterate()
         finally:
-            self.n.potential.forget()
+            self.potential.forget()
 
     def iterate(self) -> Result:
         while True:
@@ -141,12 +125,12 @@ class _Run:
             if not np.isfinite(data).all():
                 return self.result("diverged", "the Hessian is not finite")
             if self.gradient_norm() <= self.target(data):
-                self.n.potential.forget()
+                self.potential.forget()
                 verdict = self.verdict(self.assemble(0) if rung or self.foreseeing else data)
                 if verdict is not None:
                     return verdict
                 self.foreseeing, data = False, self.assemble(rung)
-            elif time.perf_counter() - self.started > self.n.timeout:
+            elif self.late(self.n.timeout):
                 return self.result("timeout", f"gave up after {self.n.timeout:g} s")
             if self.iterations >= self.n.max_iterations:
                 return self.result("max_iterations", f"gave up after {self.iterations} iterations")
@@ -154,14 +138,11 @@ class _Run:
                 return self.result("stalled", "no convexified Newton direction lowers the energy")
             self.iterations += 1
 
-    def gradient_norm(self) -> float:
-        return float(np.abs(self.g).max(initial=0.0)) / self.n._weight
-
     def target(self, data: np.ndarray) -> float:
         """The tolerance, but never below what round-off of the positions does to the gradient."""
         stiffest = float(np.abs(data[self.n._pattern.diagonal]).max(initial=0.0))
         round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(self.x).max(initial=0.0))
-        return max(self.n.tolerance, min(round_off / self.n._weight, ROUND_OFF))
+        return max(self.n.tolerance, min(round_off / self.weight, ROUND_OFF))
 
     def assemble(self, rung: int) -> np.ndarray:
         start = time.perf_counter()
@@ -196,26 +177,25 @@ class _Run:
         bold = self.iterations >= CALM
         patience = min(self.patience, self.n.max_iterations - self.iterations - 1) if bold else 0
         for k in range(patience + 1 if slope < 0 else 0):  # none if it is nan
-            step = np.zeros_like(start)
-            step[self.n._free] = p.reshape(-1, 3)
-            if not np.isfinite(p).all() or self.n.potential.largest_step(self.x, step) < 1:
+            step = self.spread(p)
+            if not np.isfinite(p).all() or self.potential.largest_step(self.x, step) < 1:
                 break
-            self.n.potential.foresee(self.x, step)
+            self.potential.foresee(self.x, step)
             self.x = self.x + step
             self.value, self.g = self.evaluate(self.x)
-            if not (np.isfinite(self.value) and np.isfinite(self.g).all()):
+            if not self.finite:
                 break
             if fallen(value, self.value, slope) or (k == 0 and level(value, self.value, slope, self.g @ p)):
                 self.foreseeing = bold and (k > 0 or self.value - value > FORESEEN * 0.5 * slope)
                 if not self.foreseeing:
-                    self.n.potential.forget()
+                    self.potential.forget()
                 self.rung, self.climbed = rung, rung > first
                 self.patience = EXCURSION
                 return True
             if k < patience:
                 p, rung = self.direction(self.assemble(rung), rung)
                 self.iterations += 1
-        self.n.potential.forget()
+        self.potential.forget()
         self.foreseeing = False
         self.patience = self.patience // 2 if bold else EXCURSION
         self.x, self.value, self.g = start, value, g
@@ -256,9 +236,8 @@ class _Run:
 
     def line_search(self, p: np.ndarray, slope: float) -> bool:
         """Backtrack until the energy falls enough; True once a step was taken."""
-        step = np.zeros_like(self.x)
-        step[self.n._free] = p.reshape(-1, 3)
-        alpha = self.n.potential.largest_step(self.x, step)
+        step = self.spread(p)
+        alpha = self.potential.largest_step(self.x, step)
         for _ in range(24):
             trial = self.x + alpha * step
             value, gradient = self.evaluate(trial)
@@ -306,9 +285,8 @@ class _Run:
             v = self.solve(self.n._metric * v)
             v /= np.abs(v).max()
         v *= -1.0 if float(v @ self.g) > 0 else 1.0
-        step = np.zeros_like(self.x)
-        step[self.n._free] = 100 * self.n._step_tolerance * v.reshape(-1, 3)
-        scale = self.n.potential.largest_step(self.x, step)
+        step = self.spread(100 * self.n._step_tolerance * v)
+        scale = self.potential.largest_step(self.x, step)
         for _ in range(30):
             trial = self.x + scale * step
             value, gradient = self.evaluate(trial)
@@ -317,19 +295,6 @@ class _Run:
                 return True
             scale *= 0.5
         return False
-
-    def result(self, status: str, reason: str) -> Result:
-        return Result(
-            positions=self.x,
-            status=status,
-            reason=reason,
-            iterations=self.iterations,
-            factorisations=self.factorisations,
-            gradient_norm=self.gradient_norm(),
-            energy=self.value,
-            terms=self.n.potential.terms(self.x),
-            seconds=self.seconds,
-        )
 
 
 def fallen(before: float, after: float, slope: float) -> bool:
