@@ -52,7 +52,7 @@ def _table(title: str, rows: list[Row]) -> str:
     methods = list(dict.fromkeys(row.method for row in rows))
     values: dict[tuple[str, str], list[float]] = {}
     for row in rows:
-        if row.value is not None:
+        if row.value is not None and row.status in ("ok", "stalled"):
             values.setdefault((row.method, row.metric), []).append(row.value)
     columns = [(metric, head) for metric, head in COLUMNS if any((m, metric) in values for m in methods)]
     lines = [[title, *(head for _, head in columns), "status"]]

@@ -87,6 +87,10 @@ def make_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    # One thread for everything, whatever the shell says: times are comparable, every row states it, and two
+    # workers do not fight over two cores. Set before anything reads it.
+    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ[name] = "1"
     try:
         options = make_parser().parse_args(words)
         if options.list:
@@ -101,9 +105,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.dry_run:
         print(describe(plan))
         return 0
-    # One thread for everything: times are comparable, and two workers do not fight over two cores.
-    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     from .stages import execute
 
     try:
@@ -172,7 +173,9 @@ def check_device(device: str) -> None:
     if device not in ("cpu", "cuda"):
         raise PlanError(f"--device '{device}': choose cpu or cuda")
     if device == "cuda":
-        raise PlanError("--device cuda: networks train and run on the CPU alone in this version")
+        raise PlanError(
+            "--device cuda: networks train and run on the CPU alone in this version; use --device cpu"
+        )
 
 
 def choose_folder(out: str | None) -> Path:

@@ -53,10 +53,10 @@ class Dressed:
 class BuiltScene:
     """All that a method may read. Frame 0 of every array is the start.
 
-    energies: the terms declared, inertia left out: the time step adds it, and `dynamic` says whether there
-    is one. dt [s]; frames: positions of a trajectory, the start included. settle: gives the start (V,3) [m]
-    from which to simulate; it may itself simulate, so it is called once, off the clock.
-    origin_heights: (T,) [m] where the gravity energy of each frame is zero. exact: (T,V,3) [m] or None.
+    energies: the terms declared, inertia left out: the time step adds it. dt [s]; frames: positions of a
+    trajectory, the start included. settle: gives the start (V,3) [m] from which to simulate; it may itself
+    simulate, so it is called once, off the clock. origin_heights: (T,) [m] where the gravity energy of each
+    frame is zero. exact: (T,V,3) [m] or None.
     """
 
     name: str
@@ -70,7 +70,6 @@ class BuiltScene:
     exact: np.ndarray | None = None
     dressed: Dressed | None = None
     start_velocity: np.ndarray | None = None
-    dynamic: bool = True
 
     @cached_property
     def start(self) -> np.ndarray:
@@ -80,4 +79,4 @@ class BuiltScene:
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the terms that exist in this scene, in the order of the tables."""
-        return tuple(e.name for e in self.energies) + (("inertia",) if self.dynamic else ())
+        return (*(e.name for e in self.energies), "inertia")

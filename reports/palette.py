@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 REFERENCE = "simulation"
 NETWORKS = ("snug", "pbns", "supervised")
-BASELINES = ("skinning", "untrained")
 STATUS_COLOURS = {
     "ok": "#0072B2",
     "stalled": "#E69F00",

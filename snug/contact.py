@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-REGION = 0.20  # m: how far, in the T-pose, a sample may be from the body faces it is allowed to touch
+from reference_sim.obstacle import DEFAULT_REGION
+
 SEED_SPACING = 0.04  # m: one starting vertex per cell of this size is tried before descending the surface
 
 
@@ -46,7 +47,7 @@ class Patch:
         body_positions: np.ndarray,
         body_faces: np.ndarray,
         *,
-        region: float = REGION,
+        region: float = DEFAULT_REGION,
     ) -> Patch:
         """Cut the patch for samples (S, 3) [m] out of a body in its T-pose (B, 3) [m], (Fb, 3)."""
         from scipy.spatial import cKDTree

@@ -7,8 +7,11 @@ For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
 in joules a frame: a frame without two frames before it in the window has no inertia term, so a window of
 three holds three static terms and one inertia. Its gradient reaches all three frames.
 
-Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU the closed-form
-kernels beside it give the same values and gradients in a tenth of the time, so autograd is told to use those.
+Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
+kernels beside it give the same values and gradients in a tenth of the time, so
+autograd is told to use those.
+The contact planes are the one difference: training keeps an anchor for each sample and takes the skin's
+normal there, where the simulator searches anew in every step and takes the direction to the closest point.
 """
 
 from __future__ import annotations

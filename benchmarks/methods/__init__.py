@@ -23,7 +23,7 @@ METHODS = (
     ),
     MethodEntry(
         name="untrained",
-        description="the SNUG network before its first training step",
+        description="the SNUG network with a random last layer (SNUG itself starts as skinning)",
         module=_NETWORKS,
         options={"kind": "untrained"},
         needs_body=True,

@@ -33,7 +33,7 @@ def energy_series(
     """
     from reference_sim.energies import Inertia
 
-    declared = [*scene.energies, *([Inertia(scene.cloth, scene.dt)] if scene.dynamic else [])]
+    declared = [*scene.energies, Inertia(scene.cloth, scene.dt)]
     # A term may remember the step before: each trajectory has terms of its own.
     own = [[copy.copy(term) for term in declared] for _ in trajectories]
     found = [{term.name: np.zeros(len(positions)) for term in declared} for positions in trajectories]

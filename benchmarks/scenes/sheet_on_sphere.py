@@ -24,7 +24,7 @@ def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
     cloth = Cloth(positions, faces, Material())
     points, triangles = sphere(RADIUS, 24)
     frames = preset.sheet_frames
-    obstacle = Obstacle(np.broadcast_to(points, (frames, *points.shape)), triangles)
+    obstacle = Obstacle(points, triangles)
     return BuiltScene(
         name=name,
         cloth=cloth,

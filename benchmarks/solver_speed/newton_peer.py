@@ -22,8 +22,6 @@ from reference_sim.material import GRAVITY
 
 from .peer_energies import spring_stiffness
 
-SOLVERS = ("VBD", "XPBD")
-
 
 @dataclass(frozen=True)
 class Advance:
