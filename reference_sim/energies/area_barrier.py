@@ -52,10 +52,7 @@ class AreaBarrier(Energy):
         return _gradient(x, self.stencils, self.Dm_inverse, self.scales, self.threshold, gradient), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        blocks = np.zeros((len(self.stencils), 9, 9))
-        elements, active = self.active_hessian_blocks(x)
-        blocks[elements] = active
-        return blocks
+        return self.expanded(*self.active_hessian_blocks(x))
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """E'' grad q grad q^T is never negative; the term with Hess q is reduced by `convexity`."""
