@@ -20,6 +20,13 @@ TRAIN: tuple[str, ...] = (
 )  # fmt: skip
 # None of these kinds of motion occurs in TRAIN.
 TEST: tuple[str, ...] = ("sudden_stop", "kick", "punch", "spin_jump")
+# Motions that stop within one frame, for garments that swing; SWING_TEST is seen by no training.
+SWING_TRAIN: tuple[str, ...] = (
+    "twist_1", "twist_2", "twist_3", "twist_4", "twist_5", "twist_6", "turntable_1", "turntable_2",
+    "turntable_3", "turning_walk_1", "turning_walk_2", "turning_walk_3", "turning_walk_4",
+)  # fmt: skip
+SWING_TEST: tuple[str, ...] = ("twist_stop", "turning_stop")
+LIBRARY = TRAIN + TEST + SWING_TRAIN + SWING_TEST
 
 # Upper arm to the spine's direction: on the default body this leaves about 2 cm between arm and chest.
 ARMS_CLEAR = np.deg2rad(25.0)
@@ -77,10 +84,10 @@ class Motion:
 def make_motion(name: str) -> Motion:
     """A motion of the embedded library at 30 fps, arms already spread clear of the torso.
 
-    Deterministic. Raises MotionError for a name that is in neither TRAIN nor TEST.
+    Deterministic. Raises MotionError for a name that is not in LIBRARY.
     """
-    if name not in TRAIN + TEST:
-        raise MotionError(f"unknown motion '{name}'; the library has: {', '.join(TRAIN + TEST)}")
+    if name not in LIBRARY:
+        raise MotionError(f"unknown motion '{name}'; the library has: {', '.join(LIBRARY)}")
     from snug.motions import build
 
     return build(name)

@@ -5,7 +5,7 @@ So the form is a union of three solids, each grown by its own distance:
 
 - the body itself, by `clearance` (this shapes shoulders and neck);
 - the torso, one convex section per height, which below the armpits never narrows again on the way down:
-  cloth hangs from its widest support;
+  cloth hangs from its widest support; a flare widens it further, from the waist to the hem;
 - the upper arm, one convex section per distance from the shoulder.
 
 Convex sections grown by d have 2 pi d more girth (Steiner's formula), so ease of girth e is a growth of
@@ -118,7 +118,7 @@ def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
     return np.stack([(height - row).max(axis=1) - grown for row, grown in zip(support, growth, strict=True)])
 
 
-def _torso(body, edges, points, nodes, ease, clearance, normals) -> Array:
+def _torso(body, edges, points, nodes, hem, ease, flare, clearance, normals) -> Array:
     """Field (nx,ny,nz) of the torso's hanging sections."""
     x, y, z = nodes
     support = _filled(_section_support(points, edges, y, 1, normals))
@@ -131,7 +131,9 @@ def _torso(body, edges, points, nodes, ease, clearance, normals) -> Array:
     support[below] = np.maximum.accumulate(support[below][::-1], axis=0)[::-1]
     smooth = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
     support[below] = np.maximum(smooth, support)[below]
-    growth = clearance + ease / (2 * np.pi) * _ramp(y, armpit, joint(body, "spine1")[1])
+    waist = joint(body, "spine1")[1]
+    growth = clearance + ease / (2 * np.pi) * _ramp(y, armpit, waist)
+    growth += flare * np.clip((waist - y) / (waist - hem), 0.0, None)  # a cone: its sides are straight
     plane = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     field = _tube(support, growth, plane, normals).reshape(len(y), len(x), len(z)).transpose(1, 0, 2)
     return np.maximum(field, (y - joint(body, "left_shoulder")[1])[None, :, None])
@@ -149,10 +151,13 @@ def _sleeve(body, edges, points, nodes, cuff, ease, clearance, normals) -> Array
     return np.maximum(field, (shoulder - x)[:, None, None])
 
 
-def build_form(body, *, hem: float, cuff: float, top: float, ease: float, clearance: float) -> Form:
+def build_form(
+    body, *, hem: float, cuff: float, top: float, ease: float, clearance: float, flare: float = 0.0
+) -> Form:
     """The form between the heights `hem` and `top` and out to x = `cuff` (all [m]).
 
-    `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin.
+    `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin;
+    `flare` [m] is how much further the hem stands off than the waist, all around.
     """
     import igl
 
@@ -164,7 +169,7 @@ def build_form(body, *, hem: float, cuff: float, top: float, ease: float, cleara
     torso_edges, arm_edges = edges[torso[edges].all(axis=1)], edges[arm[edges].all(axis=1)]
     margin = 0.04
     depth = points[torso | arm, 2]
-    reach = clearance + ease + 2 * margin
+    reach = clearance + ease + flare + 2 * margin
     low = np.array([0.0, hem - margin, depth.min() - reach])
     high = np.array([cuff + margin, top + margin, depth.max() + reach])
     counts = np.ceil((high - low) / SPACING).astype(int) + 1
@@ -177,7 +182,7 @@ def build_form(body, *, hem: float, cuff: float, top: float, ease: float, cleara
     # promises about clearance is enforced on the finished mesh.
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
-    hanging = _torso(body, torso_edges, points, nodes, ease, clearance, normals)
+    hanging = _torso(body, torso_edges, points, nodes, hem, ease, flare, clearance, normals)
     hanging = _smooth_minimum(
         hanging, _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals), ARMPIT_FILLET
     )

@@ -1,11 +1,11 @@
-"""The tailored T-shirt: topology, even triangles, room around the body, ease, borrowed weights."""
+"""Tailored garments: topology, even triangles, room around the body, ease, flare, borrowed weights."""
 
 import igl
 import numpy as np
 import pytest
 
 from snug.body import Body
-from snug.garments import GarmentError, smooth_weights, tailor_tshirt
+from snug.garments import PATTERNS, GarmentError, find_pattern, smooth_weights, tailor_tshirt, tailor_tunic
 
 WAIST = "spine1"
 
@@ -20,9 +20,12 @@ def shirts(body):
     return {count: tailor_tshirt(body, vertices=count) for count in (300, 1000, 2000, 4400)}
 
 
-@pytest.fixture(scope="session")
-def shirt(shirts):
-    return shirts[1000]
+@pytest.fixture(scope="session", params=[pattern.name for pattern in PATTERNS])
+def shirt(request, body, shirts):
+    """Every sort of garment, at 1000 vertices."""
+    return (
+        shirts[1000] if request.param == "tshirt" else find_pattern(request.param).tailor(body, vertices=1000)
+    )
 
 
 def edge_counts(faces):
@@ -130,6 +133,27 @@ def test_the_left_half_mirrors_the_right(shirt):
     points = shirt.rest_positions
     mirrored = {tuple(p) for p in np.round(points * [-1, 1, 1] + 0.0, 9).tolist()}
     assert mirrored == {tuple(p) for p in np.round(points + 0.0, 9).tolist()}
+
+
+def test_the_tunic_is_longer_and_flares_by_what_is_asked(body, shirts):
+    """Steiner: a convex section grown by d is 2 pi d longer, so d comes back from the girths."""
+    tunics = {flare: tailor_tunic(body, vertices=2000, flare=flare) for flare in (0.0, 0.045)}
+    straight, flared = tunics[0.0], tunics[0.045]
+    hem = flared.rest_positions[flared.hem, 1].mean()
+    assert shirts[2000].rest_positions[shirts[2000].hem, 1].mean() - hem == pytest.approx(0.08, abs=1e-3)
+    low = [girth(g.rest_positions, g.faces, 1, hem + 0.004) for g in (flared, straight)]
+    # A little above the hem, where the cone is 4 mm of its height narrower; chords lose the rest.
+    assert (low[0] - low[1]) / (2 * np.pi) == pytest.approx(0.045, abs=0.002)
+    above = [girth(g.rest_positions, g.faces, 1, waist(body) + 0.05) for g in (flared, straight)]
+    assert above[0] == pytest.approx(above[1], abs=0.01)
+
+
+def test_patterns_are_found_by_name(body):
+    assert find_pattern("tunic").tailor is tailor_tunic
+    with pytest.raises(GarmentError, match=r"'gown'.*tshirt, tunic"):
+        find_pattern("gown")
+    with pytest.raises(GarmentError, match=r"flare=0\.5: a tunic"):
+        tailor_tunic(body, flare=0.5)
 
 
 def test_ease_is_girth_at_waist_and_cuff(body, shirts):

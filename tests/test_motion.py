@@ -6,6 +6,8 @@ import pytest
 from snug.body import JOINT_NAMES, Body
 from snug.motion import (
     ARMS_CLEAR,
+    SWING_TEST,
+    SWING_TRAIN,
     TEST,
     TRAIN,
     Motion,
@@ -46,6 +48,38 @@ def test_library_is_large_enough_and_test_kinds_are_unseen(library):
     assert len(set(TRAIN + TEST)) == len(TRAIN) + len(TEST)
     assert not {library[name].kind for name in TEST} & {library[name].kind for name in TRAIN}
     assert all(motion.kind for motion in library.values())
+
+
+@pytest.mark.parametrize("name", SWING_TRAIN + SWING_TEST)
+class TestStops:
+    """What moves until one frame and not at all after it."""
+
+    def test_stops_within_one_frame_and_holds(self, name):
+        motion = make_motion(name)
+        moves = np.linalg.norm(np.diff(motion.poses, axis=0), axis=-1).max(-1) * 30.0  # [rad/s]
+        last = np.flatnonzero(moves > 0)[-1]
+        assert len(moves) - 1 - last == 36
+        assert moves[last] > 0.5  # at full speed into the stop
+        assert moves.max() < 12.0
+        assert np.all(np.diff(motion.translations, axis=0)[last + 1 :] == 0)
+
+    def test_starts_at_rest_with_feet_on_the_floor(self, name):
+        motion = make_motion(name)
+        assert np.linalg.norm(motion.poses[1] - motion.poses[0]) * 30.0 < 0.2
+        soles = sole_points(motion.poses, motion.translations)[..., 1].min(axis=1)
+        assert np.abs(soles).max() < 0.03
+        assert np.degrees(arm_clearance(motion).min()) > 25.0
+
+
+def test_no_two_stops_are_alike():
+    library = [make_motion(name) for name in SWING_TRAIN + SWING_TEST]
+    yaws = [motion.poses[:, 0, 1] + motion.poses[:, [3, 6, 9], 1].sum(axis=1) for motion in library]
+    twist = np.degrees(yaws[len(SWING_TRAIN)])
+    assert 40.0 < np.abs(twist).max() <= 45.0 + 1e-9
+    for i, one in enumerate(yaws):
+        for other in yaws[i + 1 :]:
+            frames = min(len(one), len(other))
+            assert np.degrees(np.abs(one[:frames] - other[:frames]).max()) > 8.0
 
 
 @pytest.mark.parametrize("name", TRAIN + TEST)
@@ -132,9 +166,10 @@ def test_unknown_names_list_the_known_ones():
 
 
 def test_names_list_equals_the_tables():
-    from snug.motions import ACTIONS, GAITS
+    from snug.motions import ACTIONS, GAITS, STOPS
 
     assert set(TRAIN + TEST) == set(ACTIONS) | set(GAITS)
+    assert tuple(STOPS) == SWING_TRAIN + SWING_TEST
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from snug.motions.actions import (
 from snug.motions.gait import RUN, WALK, Stride, gait_angles, gait_flights, gait_support, stride_phase
 from snug.motions.posture import RATE, poses_from_angles, root_path
 from snug.motions.strikes import KICK, PUNCH, SIDESTEP, TURN
+from snug.motions.turns import STOPS
 
 FPS = 30.0
 
@@ -54,6 +55,9 @@ STOP_SECONDS = 0.35  # from the full stride to standing
 
 def build(name: str) -> Motion:
     """The library's motion of that name, arms spread. Raises KeyError for an unknown name."""
+    if name in STOPS:
+        poses, path = STOPS[name].motion()
+        return spread_arms(Motion(name, poses, path, FPS, "stop", "embedded library: stops within a frame"))
     if name in ACTIONS:
         kind, action = ACTIONS[name]
         angles, flights = action.angles()
