@@ -18,7 +18,7 @@ from reference_sim.material import Material
 from snug.recipe import Recipe
 from snug.skinning import axis_angle_to_matrix, joint_transforms, matrix_to_6d, skin
 
-FEATURE_SETS = ("motion", "pose")
+FEATURE_SETS = ("motion", "pose", "pose_shape")
 
 
 class DressedBody:
@@ -85,8 +85,8 @@ class DressedBody:
     def features(
         self, motion: Any, recipe: Recipe, betas: np.ndarray | None = None, *, kind: str = "motion"
     ) -> Tensor:
-        """Inputs of a network, (T, D) float32: the pose, and for `motion` the root velocity and the shape
-        too.
+        """Inputs of a network, (T, D) float32: the pose; for `motion` the root velocity and the shape too,
+        for `pose_shape` the shape.
         """
         if kind not in FEATURE_SETS:
             raise ValueError(f"unknown features {kind!r}: use one of {FEATURE_SETS}")
@@ -94,6 +94,7 @@ class DressedBody:
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
         if kind == "motion":
             parts.append(_root_velocity(motion, rotations[:, 0], recipe.velocity_frame))
+        if kind != "pose":
             shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
             parts.append(torch.as_tensor(shape).expand(len(motion.poses), -1))
         return torch.cat(parts, dim=-1).float()

@@ -23,12 +23,36 @@ import torch
 from torch import Tensor
 
 from reference_sim.cloth import Cloth
-from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
+from reference_sim.energies import (
+    BendHinge,
+    ContactPenalty,
+    Energy,
+    Gravity,
+    Inertia,
+    StretchSpring,
+    StretchStVK,
+)
+from snug.baselines.springs import SquaredContact, spring_terms
 from snug.recipe import Recipe
+
+STATIC = ("strain", "bending", "gravity")
+
+
+def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
+    """The recipe's terms of single frames without contact, by place in the loss; others are not made."""
+    terms: tuple[Energy, Energy, Energy]
+    if recipe.material == "pbns":
+        terms = spring_terms(cloth)
+    else:
+        membrane = StretchSpring(cloth) if recipe.material == "springs" else StretchStVK(cloth)
+        terms = (membrane, BendHinge(cloth), Gravity(cloth))
+    return {name: term for name, term in zip(STATIC, terms) if name in recipe.terms}
 
 
 def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
     """The recipe's contact term; options it leaves open are the simulator's own."""
+    if recipe.material == "pbns":
+        return SquaredContact(cloth)
     options: dict[str, Any] = {"samples": recipe.contact_samples}
     if recipe.contact_margin is not None:
         options["margin"] = recipe.contact_margin
@@ -77,9 +101,7 @@ class PhysicsLoss:
         self, cloth: Cloth, recipe: Recipe, *, dt: float, contact: ContactPenalty | None = None
     ) -> None:
         self.terms = recipe.terms
-        self.static = [
-            E for E in (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)) if E.name in self.terms
-        ]
+        self.static = static_terms(cloth, recipe)
         self.inertia = Inertia(cloth, dt)
         self.contact = contact or make_contact(cloth, recipe)
 
@@ -92,7 +114,7 @@ class PhysicsLoss:
         2 p_{t-1} - p_{t-2} - p_t: where the pelvis would be if it kept its velocity, seen from where it is.
         planes: points and normals (N, T, S, 3) of the contact samples.
         """
-        terms = {energy.name: summed(energy, x) for energy in self.static}
+        terms = {name: summed(energy, x) for name, energy in self.static.items()}
         if "inertia" in self.terms and x.shape[1] >= 3:
             x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
             inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)

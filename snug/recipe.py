@@ -1,8 +1,8 @@
 """Recipe: every choice of a training run in one frozen place, each deviation from the paper by name.
 
-Two recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text to the
-letter. Neither holds a balancing weight between the energies: there is none. Imports nothing heavy, so that a
-command can list recipes without loading torch.
+Recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text to the
+letter, the ablations are the default with one thing changed. None holds a balancing weight between the
+energies: there is none. Imports nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ class Recipe:
     contact_refresh: share of a batch's frames whose contact anchors are searched anew after a step.
     mixed: frames of mixed motions (snug.mixing) for each frame of a training motion; not for `supervised`,
         which can only learn what was simulated. mixed_turn: see there [rad].
-    terms: energies in the loss; leaving one out is an ablation.
+    terms: energies in the loss; leaving one out is an ablation, and it is then never evaluated.
+    material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
+        (edges, hinges, uniform mass and squared contact of PBNS, see snug.baselines.springs; it has its own
+        stiffness and margin of contact).
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
     """
@@ -67,6 +70,7 @@ class Recipe:
     mixed: float = 4.0
     mixed_turn: float = 0.1
     terms: tuple[str, ...] = TERMS
+    material: str = "stvk"
     spike: float = 2.0
     gradient_limit: float = 1.0
 
@@ -75,6 +79,7 @@ class Recipe:
             ("pose_input", ("six", "axis_angle")),
             ("velocity_frame", ("root", "world")),
             ("contact_samples", ("all", "vertices")),
+            ("material", ("stvk", "springs", "pbns")),
         ):
             if getattr(self, option) not in allowed:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
@@ -129,7 +134,55 @@ PAPER = Recipe(
 # Vertices of a simulation depend on more than two frames before: longer windows follow them better (7 mm
 # instead of 13 on the training motions at 500 vertices), and there is no energy that a window could cheat.
 SUPERVISED = replace(DEFAULT, name="supervised", window=16, batch=6, h0_sigma=0.1, mixed=0.0)
-RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER)}
+# A constant shape needs no recurrence of its own: the fit is a mean drape, see santesteban2019.
+SANTESTEBAN2019 = replace(SUPERVISED, name="santesteban2019")
+# One frame knows nothing of its past, so windows of one; Adam, rate and batch as its authors train it.
+TAILORNET = replace(
+    SUPERVISED,
+    name="tailornet",
+    window=1,
+    batch=32,
+    learning_rate=1e-4,
+    drop_at=1.0,
+    output_scale=1.0,
+    terms=(),
+)
+PBNS_SPRINGS = replace(DEFAULT, name="pbns-springs", material="pbns", contact_samples="vertices")
+
+
+def _without(term: str) -> Recipe:
+    return replace(DEFAULT, name=f"no-{term}", terms=tuple(name for name in TERMS if name != term))
+
+
+# Longer windows get smaller batches, so that a step sees 48 frames in each.
+ABLATIONS = (
+    *(_without(term) for term in ("bending", "strain", "gravity", "inertia")),
+    replace(DEFAULT, name="no-noise", h0_sigma=0.0),
+    replace(DEFAULT, name="window6", window=6, batch=8),
+    replace(DEFAULT, name="window12", window=12, batch=4),
+    replace(DEFAULT, name="springs", material="springs"),
+)
+RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER, *ABLATIONS)}
+
+
+@dataclass(frozen=True)
+class Training:
+    """How a named model comes to be. kind: one of snug.trained_model.KINDS. simulated: needs trajectories."""
+
+    kind: str
+    recipe: Recipe
+    simulated: bool = False
+
+
+TRAININGS = {
+    "snug": Training("snug", DEFAULT),
+    "pbns": Training("pbns", DEFAULT),
+    "pbns-springs": Training("pbns", PBNS_SPRINGS),
+    "supervised": Training("supervised", SUPERVISED, simulated=True),
+    "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, simulated=True),
+    "tailornet": Training("tailornet", TAILORNET, simulated=True),
+    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
+}
 
 
 def find_recipe(name: str) -> Recipe:

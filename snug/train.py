@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snug.recipe import DEFAULT, RECIPES, SUPERVISED, Recipe, find_recipe
+from snug.recipe import DEFAULT, RECIPES, TRAININGS, Recipe, find_recipe
 
 if TYPE_CHECKING:
     from snug.dresser import DressedBody
@@ -31,16 +31,16 @@ def train(
 ) -> TrainedModel:
     """Train one network for a number of steps; on a CPU equal arguments give equal weights, bit for bit.
 
-    model_kind: `snug` (physics), `supervised` (same network, vertices of a simulation), `pbns` (static).
-    trajectories: for `supervised`, motion name -> simulated world vertices (T, V, 3) [m].
-    recipe: None takes DEFAULT, or SUPERVISED for that kind.
+    model_kind: one of snug.trained_model.KINDS; `snug` and `pbns` learn from the energies, the others from a
+    simulation. trajectories: for those, motion name -> simulated world vertices (T, V, 3) [m].
+    recipe: None takes the one of that name in TRAININGS.
     log: called with each row of the history, every `every` steps. progress: a bar on standard error.
     Raises ValueError (TrainingError, TargetError, RecipeError) naming what is missing or diverged.
     """
     from snug.trainer import Trainer
 
     if recipe is None:
-        recipe = SUPERVISED if model_kind == "supervised" else DEFAULT
+        recipe = TRAININGS[model_kind].recipe if model_kind in TRAININGS else DEFAULT
     trainer = Trainer(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories
     )

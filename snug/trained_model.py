@@ -14,6 +14,9 @@ import torch
 from torch import nn
 
 from snug.baselines.pbns import PoseSpaceDeformation
+from snug.baselines.santesteban2019 import FitAndWrinkles
+from snug.baselines.supervised import VertexTargets
+from snug.baselines.tailornet import BandTargets, FrequencyMixture
 from snug.recipe import Recipe, RecipeError
 from snug.regressor import Regressor, parameter_megabytes
 
@@ -22,18 +25,27 @@ FORMAT = "snug-model-1"
 
 @dataclass(frozen=True)
 class Kind:
-    """A sort of model: its network, the inputs it reads, whether it sees sequences and how it is taught."""
+    """A sort of model: its network, the inputs it reads, whether it sees sequences, and what teaches it.
+
+    targets: what simulated vertices become for it; None where the energies teach it.
+    """
 
     network: type[nn.Module]
     features: str
     sequences: bool
-    physics: bool
+    targets: type[VertexTargets] | None = None
+
+    @property
+    def physics(self) -> bool:
+        return self.targets is None
 
 
 KINDS = {
-    "snug": Kind(Regressor, "motion", sequences=True, physics=True),
-    "supervised": Kind(Regressor, "motion", sequences=True, physics=False),
-    "pbns": Kind(PoseSpaceDeformation, "pose", sequences=False, physics=True),
+    "snug": Kind(Regressor, "motion", sequences=True),
+    "supervised": Kind(Regressor, "motion", sequences=True, targets=VertexTargets),
+    "pbns": Kind(PoseSpaceDeformation, "pose", sequences=False),
+    "santesteban2019": Kind(FitAndWrinkles, "pose_shape", sequences=True, targets=VertexTargets),
+    "tailornet": Kind(FrequencyMixture, "pose_shape", sequences=False, targets=BandTargets),
 }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from snug.baselines.supervised import matched_targets, vertex_loss
+from snug.baselines.supervised import VertexTargets
 from snug.dresser import DressedBody
 from snug.loss import PhysicsLoss, make_contact
 from snug.mixing import mixed_motions
@@ -64,15 +64,11 @@ class Trainer:
         self.epoch = 0
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
-        self.targets: Tensor | None = None
-        if how.physics:
+        self.targets: VertexTargets | None = None
+        if how.targets is None:
             self._prepare_physics()
         else:
-            targets = matched_targets(motions, trajectories, dressed.vertices)
-            pelvis = [dressed.pelvis(motion) for motion in motions]
-            self.targets = torch.cat(
-                [torch.as_tensor(t - p[:, None]).float() for t, p in zip(targets, pelvis)]
-            )
+            self.targets = how.targets(dressed, motions, trajectories, self.weights, self.data.transforms)
         self.summary: dict[str, Any] = {"high_windows": 0, "skipped_updates": 0, "named_windows": []}
         self.skipped_in_a_row = 0
 
@@ -93,14 +89,17 @@ class Trainer:
         drawn, self.order = self.order[: self.windows], self.order[self.windows :]
         return drawn
 
+    def start_state(self, batch: Batch) -> Any:
+        """What the windows of a batch start from: noise of the recipe's sigma, or a network's own masks."""
+        return self.network.random_state(len(batch.frames), self.recipe.h0_sigma, self.noise)
+
     def predict(self, batch: Batch) -> Tensor:
         """Vertices relative to the pelvis, (N, T, V, 3) [m]."""
-        state = self.network.random_state(len(batch.frames), self.recipe.h0_sigma, self.noise)
-        offsets, _ = self.network(batch.features, state)
+        offsets, _ = self.network(batch.features, self.start_state(batch))
         return skin(batch.rest + offsets, self.weights, batch.transforms)
 
     def step(self, number: int) -> dict[str, float]:
-        """One update; mean joules a frame by term (cm^2 for the supervised loss)."""
+        """One update; mean joules a frame by term (cm^2 or cm for what simulated vertices teach)."""
         self._set_rate(number)
         windows = self.draw()
         betas = None
@@ -108,12 +107,12 @@ class Trainer:
             shapes = self.dressed.body.shape_count
             betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
         batch = self.data.batch(windows, betas)
-        x = self.predict(batch)
         if self.loss is None:
             assert self.targets is not None
-            terms = {"vertices": vertex_loss(x, self.targets[torch.as_tensor(batch.frames)])}
+            terms = self.targets.terms(self.network, batch, self.start_state(batch))
             self._update(number, batch, terms)
         else:
+            x = self.predict(batch)
             posed = self.contact.posed(batch, betas) if self.contact else None
             planes = self.contact.planes(batch, posed) if self.contact and posed else None
             terms = self.loss(x, batch.ahead, planes)

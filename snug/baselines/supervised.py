@@ -6,10 +6,16 @@ loss = mean over frames and vertices of |x - x_simulated|^2     [cm^2]
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import torch
 from torch import Tensor
+
+from snug.skinning import skin
+
+if TYPE_CHECKING:
+    from snug.training_set import Batch
 
 CM2_PER_M2 = 1e4
 
@@ -21,6 +27,33 @@ class TargetError(ValueError):
 def vertex_loss(x: Tensor, target: Tensor) -> Tensor:
     """x, target (N, T, V, 3) [m] -> (N, T) [cm^2]."""
     return CM2_PER_M2 * (x - target).square().sum(-1).mean(-1)
+
+
+class VertexTargets:
+    """What a simulation teaches: vertices (F, V, 3) [m] relative to the pelvis, all training frames in a row.
+
+    weights (V, J) and transforms (F, J, 3, 4) are those that skin the prediction. Raises TargetError for a
+    motion without a fitting trajectory.
+    """
+
+    def __init__(
+        self,
+        dressed: Any,
+        motions: Sequence[Any],
+        trajectories: Mapping[str, np.ndarray] | None,
+        weights: Tensor,
+        transforms: Tensor,
+    ) -> None:
+        targets = matched_targets(motions, trajectories, dressed.vertices)
+        pelvis = [dressed.pelvis(motion) for motion in motions]
+        self.weights, self.transforms = weights, transforms
+        self.vertices = torch.cat([torch.as_tensor(t - p[:, None]).float() for t, p in zip(targets, pelvis)])
+
+    def terms(self, network: Any, batch: Batch, state: Any) -> dict[str, Tensor]:
+        """Parts of the loss of each window and frame, name -> (N, T)."""
+        offsets, _ = network(batch.features, state)
+        x = skin(batch.rest + offsets, self.weights, batch.transforms)
+        return {"vertices": vertex_loss(x, self.vertices[torch.as_tensor(batch.frames)])}
 
 
 def matched_targets(

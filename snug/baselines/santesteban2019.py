@@ -1,0 +1,51 @@
+"""Santesteban et al. 2019, "Learning-based animation of clothing": a fit by shape plus wrinkles by motion.
+
+    offsets(beta, theta_1..t) = fit(beta) + wrinkles(beta, theta_1..t)
+    fit: 10 -> 20 (ReLU) -> 3V,   wrinkles: one GRU of 1500, one linear layer to 3V
+
+taught by simulated vertices, as the supervised network is (snug.baselines.supervised). Its authors train the
+two parts one after the other, the fit on drapes of many bodies in one pose; here both are trained together on
+the simulated motions. Those show one body shape, the mean one: the fit reads a constant and can only give a
+constant, a mean drape that the last layer's bias could hold as well. Its numbers say nothing of how it would
+do on other bodies. The 2 mm clean-up of its authors is a method of its own, see snug.clean_up.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from snug.regressor import Regressor
+
+SHAPES, FIT, HIDDEN = 10, 20, 1500
+
+
+class FitAndWrinkles(nn.Module):
+    """features (N, T, D), the last ten of them the shape -> offsets (N, T, V, 3) [m], and the state."""
+
+    def __init__(
+        self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
+    ) -> None:
+        super().__init__()
+        self.vertices, self.output_scale = vertices, output_scale
+        self.input_mean: Tensor
+        self.input_std: Tensor
+        self.register_buffer("input_mean", torch.zeros(inputs))
+        self.register_buffer("input_std", torch.ones(inputs))
+        drape = nn.Linear(FIT, 3 * vertices)
+        self.fit = nn.Sequential(nn.Linear(SHAPES, FIT), nn.ReLU(), drape)
+        self.gru = nn.GRU(inputs, HIDDEN, batch_first=True)
+        self.offsets = nn.Linear(HIDDEN, 3 * vertices)
+        if zero_last_layer:
+            for layer in (drape, self.offsets):
+                nn.init.zeros_(layer.weight)
+                nn.init.zeros_(layer.bias)
+
+    normalise_by = Regressor.normalise_by
+    random_state = Regressor.random_state
+
+    def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
+        hidden, state = self.gru(normalised, state)  # (N, T, 1500), (1, N, 1500)
+        flat = self.fit(normalised[..., -SHAPES:]) + self.offsets(hidden)  # (N, T, 3V)
+        return (self.output_scale * flat).unflatten(-1, (self.vertices, 3)), state

@@ -1,0 +1,73 @@
+"""The material of PBNS itself (Bertiche et al. 2021): springs, hinges, uniform mass, squared contact.
+
+    edges    15 (l - l0)^2                  [J]  reference_sim's StretchSpring, exactly
+    bending  5e-5 |n0 - n1|^2               [J]  reference_sim's BendHinge, 5e-5 theta^2: the nearest there is
+    gravity  m g y, m = 0.3 kg/m^2 A / V    [J]  the same mass for every vertex
+    contact  25 max(4 mm - n.(x - c), 0)^2  [J]  on vertices, with the contact planes of all our training
+
+|n0 - n1|^2 = 4 sin^2(theta/2) = theta^2 - theta^4/12 + ...: the hinge has 3 % more at 0.6 rad, and goes on
+growing where a folded edge no longer resists. Constants as in the authors' own training. No inertia: a static
+method, on the mean body.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reference_sim.cloth import Cloth
+from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchSpring
+from reference_sim.energies.energy import Energy
+from reference_sim.material import GRAVITY, Material
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+BENDING = 5e-5  # [J]
+AREAL_DENSITY = 0.3  # [kg/m^2]
+CONTACT_STIFFNESS = 25.0  # [J/m^2] on each vertex
+MARGIN = 4e-3  # [m]
+
+
+def spring_terms(cloth: Cloth) -> tuple[Energy, Energy, Energy]:
+    """Membrane, bending and gravity of PBNS for the rest state of `cloth`, whose own material is not used."""
+    hinges = Material(bending_stiffness=2 * BENDING)
+    own = Cloth(cloth.rest_positions, cloth.faces, hinges, pins=cloth.pins, rest_uv=cloth.rest_uv)
+    gravity = Gravity(own)
+    uniform = AREAL_DENSITY * cloth.areas.sum() / cloth.vertex_count
+    gravity.weights = np.full(cloth.vertex_count, uniform * GRAVITY)
+    return StretchSpring(own), BendHinge(own), gravity
+
+
+class SquaredContact(ContactPenalty):
+    """k max(eps - d, 0)^2 [J] of each vertex, in place of the cube; planes and samples are ContactPenalty's.
+
+    For training alone: its second derivatives are those of automatic differentiation.
+    """
+
+    hessian_blocks = Energy.hessian_blocks
+    active_hessian_blocks = Energy.active_hessian_blocks
+    scalar_stiffness = Energy.scalar_stiffness
+
+    def __init__(self, cloth: Cloth) -> None:
+        super().__init__(cloth, samples="vertices", margin=MARGIN, per_sample_stiffness=CONTACT_STIFFNESS)
+
+    def element_energy(
+        self, u: Tensor, points: Tensor | None = None, normals: Tensor | None = None
+    ) -> Tensor:
+        import torch
+
+        c = torch.as_tensor(self.points).to(u) if points is None else points
+        n = torch.as_tensor(self.normals).to(u) if normals is None else normals
+        depth = torch.clamp(self.margin - (n * (u[..., 0, :] - c)).sum(-1), min=0.0)
+        return torch.as_tensor(self.stiffness).to(u) * depth**2
+
+    def value_and_gradient(
+        self, x: np.ndarray, points: np.ndarray | None = None, normals: np.ndarray | None = None
+    ) -> tuple[float, np.ndarray]:
+        c = self.points if points is None else points
+        n = self.normals if normals is None else normals
+        depth = np.maximum(self.margin - np.einsum("vi,vi->v", n, x - c), 0.0)
+        gradient = (-2.0 * self.stiffness * depth)[:, None] * n
+        return float(self.stiffness @ depth**2), gradient.astype(x.dtype)
