@@ -43,7 +43,7 @@ def run_cell(cell: Cell, scene: BuiltScene, run: RunFolder, *, device: str) -> O
         clock = time.perf_counter()
         trajectory = method.run()
         seconds = time.perf_counter() - clock
-        status, reason = judge(trajectory, scene, cut_short=cell.method.startswith("newton-"))
+        status, reason = judge(trajectory, scene, cut_short=entry.cut_short)
         provenance = trajectory.provenance | {"run_seconds": seconds, "scene": scene.name, "seed": cell.seed}
         path.parent.mkdir(parents=True, exist_ok=True)
         dataclasses.replace(trajectory, provenance=provenance).save(path)

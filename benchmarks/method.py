@@ -31,6 +31,7 @@ class MethodEntry:
     needs_body: whether it works on dressed scenes alone. trained: the kind of network it needs, if any.
     seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
     dtype: the numbers it computes with; trajectories and metrics are float64 in any case.
+    cut_short: whether it stops before the minimum on purpose, so that running out of iterations is its end.
     """
 
     name: str
@@ -41,6 +42,7 @@ class MethodEntry:
     trained: str | None = None
     seeded: bool = False
     dtype: str = "float64"
+    cut_short: bool = False
 
     def skip(self, scene: Scene) -> str | None:
         """Why this method cannot do that scene, or None."""

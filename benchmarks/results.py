@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-STATUSES = ("ok", "diverged", "stalled", "timeout", "failed", "skipped")
+STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
 
 COLUMNS = (
     "suite", "scene", "method", "seed", "metric", "unit", "value", "status", "reason", "expected",
@@ -147,10 +147,14 @@ class RunFolder:
     def trajectories(self) -> Path:
         return self.path / "trajectories"
 
+    @property
+    def records(self) -> Path:
+        return self.path / "records"
+
     def trajectory_path(self, scene: str, method: str, seed: int = 0) -> Path:
-        """trajectories/<scene>/<method>.vtkhdf; the slash of "dressed/walk" becomes "dressed-walk"."""
+        """trajectories/<scene>/<method>.vtkhdf; a slash, as in "dressed/walk", becomes a hyphen."""
         suffix = "" if seed == 0 else f"-seed{seed}"
-        return self.trajectories / scene.replace("/", "-") / f"{method}{suffix}.vtkhdf"
+        return self.trajectories / scene.replace("/", "-") / f"{method.replace('/', '-')}{suffix}.vtkhdf"
 
     def write_config(self, config: dict[str, Any]) -> None:
         """Write run.json whole or not at all."""

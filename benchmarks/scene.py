@@ -56,7 +56,7 @@ class BuiltScene:
     energies: the terms declared, inertia left out: the time step adds it. dt [s]; frames: positions of a
     trajectory, the start included. settle: gives the start (V,3) [m] from which to simulate; it may itself
     simulate, so it is called once, off the clock. origin_heights: (T,) [m] where the gravity energy of each
-    frame is zero. exact: (T,V,3) [m] or None.
+    frame is zero. exact: (T,V,3) [m] or None. pin_positions: frame -> (P,3) [m] of handles that move.
     """
 
     name: str
@@ -70,6 +70,7 @@ class BuiltScene:
     exact: np.ndarray | None = None
     dressed: Dressed | None = None
     start_velocity: np.ndarray | None = None
+    pin_positions: Callable[[int], np.ndarray] | None = None
 
     @cached_property
     def start(self) -> np.ndarray:

@@ -66,7 +66,8 @@ def simulate(
             frames may be asked for); without such a file start at the beginning. The same bits come out as
             without the interruption.
         progress: label of a progress bar with time left; None for silence.
-        options: of the minimiser: method ("newton", the default, or "lbfgs"), tolerance, max_iterations, ...
+        options: of the minimiser: method ("newton", the default, "lbfgs", or a function that makes one of a
+            potential and the other options), tolerance, max_iterations, ...
 
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the first other status; a

@@ -192,7 +192,7 @@ class Stepper:
             "substeps": self.substeps,
             "guess": self.guess,
             "quasi_static": self.quasi_static,
-            "options": self.options,
+            "options": {name: getattr(value, "__name__", value) for name, value in self.options.items()},
             "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
             "material": asdict(cloth.material),
             "cloth": fingerprint(cloth.rest_positions, cloth.faces, np.asarray(cloth.pins), cloth.rest_uv),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -38,20 +39,12 @@ def roll_out(
     output after that pose was held still for a second: what the network thinks is static. It is not timed
     (NaN). Raises RollOutError.
     """
-    if model.vertices != dressed.vertices:
-        raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
     moving = replace(motion, translations=np.zeros_like(motion.translations)) if held_pose else motion
-    features = dressed.features(moving, model.recipe, betas, kind=find_kind(model.kind).features)
-    inputs = model.network.input_mean.shape[0]
-    if features.shape[1] != inputs:
-        raise RollOutError(
-            f"the model reads {inputs} numbers a frame, this body and motion give {features.shape[1]}"
-        )
+    features = _features(model, dressed, moving, betas)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
     transforms = dressed.transforms(motion.poses, betas)
-    run = _held if held_pose else _frame_by_frame
-    with torch.inference_mode():
-        posed, seconds = run(model, features, rest, weights, transforms)
+    run = _held if held_pose else _timed
+    posed, seconds = run(model, features, rest, weights, transforms)
     positions = posed.astype(np.float64) + dressed.pelvis(motion, betas)[:, None]
     return Trajectory(
         positions=positions,
@@ -70,25 +63,83 @@ def roll_out(
     )
 
 
-def _frame_by_frame(
+def predictions(
+    model: TrainedModel, dressed: DressedBody, motion: Any, betas: np.ndarray | None = None
+) -> Iterator[np.ndarray]:
+    """The frames of `roll_out` one at a time: (V, 3) [m], world, float64, each computed when asked for.
+
+    Inputs and joint transforms are made, and the network warmed up, before this returns. Raises RollOutError.
+    """
+    features = _features(model, dressed, motion, betas)
+    rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
+    transforms = dressed.transforms(motion.poses, betas)
+    pelvis = dressed.pelvis(motion, betas)
+    frames = _one_by_one(model, features, rest, weights, transforms)
+    return (vertices.numpy().astype(np.float64) + origin for vertices, origin in zip(frames, pelvis))
+
+
+def skinned_frames(
+    dressed: DressedBody, motion: Any, smoothing: int, betas: np.ndarray | None = None
+) -> Iterator[np.ndarray]:
+    """As `predictions`, of skinning alone, with weights smoothed by that many sweeps."""
+    rest, weights = dressed.rest(betas), dressed.weights(smoothing)
+    transforms = dressed.transforms(motion.poses, betas)
+    pelvis = dressed.pelvis(motion, betas)
+    for transform in transforms[:WARM_UP]:
+        skin(rest, weights, transform)
+    return (skin(rest, weights, t).numpy().astype(np.float64) + at for t, at in zip(transforms, pelvis))
+
+
+def _features(model: TrainedModel, dressed: DressedBody, motion: Any, betas: np.ndarray | None) -> Tensor:
+    """The network's inputs (T, D). Raises RollOutError where the model does not fit."""
+    if model.vertices != dressed.vertices:
+        raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
+    features = dressed.features(motion, model.recipe, betas, kind=find_kind(model.kind).features)
+    inputs = model.network.input_mean.shape[0]
+    if features.shape[1] != inputs:
+        raise RollOutError(
+            f"the model reads {inputs} numbers a frame, this body and motion give {features.shape[1]}"
+        )
+    return features
+
+
+def _one_by_one(
+    model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
+) -> Iterator[Tensor]:
+    """Skinned vertices (V, 3) of each frame, computed when asked for; the network is warmed up at once."""
+
+    @torch.inference_mode()
+    def step(frame: int, state: Any) -> tuple[Tensor, Any]:
+        offsets, state = model.network(features[frame][None, None], state)
+        return skin(rest + offsets[0, 0], weights, transforms[frame]), state
+
+    def frames() -> Iterator[Tensor]:
+        state = None
+        for frame in range(len(features)):
+            vertices, state = step(frame, state)
+            yield vertices
+
+    for frame in range(min(WARM_UP, len(features))):
+        step(frame, None)
+    return frames()
+
+
+def _timed(
     model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
 ) -> tuple[np.ndarray, np.ndarray]:
-    frames = len(features)
-    posed = np.empty((frames, *rest.shape), np.float32)
-    seconds = np.empty(frames)
-    for frame in range(min(WARM_UP, frames)):
-        offsets, _ = model.network(features[frame][None, None])
-        skin(rest + offsets[0, 0], weights, transforms[frame])
-    state = None
-    for frame in range(frames):
+    """All frames and the seconds of each."""
+    count = len(features)
+    posed, seconds = np.empty((count, *rest.shape), np.float32), np.empty(count)
+    frames = _one_by_one(model, features, rest, weights, transforms)
+    for frame in range(count):
         start = time.perf_counter()
-        offsets, state = model.network(features[frame][None, None], state)
-        vertices = skin(rest + offsets[0, 0], weights, transforms[frame])
+        vertices = next(frames)
         seconds[frame] = time.perf_counter() - start
         posed[frame] = vertices.numpy()
     return posed, seconds
 
 
+@torch.inference_mode()
 def _held(
     model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
 ) -> tuple[np.ndarray, np.ndarray]:

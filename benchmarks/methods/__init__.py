@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..method import MethodEntry
+from .solvers import SOLVERS
 
 _SIMULATION = "benchmarks.methods.simulation"
-_TRUNCATED = "benchmarks.methods.truncated_newton"
 _NETWORKS = "benchmarks.methods.networks"
 
 METHODS = (
@@ -61,15 +61,7 @@ METHODS = (
         trained="pbns",
         seeded=True,
     ),
-    *(
-        MethodEntry(
-            name=f"newton-{cut}",
-            description=f"the reference's Newton method, cut after {cut} iteration{'s' * (cut > 1)} a step",
-            module=_TRUNCATED,
-            options={"iterations": cut},
-        )
-        for cut in (1, 2, 4, 8)
-    ),
+    *SOLVERS,
 )
 
 

@@ -41,11 +41,12 @@ class Simulation:
             obstacle=scene.obstacle,
             start=scene.start,
             velocity=scene.start_velocity,
+            pin_positions=scene.pin_positions,
             progress=progress,
             **self.options,
         )
 
 
-def make(*, models: Path, seed: int, device: str) -> Simulation:
-    """A simulation to the reference's own tolerance."""
-    return Simulation(options={})
+def make(*, models: Path, seed: int, device: str, **options: Any) -> Simulation:
+    """A simulation to the reference's own tolerance and time step, or to those in the options."""
+    return Simulation(options=options)

@@ -18,6 +18,16 @@ SMALL_SCENES = (
         module="benchmarks.scenes.sheet_on_sphere",
     ),
     Scene(
+        name="flag",
+        description="a flag whose pole is swung to and fro; handles that move, no obstacle",
+        module="benchmarks.scenes.flag",
+    ),
+    Scene(
+        name="twisted_strip",
+        description="a strip whose two ends turn against each other, one turn in all; no obstacle",
+        module="benchmarks.scenes.twisted_strip",
+    ),
+    Scene(
         name="free_fall",
         description="a thrown sheet with no pins and its weight alone; the exact answer is known",
         module="benchmarks.scenes.free_fall",

@@ -1,5 +1,6 @@
 """Minimisers of a Potential: same call, same result type, one file each."""
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,8 +23,15 @@ class Minimiser(Protocol):
         ...
 
 
-def make_minimiser(potential: Potential, method: str = "newton", **options: Any) -> Minimiser:
-    """A minimiser by name ("newton" or "lbfgs") with its options; raises ValueError for an unknown name."""
+def make_minimiser(
+    potential: Potential, method: str | Callable[..., Minimiser] = "newton", **options: Any
+) -> Minimiser:
+    """A minimiser by name ("newton" or "lbfgs"), or made by `method(potential, **options)`.
+
+    Raises ValueError for an unknown name.
+    """
+    if callable(method):
+        return method(potential, **options)
     if method not in METHODS:
         raise ValueError(f"unknown minimiser {method!r}: choose one of {', '.join(METHODS)}")
     return METHODS[method](potential, **options)

@@ -1,0 +1,14 @@
+"""Vertex block descent on our own energies, cut after a number of sweeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .simulation import Simulation
+
+
+def make(*, models: Path, seed: int, device: str, iterations: int) -> Simulation:
+    """A simulation whose every step is `iterations` sweeps of vertex block descent."""
+    from ..minimisers.block_descent import VertexBlockDescent
+
+    return Simulation(options={"method": VertexBlockDescent, "max_iterations": iterations})

@@ -1,0 +1,40 @@
+"""A flag under gravity whose pole is swung to and fro: what moves it is its pinned edge alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference_sim import Cloth, Material
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
+
+from ..presets import Preset
+from ..scene import BuiltScene
+from .sheet import square_sheet
+
+SIZE = 0.4  # [m]
+SWING = 0.15  # [m] to either side
+PERIOD = 1.0  # [s]
+
+
+def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
+    """The built scene; the wardrobe is not looked at."""
+    flat, faces = square_sheet(preset.sheet_cells, SIZE)
+    positions = np.stack([flat[:, 0], -flat[:, 2], flat[:, 1]], axis=1)  # upright, in the plane of x and y
+    pole = np.arange(preset.sheet_cells + 1)  # the edge at the smallest x
+    cloth = Cloth(positions, faces, Material(), pins=pole)
+    dt = 1.0 / 30.0
+
+    def handles(frame: int) -> np.ndarray:
+        """The pole, swung sideways: from rest, so that the first frame has no jolt."""
+        phase = 2.0 * np.pi * frame * dt / PERIOD
+        return positions[pole] + [0.0, 0.0, SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0]
+
+    return BuiltScene(
+        name=name,
+        cloth=cloth,
+        energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
+        dt=dt,
+        frames=preset.sheet_frames,
+        settle=lambda: positions,
+        pin_positions=handles,
+    )

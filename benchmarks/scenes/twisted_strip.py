@@ -1,0 +1,50 @@
+"""A strip whose two ends turn against each other until it has made one turn: large rotations, folds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference_sim import Cloth, Material
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
+
+from ..presets import Preset
+from ..scene import BuiltScene
+from .sheet import sheet
+
+LENGTH, WIDTH = 0.4, 0.12  # [m]
+TURN = np.pi  # of each end, against the other
+CLOSER = 0.1  # share of the length by which the ends approach, so that the strip may fold
+
+
+def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
+    """The built scene; the wardrobe is not looked at."""
+    across = max(2, preset.sheet_cells // 2)
+    positions, faces = sheet((round(across * LENGTH / WIDTH), across), (LENGTH, WIDTH))
+    ends = np.flatnonzero(np.abs(np.abs(positions[:, 0]) - LENGTH / 2) < 1e-9)
+    cloth = Cloth(positions, faces, Material(), pins=ends)
+    side = np.sign(positions[ends, 0])
+    frames = preset.sheet_frames
+
+    def handles(frame: int) -> np.ndarray:
+        """Both ends turned about the strip's axis and moved together, with a smooth start and stop."""
+        share = 0.5 - 0.5 * np.cos(np.pi * frame / (frames - 1))
+        angle = TURN * share * side
+        rest = positions[ends]
+        return np.stack(
+            [
+                rest[:, 0] * (1.0 - CLOSER * share),
+                rest[:, 1] * np.cos(angle) - rest[:, 2] * np.sin(angle),
+                rest[:, 1] * np.sin(angle) + rest[:, 2] * np.cos(angle),
+            ],
+            axis=1,
+        )
+
+    return BuiltScene(
+        name=name,
+        cloth=cloth,
+        energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
+        dt=1.0 / 30.0,
+        frames=frames,
+        settle=lambda: positions,
+        pin_positions=handles,
+    )
