@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from .methods import METHODS
 from .presets import PRESETS
 from .scenes import PREFIX, SMALL_SCENES
+from .studies import STUDIES
 from .suites import SUITES
 from .suites.extremes import MAPS, REFUSALS, STEPS
 from .suites.validation import CHECKS
@@ -25,6 +26,7 @@ def listing() -> str:
         ("presets", ((p.name, p.description) for p in PRESETS)),
         ("validation checks", ((c.name, c.description) for c in CHECKS)),
         ("extreme cases", [*((c.name, c.description) for c in (*STEPS, *REFUSALS)), *map(_map, MAPS)]),
+        ("studies", ((s.name, f"{s.suite}: {s.description}") for s in STUDIES)),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
 

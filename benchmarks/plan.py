@@ -14,6 +14,8 @@ from .methods import METHODS, find_method
 from .presets import Preset
 from .scene import Scene
 from .scenes import PREFIX, SMALL_SCENES, all_scenes
+from .studies import METHOD as STUDIES_METHOD
+from .studies import STUDIES, Study
 from .suites import SUITE_NAMES
 from .suites.extremes import CASES, Case
 from .suites.extremes import METHOD as EXTREMES_METHOD
@@ -53,6 +55,7 @@ class Plan:
     cells: tuple[Cell, ...]
     checks: tuple[Check, ...]
     cases: tuple[Case, ...]
+    studies: tuple[Study, ...] = ()
     train: tuple[str, ...]
     test: tuple[str, ...]
     files: dict[str, Motion] = field(default_factory=dict)
@@ -134,7 +137,7 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
 
 def names_no_motion(scenes: Sequence[str]) -> bool:
     """Whether a choice of scenes names small scenes, checks and cases alone; no motion is looked at then."""
-    known = {item.name for group in (SMALL_SCENES, CHECKS, CASES) for item in group}
+    known = {item.name for group in (SMALL_SCENES, CHECKS, CASES, STUDIES) for item in group}
     return bool(scenes) and known.issuperset(scenes)
 
 
@@ -153,7 +156,7 @@ def choose_cells(
     scenes and methods are names or patterns; empty means all. Naming scenes reaches all of each suite.
     """
     declared = all_scenes(motions.test)
-    rows = [*(check.name for check in CHECKS), *(case.name for case in CASES)]
+    rows = [item.name for group in (CHECKS, CASES, STUDIES) for item in group]
     _check_words("scene", scenes, [*declared, *rows])
     _check_words("method", methods, [entry.name for entry in METHODS])
     full = full or bool(scenes)
@@ -175,13 +178,21 @@ def choose_cells(
     checks = _matching(known, scenes, "validation" in suites and _named(VALIDATION_METHOD, methods))
     hard = [case for case in CASES if case.smoke or scenes or preset.name != "smoke"]
     cases = _matching(hard, scenes, "extremes" in suites and _named(EXTREMES_METHOD, methods))
-    if not (found or checks or cases):
+    if not (found or checks or cases or choose_studies(suites, scenes, methods)):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
     # The reference first: an error against it can be said as soon as another cell is done.
     order = {entry.name: place for place, entry in enumerate(METHODS)}
     places = {name: place for place, name in enumerate(declared)}
     cells = sorted(found.values(), key=lambda c: (places[c.scene.name], order[c.method], c.seed))
     return tuple(cells), checks, cases
+
+
+def choose_studies(
+    suites: Sequence[str], scenes: Sequence[str], methods: Sequence[str]
+) -> tuple[Study, ...]:
+    """The studies of the suites, chosen by name as scenes are."""
+    known = [study for study in STUDIES if study.suite in suites]
+    return _matching(known, scenes, _named(STUDIES_METHOD, methods))
 
 
 def choose_suites(words: Iterable[str]) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from .plan import (
     PlanError,
     choose_cells,
     choose_motions,
+    choose_studies,
     choose_suites,
     names_no_motion,
     runs,
@@ -135,13 +136,16 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         seeds=seeds,
     )
     kept = [s for s in suites if s in MEETINGS and any(s in cell.suites for cell in cells)]
-    kept += ["validation"] * bool(checks) + ["extremes"] * bool(cases)
+    studies = choose_studies(suites, scenes, split(options.methods))
+    for suite, items in (("validation", checks), ("extremes", cases)):
+        kept += [suite] * bool(items or any(study.suite == suite for study in studies))
     return Plan(
         preset=preset,
         suites=tuple(kept),
         cells=cells,
         checks=checks,
         cases=cases,
+        studies=studies,
         train=motions.train,
         test=motions.test,
         files=motions.files,
@@ -217,11 +221,12 @@ def describe(plan: Plan) -> str:
             steps = plan.preset.steps.get(kind or "", 0)
             lines.append(f"train {kind}, seed {seed}: {steps} steps")
     lines.append(f"{len(plan.cells) - skipped} cells, {skipped} skipped, {len(plan.checks)} checks, "
-                 f"{len(plan.cases)} extreme cases")  # fmt: skip
+                 f"{len(plan.cases)} extreme cases, {len(plan.studies)} studies")  # fmt: skip
     for cell in plan.cells:
         lines.append(f"  {cell.label} [{', '.join(cell.suites)}]" + ("" if runs(cell) else ": skip"))
     lines += [f"  {check.name} [validation]" for check in plan.checks]
     lines += [f"  {case.name} [extremes]" for case in plan.cases]
+    lines += [f"  {study.name} [{study.suite}]" for study in plan.studies]
     return "\n".join(lines)
 
 

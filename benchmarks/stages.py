@@ -87,6 +87,9 @@ class Stages:
                 from .suites.extremes import run_case
 
                 self.record.rows += [run_case(case) for case in _bar(plan.cases, "extremes", "case")]
+        for study in plan.studies:
+            with self.record.stage(f"{study.suite}: {study.name}"):
+                self.record.rows += study.run(plan, self.folder, self.wardrobe)
         self.record.write_rows()
 
     def open_wardrobe(self) -> None:

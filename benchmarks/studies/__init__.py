@@ -1,0 +1,16 @@
+"""The visible tuple of studies: one line each. Nothing is imported until a study is run."""
+
+from __future__ import annotations
+
+from ..study import METHOD, Study
+
+__all__ = ["METHOD", "STUDIES", "Study"]
+
+STUDIES = (
+    Study(
+        name="laws",
+        description="momentum, energy and residual of every roll-out on unseen motions, frame by frame",
+        suite="validation",
+        module="benchmarks.studies.laws",
+    ),
+)
