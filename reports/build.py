@@ -47,18 +47,40 @@ def build_report(run_dir: str | Path, *, opengl: bool = True) -> tuple[Path, lis
 
 def draw(run: RunFolder, rows: Sequence[Row], problems: list[str], *, opengl: bool) -> list[Picture]:
     """Every figure that the run holds something for."""
-    from reports import figures, render, stability, training, work_precision
+    from reports import break_even, figures, profile, render, stability, training, work_precision
 
     dressed = dressed_trajectories(run, rows, problems)
     pictures = render.side_by_side(run.figures, dressed, opengl=opengl)
     series = [figures.energy_series(run.figures, kept.scene, kept.series) for kept in dressed]
     pictures += [picture for picture in series if picture is not None]
     pictures += work_precision.error_against_time(run.figures, rows)
+    pictures += profile.performance_profile(run.figures, rows)
+    pictures += break_even.break_even(run.figures, rows)
     pictures += training.training_curves(run.figures, run.models, problems)
     pictures += figures.validation_dots(run.figures, rows)
     pictures += stability.stability_maps(run.figures, rows)
     pictures += figures.extremes_outcomes(run.figures, rows)
     return pictures
+
+
+def draw_axes(run: RunFolder, x: str, y: str, scenes: str | None) -> Path:
+    """Any metric against any other, into figures/. Raises ResultsError for a name that no row has."""
+    rows = run.read_rows()
+    for what, name, known in (
+        *(("metric", metric, {row.metric for row in rows}) for metric in (x, y)),
+        *(("scene", scene, {row.scene for row in rows}) for scene in (scenes.split(",") if scenes else ())),
+    ):
+        if name not in known:
+            raise ResultsError(f"{run.rows_path}: no row has the {what} '{name}'")
+    from reports.work_precision import metric_against_metric
+
+    having = [{r.scene for r in rows if r.metric == metric and r.value is not None} for metric in (x, y)]
+    asked = scenes.split(",") if scenes else sorted(set.intersection(*having))
+    picture = metric_against_metric(run.figures, rows, x, y, asked)
+    if picture is None:
+        where = ", ".join(asked) or "every scene"
+        raise ResultsError(f"{run.rows_path}: fewer than two methods have both {x} and {y} on {where}")
+    return picture.path
 
 
 def dressed_trajectories(run: RunFolder, rows: Sequence[Row], problems: list[str]) -> list[Dressed]:
@@ -113,8 +135,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("run_dir", metavar="RUN_DIR", help="folder with run.json and results.csv")
     parser.add_argument("--no-opengl", action="store_true", help="draw the frames without OpenGL")
+    parser.add_argument(
+        "--axes",
+        nargs=2,
+        metavar=("X", "Y"),
+        help="draw only metric Y against metric X (names as in results.csv, say cost/frame gap/relative), "
+        "means over --scenes, into figures/",
+    )
+    parser.add_argument("--scenes", metavar="NAME,...", help="scenes of --axes (default: all that have both)")
     options = parser.parse_args(arguments)
     try:
+        if options.axes:
+            x, y = options.axes
+            print(draw_axes(RunFolder(options.run_dir), x, y, options.scenes))
+            return 0
         path, problems = build_report(options.run_dir, opengl=not options.no_opengl)
     except ResultsError as error:
         print(f"reports.build: {error}", file=sys.stderr)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
+LINE_LETTERS = 115  # of a legend that fit on one line of it
 GRID = "#E3E3E3"
 _LOOK: dict[Any, Any] = {
     "font.family": "STIXGeneral",
@@ -152,7 +153,7 @@ def legend_above(figure: Figure, methods: Sequence[str], *, lines: bool) -> None
     figure.legend(
         handles=handles,
         loc="outside upper center",
-        ncols=len(handles) if letters <= 115 else -(-len(handles) // 2),
+        ncols=max(1, -(-len(handles) // -(-letters // LINE_LETTERS))),
         frameon=False,
         handlelength=1.6 if lines else 0.8,
         handletextpad=0.5,

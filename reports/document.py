@@ -83,7 +83,12 @@ def document(
         {"title": "Garments on moving bodies", "blocks": _garments(tables, rest)},
         {
             "title": "Speed: error against run time",
-            "blocks": _figures(rest, "speed", "speed") + _tables(tables, "speed"),
+            "blocks": [
+                block
+                for kind in ("break_even", "profile", "speed")
+                for block in _figures(rest, "speed", kind)
+            ]
+            + _tables(tables, "speed"),
         },
         {
             "title": "Validation: known answers",

@@ -44,28 +44,69 @@ _KNOWN = {
 _FAMILIES = {
     "newton": Style("Newton", "#D55E00", "P"),
     "lbfgs": Style("L-BFGS", "#CC79A7", "X"),
+    "gradient-descent": Style("Gradient descent", "#7A5C00", "p"),
+    "vbd": Style("Vertex block descent", "#44AA99", ">"),
+    "xpbd": Style("XPBD", "#332288", "<"),
+    "simulation-tolerance": Style("Simulation to a tolerance", "#555555", "*"),
+    "simulation-dt": Style("Simulation with smaller steps", "#882255", "*"),
 }
-_SPARE = ("#7A5C00", "#332288", "#882255", "#44AA99", "#999933", "#661100")
+_SPARE = ("#999933", "#661100", "#AA4499", "#117733", "#88CCEE", "#DDCC77")
+CLEANED = "+cleanup"  # at the end of a method's name: its vertices were pushed out of the body afterwards
 
 
-def family_of(method: str) -> tuple[str, int] | None:
-    """("newton", 4) for "newton-4", a solver cut at 4 iterations; None for a method that is no such cut."""
+@dataclass(frozen=True)
+class Cut:
+    """A member of a family of methods that differ by one number: which family, its place, and its mark."""
+
+    family: str
+    order: float
+    mark: str
+
+
+def cut_of(method: str) -> Cut | None:
+    """("newton", 4, "4") for "newton-4"; None for a method that belongs to no family."""
+    if match := re.fullmatch(r"simulation-1e-(\d+)", method):
+        return Cut("simulation-tolerance", float(match[1]), f"1e-{match[1]}")
+    if match := re.fullmatch(r"simulation-dt/(\d+)", method):
+        return Cut("simulation-dt", float(match[1]), f"dt/{match[1]}")
     match = re.fullmatch(r"(.+)-(\d+)", method)
-    return (match[1], int(match[2])) if match else None
+    return Cut(match[1], float(match[2]), match[2]) if match else None
+
+
+def is_hybrid(method: str) -> bool:
+    """Whether it is a solver that starts each step from another method's guess, as "snug+lbfgs-4"."""
+    start, plus, solver = method.partition("+")
+    cut = cut_of(solver)
+    return bool(start and plus and cut and cut.family in _FAMILIES)
+
+
+def family_style(name: str) -> Style:
+    """The style of a family: a hybrid has the colour of what it starts from and the marker of its solver."""
+    start, plus, solver = name.partition("+")
+    if plus and solver in _FAMILIES:
+        before, after = style(start), _FAMILIES[solver]
+        return Style(f"{before.label} + {after.label}", before.colour, after.marker, "-.")
+    spare = _SPARE[zlib.crc32(name.encode()) % len(_SPARE)]
+    return _FAMILIES.get(name, Style(name, spare, "h"))
 
 
 def style(method: str) -> Style:
     """The style of a method; a name not known here gets a spare colour that depends on the name alone."""
     if method in _KNOWN:
         return _KNOWN[method]
-    cut = family_of(method)
-    name = cut[0] if cut else method
-    colour = _SPARE[zlib.crc32(name.encode()) % len(_SPARE)]
-    base = _FAMILIES.get(name, Style(name, colour, "h"))
-    if not cut:
-        return base
-    steps = "iteration" if cut[1] == 1 else "iterations"
-    return Style(f"{base.label}, {cut[1]} {steps}", base.colour, base.marker)
+    if method.endswith(CLEANED):
+        base = style(method.removesuffix(CLEANED))
+        return Style(f"{base.label}, cleaned up", base.colour, base.marker, ":")
+    cut = cut_of(method)
+    if cut is None:
+        return family_style(method)
+    base = family_style(cut.family)
+    if cut.family == "simulation-tolerance":
+        return Style(f"Simulation to {cut.mark}", base.colour, base.marker)
+    if cut.family == "simulation-dt":
+        return Style(f"Simulation, step {cut.mark}", base.colour, base.marker)
+    steps = "iteration" if cut.mark == "1" else "iterations"
+    return Style(f"{base.label}, {cut.mark} {steps}", base.colour, base.marker, base.line)
 
 
 def label(method: str) -> str:
@@ -73,13 +114,16 @@ def label(method: str) -> str:
 
 
 def ordered(methods: Iterable[str]) -> list[str]:
-    """Without repeats: the known methods first, then solvers by family and iterations, then the rest."""
-    known = list(_KNOWN)
+    """Without repeats: the known methods first, then solvers by family and place in it, then the rest."""
+    known, families = list(_KNOWN), list(_FAMILIES)
 
-    def rank(method: str) -> tuple[int, str, int]:
+    def rank(method: str) -> tuple[int, int, str, float]:
         if method in known:
-            return (known.index(method), "", 0)
-        family, cut = family_of(method) or (method, 0)
-        return (len(known) + (family not in _FAMILIES), family, cut)
+            return (0, known.index(method), "", 0.0)
+        cut = cut_of(method)
+        family, place = (cut.family, cut.order) if cut else (method, 0.0)
+        if family in families:
+            return (1, families.index(family), family, place)
+        return (2 + ("+" not in family), 0, family, place)
 
     return sorted(set(methods), key=rank)

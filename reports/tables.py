@@ -125,8 +125,10 @@ def speed(rows: Sequence[Row]) -> Table | None:
     measured = speed_measurements(rows)
     metrics = {
         "cost/frame": Column("run_time", "Run time", "ms"),
-        "curvature/error": Column("curvature_error", "Curvature error", "1/m"),
         "gap/relative": Column("gap", "Relative gap"),
+        "gradient/norm": Column("gradient", "Gradient left", "weights"),
+        "curvature/error": Column("curvature_error", "Curvature error", "1/m"),
+        "curvature/histogram": Column("histogram", "Histogram distance", "1/m"),
         "distance/rms": Column("distance_rms", "Distance", "mm"),
     }
     lines: list[tuple[Cell, ...]] = []

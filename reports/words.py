@@ -7,14 +7,13 @@ from collections.abc import Iterable, Sequence
 
 from benchmarks.results import Row
 from reports import palette
+from reports.answers import answers
 from reports.numbers import number, with_spread
 from reports.palette import NETWORKS, REFERENCE
 from reports.summary import (
     TERMS,
     Measurements,
     dressed_scenes,
-    excess_energy,
-    speed_measurements,
     suite_rows,
 )
 
@@ -38,7 +37,7 @@ def findings(rows: Sequence[Row]) -> list[tuple[str, str]]:
         ("Against PBNS", against(dressed, "pbns")),
         ("Against supervised", against(dressed, "supervised")),
         ("Wrinkles", curvature(dressed)),
-        ("Run time", run_time(rows)),
+        *answers(rows),
         ("Validation", checks(rows)),
         ("Extremes", outcomes(rows)),
         ("Not finished", trouble(rows)),
@@ -133,54 +132,6 @@ def curvature(measured: Measurements) -> str:
     if own is None or snug is None:
         return text
     return f"{text} Mean curvature itself: the simulation {number(own)} 1/m, SNUG {number(snug)} 1/m."
-
-
-def run_time(rows: Sequence[Row]) -> str:
-    """SNUG's time against the simulation's, and whether a cut solver is both faster and closer."""
-    measured = speed_measurements(rows)
-    scenes = dressed_scenes(measured)
-    sentences = []
-    own, reference = (measured.value(m, "cost/frame", scenes) for m in ("snug", REFERENCE))
-    if own and reference:
-        ratio = (
-            f"{number(reference / own, 2)} times faster"
-            if reference > own
-            else f"{number(own / reference, 2)} times slower"
-        )
-        sentences.append(
-            f"SNUG takes {number(own)} ms per frame, the converged simulation {number(reference)}: {ratio}."
-        )
-    sentences += [words for scene in scenes if (words := _cut_solver(measured, scene))]
-    return " ".join(sentences)
-
-
-def _cut_solver(measured: Measurements, scene: str) -> str:
-    """In one scene: the fastest cut solver with a smaller error than SNUG, and how much longer it takes."""
-    errors_of = {
-        "mean-curvature error": lambda method: measured.value(method, "curvature/error", [scene]),
-        "total energy": lambda method: excess_energy(measured, scene, method),
-    }
-    for words, error_of in errors_of.items():
-        own, own_time = error_of("snug"), measured.value("snug", "cost/frame", [scene])
-        timed = [
-            (time, method, error)
-            for method in measured.methods
-            if palette.family_of(method)
-            and (error := error_of(method)) is not None
-            and (time := measured.value(method, "cost/frame", [scene]))
-        ]
-        if own is None or not own_time or not timed:
-            continue
-        better = sorted(entry for entry in timed if entry[2] < own)
-        if not better:
-            return f"On {scene} no cut solver reached SNUG's {words}."
-        time, method, _ = better[0]
-        pace = f"{number(time / own_time, 2)} times SNUG's time" if time > own_time else "less time than SNUG"
-        return (
-            f"On {scene} the fastest cut solver with a smaller {words} than SNUG is "
-            f"{name(method)}: {number(time)} ms per frame, {pace}."
-        )
-    return ""
 
 
 def checks(rows: Sequence[Row]) -> str:

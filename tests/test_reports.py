@@ -18,6 +18,7 @@ from benchmarks.results import Row, RunFolder
 from reference_sim import Trajectory
 from reports import build, figures, numbers, palette, render, tables, training, vtkhdf, words, work_precision
 from reports.document import document, merged
+from reports.fronts import Point
 from reports.layout import table_block
 from reports.summary import Mean, Measurements
 
@@ -370,7 +371,8 @@ def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
     from reports.canvas import new_figure
 
     axes = new_figure(3, 3).subplots()
-    hollow = work_precision._draw_points(axes, {"snug": (1.0, 0.2), "newton-8": (9.0, -0.1)}, 20.0)
+    points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
+    hollow = work_precision._draw_points(axes, points, 20.0, floor=0.0)
     assert hollow == {"newton-8"}
     low, high = axes.get_ylim()
     shown = [

@@ -1,0 +1,134 @@
+"""What error against run time comes to, in words from the numbers, whichever way they come out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from benchmarks.results import Row
+from reports import palette
+from reports.break_even import Cost, compared_scenes, cost_of, crossing, frames_text, rivals
+from reports.fronts import TIME, Point, fastest, front, hybrids, points_of, solvers
+from reports.numbers import duration, number
+from reports.summary import Measurements, dressed_scenes, speed_measurements
+
+NETWORK = "snug"
+ERRORS = (("gap/relative", "energy gap", ""), ("curvature/error", "mean-curvature error", " 1/m"))
+
+
+def answers(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """(question, sentences): where SNUG wins, what beats it, whether hybrids do, when training pays."""
+    measured = speed_measurements(rows)
+    scenes = compared_scenes(measured)
+    return [
+        ("Run time", run_time(measured)),
+        ("Where SNUG wins", _per_error(measured, scenes, _unbeaten)),
+        ("A few iterations", _per_error(measured, scenes, _cut_solver)),
+        ("Network plus solver", _per_error(measured, scenes, _hybrid)),
+        ("When training pays", training_pays(measured, scenes)),
+    ]
+
+
+def run_time(measured: Measurements) -> str:
+    """SNUG's time a frame against the simulation's."""
+    scenes = dressed_scenes(measured)
+    own, reference = (measured.value(m, TIME, scenes) for m in (NETWORK, palette.REFERENCE))
+    if not own or not reference:
+        return ""
+    pace = f"{number(reference / own, 2)} times faster"
+    if reference <= own:
+        pace = f"{number(own / reference, 2)} times slower"
+    return f"SNUG takes {number(own)} ms per frame, the converged simulation {number(reference)} ms: {pace}."
+
+
+def _per_error(measured: Measurements, scenes: Sequence[str], say) -> str:
+    """One sentence for each measure of error, over the means of the scenes compared."""
+    sentences = []
+    for metric, words, unit in ERRORS:
+        points = points_of(measured, scenes, metric) if scenes else []
+        own = next((p for p in points if p.method == NETWORK), None)
+        if own is not None and (sentence := say(points, own, words, unit)):
+            sentences.append(sentence)
+    if not sentences:
+        return ""
+    where = scenes[0] if len(scenes) == 1 else f"mean of {len(scenes)} scenes"
+    return f"{' '.join(sentences)} ({where}.)"
+
+
+def _unbeaten(points: Sequence[Point], own: Point, words: str, unit: str) -> str:
+    """Whether anything as fast is more accurate than SNUG, and what the next faster and slower ones are."""
+    faster = [p for p in points if p.time <= own.time and p.error <= own.error and p is not own]
+    if faster:
+        best = min(faster, key=lambda p: p.error)
+        text = f"By {words} SNUG ({number(own.error)}{unit} in {number(own.time)} ms) is not on the front: "
+        return text + f"{palette.label(best.method)} has {number(best.error)} in {number(best.time)} ms."
+    following = [p for p in front(points) if p.time > own.time]
+    text = f"By {words} nothing as fast as SNUG ({number(own.time)} ms) comes nearer than its "
+    text += f"{number(own.error)}{unit}"
+    if not following:
+        return text + ", and nothing slower does."
+    after = following[0]
+    pace = number(after.time / own.time, 2)
+    return text + (
+        f"; the next on the front, {palette.label(after.method)}, has {number(after.error)} in "
+        f"{number(after.time)} ms, {pace} times its time."
+    )
+
+
+def _cut_solver(points: Sequence[Point], own: Point, words: str, unit: str) -> str:
+    """The fastest solver with no larger an error than SNUG's."""
+    cuts = [p for p in solvers(points) if palette.cut_of(p.method)]
+    best = fastest(cuts, own.error)
+    if not cuts:
+        return ""
+    if best is None:
+        return f"No cut solver reaches SNUG's {words}."
+    pace = f"{number(best.time / own.time, 2)} times SNUG's time"
+    if best.time <= own.time:
+        pace = "no more than SNUG's time"
+    return (
+        f"The fastest solver with at most SNUG's {words} ({number(own.error)}{unit}) is "
+        f"{palette.label(best.method)}: {number(best.error)}{unit} in {number(best.time)} ms, {pace}."
+    )
+
+
+def _hybrid(points: Sequence[Point], own: Point, words: str, unit: str) -> str:
+    """Hybrids that no solver alone beats in both time and error, and how far below SNUG the cheapest is."""
+    mixed = [p for p in hybrids(points) if p.method.startswith(f"{NETWORK}+")]
+    alone = [*solvers(points), own]
+    if not mixed:
+        return ""
+    winning = [p for p in mixed if not any(q.time <= p.time and q.error <= p.error for q in alone)]
+    if not winning:
+        return f"By {words} every SNUG-started solver is beaten by a solver alone that is no slower."
+    first = min(winning, key=lambda p: p.time)
+    names = ", ".join(palette.label(p.method) for p in sorted(winning, key=lambda p: p.time))
+    return (
+        f"By {words} {len(winning)} of {len(mixed)} SNUG-started solvers are beaten by none without it "
+        f"({names}); the fastest has {number(first.error)}{unit} in {number(first.time)} ms."
+    )
+
+
+def training_pays(measured: Measurements, scenes: Sequence[str]) -> str:
+    """After how many frames SNUG has cost less than the solvers it competes with."""
+    own = cost_of(measured, NETWORK, scenes) if scenes else None
+    if own is None or own.before <= 0.0:
+        return ""
+    sentences = []
+    for method, why in rivals(measured, scenes, NETWORK).items():
+        rival = cost_of(measured, method, scenes)
+        if rival is not None:
+            sentences.append(_pays(own, rival, why))
+    return " ".join(sentences)
+
+
+def _pays(own: Cost, rival: Cost, why: str) -> str:
+    name = "the converged simulation"
+    if rival.method != palette.REFERENCE:
+        name = f"{palette.label(rival.method)}, the fastest solver with at most SNUG's {why}"
+    frames = crossing(own, rival)
+    if frames is None:
+        return f"Against {name}, SNUG never pays: its frames cost no less."
+    return (
+        f"SNUG's training of {duration(own.before)} pays against {name}, after {frames_text(frames)} frames "
+        f"({duration(frames / 30.0)} of motion at 30 frames a second)."
+    )

@@ -1,0 +1,142 @@
+"""Error against run time in the report: fronts, profiles, break-even and the answers in words."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.results import Row, RunFolder
+from reports import build, palette
+from reports.answers import answers
+from reports.break_even import Cost, break_even, crossing, rivals
+from reports.fronts import Point, fastest, front, hybrids, points_of, solvers
+from reports.profile import performance_profile, staircases, times_to_reach
+from reports.summary import speed_measurements
+from reports.work_precision import error_against_time
+
+# method: ms a frame, relative gap, curvature error
+DRESSED = {
+    "simulation": (100.0, 0.0, None),
+    "newton-1": (12.0, 0.2, 3.0),
+    "newton-4": (45.0, 0.01, 1.0),
+    "lbfgs-5": (4.0, 0.3, 4.0),
+    "lbfgs-20": (16.0, 0.05, 2.0),
+    "skinning": (0.1, 1.0, 4.5),
+    "snug": (0.25, 0.1, 5.0),
+    "snug+lbfgs-1": (1.0, 0.08, 2.5),
+    "snug+lbfgs-4": (50.0, 0.02, 1.5),
+}
+SCENES = ("dressed/walk", "dressed/jump")
+
+
+def row(scene, method, metric, value, unit="1") -> Row:
+    return Row(suite="speed", scene=scene, method=method, seed=0, metric=metric, unit=unit, value=value)
+
+
+def all_rows() -> list[Row]:
+    rows = []
+    for scene in SCENES:
+        for method, (time, gap, curvature) in DRESSED.items():
+            rows += [row(scene, method, "cost/frame", time, "ms"), row(scene, method, "gap/relative", gap)]
+            if curvature is not None:
+                rows.append(row(scene, method, "curvature/error", curvature, "1/m"))
+                rows.append(row(scene, method, "distance/rms", 10.0 * curvature, "mm"))
+        rows.append(row(scene, "snug", "cost/train", 200.0, "s"))
+        rows.append(row(scene, "simulation", "distance/floor", 21.0, "mm"))
+    for method in ("simulation", "newton-1", "newton-4"):
+        time, gap, _ = DRESSED[method]
+        rows += [row("sheet", method, "cost/frame", time, "ms"), row("sheet", method, "gap/relative", gap)]
+    return rows
+
+
+def test_names_of_families_cuts_and_hybrids():
+    assert palette.cut_of("newton-4") == palette.Cut("newton", 4.0, "4")
+    assert palette.cut_of("simulation-1e-4") == palette.Cut("simulation-tolerance", 4.0, "1e-4")
+    assert palette.cut_of("simulation-dt/8") == palette.Cut("simulation-dt", 8.0, "dt/8")
+    assert palette.cut_of("snug") is None and palette.cut_of("snug-no-bending") is None
+    assert palette.is_hybrid("snug+lbfgs-4")
+    assert not palette.is_hybrid("lbfgs-4") and not palette.is_hybrid("snug+cleanup")
+    assert palette.label("snug+lbfgs-4") == "SNUG + L-BFGS, 4 iterations"
+    assert palette.style("snug+newton-2").colour == palette.style("snug").colour
+    assert palette.ordered(["a+newton-2", "lbfgs-10", "lbfgs-5", "snug"])[:2] == ["snug", "lbfgs-5"]
+
+
+def test_the_front_holds_those_that_nothing_beats():
+    points = [Point("a", 1.0, 5.0), Point("b", 2.0, 6.0), Point("c", 3.0, 1.0), Point("d", 3.0, 2.0)]
+    assert [p.method for p in front(points)] == ["a", "c"]
+    assert fastest(points, 2.0) == points[2]
+    assert fastest(points, 0.5) is None
+
+
+def test_points_need_every_scene():
+    measured = speed_measurements(all_rows())
+    everywhere = points_of(measured, ["sheet", *SCENES], "gap/relative")
+    assert [p.method for p in everywhere] == ["simulation", "newton-1", "newton-4"]
+    dressed = points_of(measured, SCENES, "gap/relative")
+    assert {p.method for p in solvers(dressed)} == {
+        "simulation",
+        "newton-1",
+        "newton-4",
+        "lbfgs-5",
+        "lbfgs-20",
+    }
+    assert {p.method for p in hybrids(dressed)} == {"snug+lbfgs-1", "snug+lbfgs-4"}
+
+
+def test_a_profile_counts_scenes_within_a_ratio_of_the_fastest():
+    times = times_to_reach(speed_measurements(all_rows()), ["sheet", *SCENES], 0.15)
+    assert times["sheet"] == {"simulation": 100.0, "newton": 45.0}
+    assert times["dressed/walk"]["snug"] == 0.25 and times["dressed/walk"]["lbfgs"] == 16.0
+    stairs = staircases(times)
+    ratios, shares = stairs["newton"]
+    assert ratios[:3] == [1.0, 180.0, 180.0] and shares[:3] == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert stairs["snug"][1][-1] == pytest.approx(2 / 3)
+
+
+def test_break_even_is_where_the_total_costs_cross():
+    network, solver = Cost("snug", 200.0, 0.001), Cost("simulation", 0.0, 0.101)
+    frames = crossing(network, solver)
+    assert frames == pytest.approx(2000.0)
+    assert network.total(frames) == pytest.approx(solver.total(frames))
+    assert crossing(solver, network) is None
+    assert crossing(Cost("snug", 200.0, 0.2), solver) is None
+
+
+def test_rivals_are_the_fastest_solvers_as_accurate():
+    found = rivals(speed_measurements(all_rows()), list(SCENES))
+    assert found == {"simulation": "converged", "lbfgs-20": "energy gap", "lbfgs-5": "curvature error"}
+
+
+def test_the_answers_follow_the_numbers():
+    said = dict(answers(all_rows()))
+    assert "400 times faster" in said["Run time"]
+    assert "nothing as fast as SNUG" in said["Where SNUG wins"]
+    assert "is not on the front: Skinning alone has 4.50" in said["Where SNUG wins"]
+    assert "L-BFGS, 20 iterations: 0.0500 in 16.0 ms, 64 times" in said["A few iterations"]
+    assert "1 of 2 SNUG-started solvers" in said["Network plus solver"]
+    assert "after 2,000 frames" in said["When training pays"]
+    assert "after 13,000 frames" in said["When training pays"]
+
+
+def test_without_networks_nothing_is_said():
+    rows = [r for r in all_rows() if "snug" not in r.method]
+    assert not any(words for _, words in answers(rows))
+
+
+def test_every_figure_of_the_suite_is_drawn(tmp_path):
+    rows = all_rows()
+    pictures = (
+        error_against_time(tmp_path, rows) + performance_profile(tmp_path, rows) + break_even(tmp_path, rows)
+    )
+    assert len(pictures) == 5 and all(p.path.is_file() for p in pictures)
+    assert "Grey: under 21.0 mm" in pictures[0].caption
+    assert "SNUG overtakes Simulation at 2,000 frames (3.34 min)" in pictures[-1].caption
+
+
+def test_any_metric_against_any_other(tmp_path, capsys):
+    run = RunFolder(tmp_path)
+    run.write_rows(all_rows())
+    assert build.main([str(tmp_path), "--axes", "distance/rms", "gap/relative"]) == 0
+    assert (tmp_path / "figures/gap-relative_against_distance-rms.svg").is_file()
+    assert build.main([str(tmp_path), "--axes", "cost/frame", "gap/nothing"]) == 2
+    assert "no row has the metric 'gap/nothing'" in capsys.readouterr().err
+    assert build.main([str(tmp_path), "--axes", "cost/frame", "gap/relative", "--scenes", "moon"]) == 2
