@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from snug.recipe import learns_from_simulation
+
 from .cell import Outcome
 from .methods import find_method
 from .metrics.curvature import CurvatureSeries, curvature_error, curvature_series
@@ -110,7 +112,7 @@ def model_costs(trained: Trained | None, data_seconds: float) -> dict[str, float
     """cost/data, cost/train and cost/memory of a method that uses this network; nothing without one."""
     if trained is None:
         return {}
-    data = data_seconds if trained.kind == "supervised" else 0.0
+    data = data_seconds if learns_from_simulation(trained.kind) else 0.0
     return {"cost/data": data, "cost/train": trained.seconds, "cost/memory": trained.megabytes}
 
 

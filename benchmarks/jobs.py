@@ -95,6 +95,7 @@ def train_network(
 
     from reference_sim import Trajectory
     from snug.dresser import DressedBody
+    from snug.recipe import TRAININGS
     from snug.train import train, untrained_model
 
     from .methods.networks import model_path
@@ -107,7 +108,8 @@ def train_network(
         model = untrained_model("snug", dressed, clips, seed=seed)
     else:
         targets = None
-        if kind == "supervised":
+        training = TRAININGS[kind]
+        if training.simulated:
             paths = {m: run.trajectory_path(PREFIX + m, "simulation") for m in motions}
             targets = {m: Trajectory.load(path).positions for m, path in paths.items()}
         told = 0
@@ -118,8 +120,8 @@ def train_network(
             told = int(row["step"])
 
         model = train(
-            kind, dressed, clips, steps=steps, seed=seed, trajectories=targets, log=log, progress=False,
-            every=LOG_EVERY,
+            training.kind, dressed, clips, steps=steps, seed=seed, trajectories=targets,
+            recipe=training.recipe, log=log, progress=False, every=LOG_EVERY,
         )  # fmt: skip
     model.save(model_path(run.models, kind, seed))
     final = model.history[-1] if model.history else {}

@@ -10,6 +10,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from snug.recipe import learns_from_simulation
+
 from .methods import METHODS, find_method
 from .presets import Preset
 from .scene import Scene
@@ -86,7 +88,7 @@ class Plan:
     @property
     def needs_targets(self) -> bool:
         """Whether training motions have to be simulated."""
-        return any(kind == "supervised" for kind, _ in self.models)
+        return any(learns_from_simulation(name) for name, _ in self.models)
 
 
 def runs(cell: Cell) -> bool:
@@ -167,7 +169,8 @@ def choose_cells(
             continue
         module = importlib.import_module(f"benchmarks.suites.{suite}")
         for scene in module.scenes(motions.test, full=full):
-            for method in module.methods(preset.newton_cuts):
+            further = module.FURTHER if methods or preset.further else ()
+            for method in (*module.methods(preset.newton_cuts), *further):
                 if not (_named(scene, scenes) and _named(method, methods)):
                     continue
                 for seed in seeds if find_method(method).seeded else seeds[:1]:

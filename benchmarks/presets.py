@@ -10,7 +10,8 @@ class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
     frames: at most so many frames of each motion, at 30 per second. steps: optimiser steps per kind
-    of network. settle_frames: frames from the T-pose into the first pose of a motion.
+    of network, for ablations those of what they vary. further: whether the ablations and further baselines of
+    a suite take part without being named. settle_frames: frames from the T-pose into the first pose of a motion.
     sheet_cells: the small scenes are sheets of so many cells along each side. gap_samples: frames of a
     trajectory at which suite speed solves the step again to know the gap to its minimum.
     """
@@ -27,6 +28,11 @@ class Preset:
     sheet_frames: int
     newton_cuts: tuple[int, ...]
     gap_samples: int
+    further: bool = False
+
+    def steps_of(self, model: str) -> int:
+        """Optimiser steps of the network of that name; 0 for one that is not trained."""
+        return self.steps.get(model, self.steps.get(model.partition("-")[0], 0))
 
 
 PRESETS = (
@@ -38,7 +44,7 @@ PRESETS = (
         test_motions=1,
         frames=20,
         settle_frames=12,
-        steps={"snug": 60, "supervised": 60, "pbns": 60},
+        steps={"snug": 60, "supervised": 60, "pbns": 60, "santesteban2019": 10, "tailornet": 60},
         sheet_cells=6,
         sheet_frames=10,
         newton_cuts=(1, 4),
@@ -52,7 +58,7 @@ PRESETS = (
         test_motions=None,
         frames=150,
         settle_frames=30,
-        steps={"snug": 6000, "supervised": 4000, "pbns": 6000},
+        steps={"snug": 6000, "supervised": 4000, "pbns": 6000, "santesteban2019": 1000, "tailornet": 4000},
         sheet_cells=14,
         sheet_frames=45,
         newton_cuts=(1, 2, 4, 8),
@@ -66,7 +72,8 @@ PRESETS = (
         test_motions=None,
         frames=100_000,
         settle_frames=60,
-        steps={"snug": 60_000, "supervised": 60_000, "pbns": 60_000},
+        steps=dict.fromkeys(("snug", "supervised", "pbns", "santesteban2019", "tailornet"), 60_000),
+        further=True,
         sheet_cells=30,
         sheet_frames=90,
         newton_cuts=(1, 2, 4, 8),

@@ -218,8 +218,7 @@ def describe(plan: Plan) -> str:
         targets = "simulated for the supervised network" if plan.needs_targets else "not simulated"
         lines.append(f"training motions {', '.join(plan.train)} ({targets})")
         for kind, seed in plan.models:
-            steps = plan.preset.steps.get(kind or "", 0)
-            lines.append(f"train {kind}, seed {seed}: {steps} steps")
+            lines.append(f"train {kind}, seed {seed}: {plan.preset.steps_of(kind)} steps")
     lines.append(f"{len(plan.cells) - skipped} cells, {skipped} skipped, {len(plan.checks)} checks, "
                  f"{len(plan.cases)} extreme cases, {len(plan.studies)} studies")  # fmt: skip
     for cell in plan.cells:

@@ -9,6 +9,8 @@ import dataclasses
 import sys
 from typing import TYPE_CHECKING, Any
 
+from snug.recipe import learns_from_simulation
+
 from .cell import Outcome, run_cell
 from .methods import find_method
 from .plan import Cell, Plan, runs
@@ -157,10 +159,10 @@ class Stages:
         assert self.wardrobe is not None
         todo = []
         # The longest first: two workers then end at about the same time.
-        models = sorted(plan.models, key=lambda model: -plan.preset.steps.get(model[0], 0))
+        models = sorted(plan.models, key=lambda model: -plan.preset.steps_of(model[0]))
         for kind, seed in models:
-            motions = self.targets if kind == "supervised" else list(plan.train)
-            steps = plan.preset.steps.get(kind, 0)
+            motions = self.targets if learns_from_simulation(kind) else list(plan.train)
+            steps = plan.preset.steps_of(kind)
             arguments = (kind, seed, steps, motions, plan.folder, plan.device)
             todo.append(Job(f"{kind} seed {seed}", jobs.train_network, arguments, steps))
         results = run_jobs(todo, self.wardrobe, title="training", unit="step")

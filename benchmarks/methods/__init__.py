@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..method import MethodEntry
+from .learned import LEARNED
 from .solvers import SOLVERS
 
 _SIMULATION = "benchmarks.methods.simulation"
@@ -61,6 +62,7 @@ METHODS = (
         trained="pbns",
         seeded=True,
     ),
+    *LEARNED,
     *SOLVERS,
 )
 

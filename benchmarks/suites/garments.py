@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..methods.learned import LEARNED
+
 METHODS = ("simulation", "skinning", "untrained", "snug", "supervised", "pbns")
+FURTHER = tuple(entry.name for entry in LEARNED)  # only where methods are named, or at a preset that holds all
 
 
 def scenes(test_motions: Sequence[str], *, full: bool) -> list[str]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 
+FURTHER = ("pbns-springs", "santesteban2019", "tailornet")  # as in suite garments
+
+
 def scenes(test_motions: Sequence[str], *, full: bool) -> list[str]:
     """Small scenes and dressed bodies; the quick subset is one of each."""
     small = ["hanging_sheet", "sheet_on_sphere", "free_fall"] if full else ["hanging_sheet"]

@@ -1,0 +1,30 @@
+"""Further learned methods, which run when they are named: other baselines, ablations of SNUG, and clean-up."""
+
+from __future__ import annotations
+
+from snug.recipe import ABLATIONS
+
+from ..method import MethodEntry
+
+
+def _network(name: str, description: str) -> MethodEntry:
+    """The entry of a network that snug.recipe.TRAININGS knows under the same name."""
+    return MethodEntry(
+        name=name,
+        description=description,
+        module="benchmarks.methods.networks",
+        options={"kind": name},
+        needs_body=True,
+        dtype="float32",
+        trained=name,
+        seeded=True,
+    )
+
+
+LEARNED = (
+    _network("pbns-springs", "PBNS with its own mass-spring material instead of StVK"),
+    _network("santesteban2019", "fit by shape and one GRU of 1500, trained on simulated vertices"),
+    _network("tailornet", "low and high frequencies by static networks, trained on simulated vertices"),
+    _network("snug-paper", "SNUG by the paper's text to the letter"),
+    *(_network(f"snug-{recipe.name}", f"ablation: SNUG, recipe {recipe.name}") for recipe in ABLATIONS),
+)
