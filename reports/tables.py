@@ -6,118 +6,13 @@ What was not measured is None, and printed as a dash.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from benchmarks.results import Row
+from reports.garment_tables import cost, curvature, dynamics, energies, energies_by_scene, geometry, shape
 from reports.stability import refusals
-from reports.summary import (
-    EXTRA_TERMS,
-    TERMS,
-    Measurements,
-    benchmark_cells,
-    dressed_scenes,
-    excess_energy,
-    speed_measurements,
-    suite_rows,
-)
+from reports.summary import Measurements, excess_energy, speed_measurements, suite_rows
 from reports.table import Cell, Column, Table
-
-
-def _by_method(
-    name: str, measurements: Measurements, scenes: Sequence[str] | None, columns: Iterable[tuple[str, Column]]
-) -> Table | None:
-    """One row per method with any of the metrics; columns nobody has are kept, as dashes."""
-    pairs = list(columns)
-    rows: list[tuple[Cell, ...]] = []
-    for method in measurements.methods:
-        means = [measurements.mean(method, metric, scenes) for metric, _ in pairs]
-        if any(mean is not None for mean in means):
-            rows.append((method, *means))
-    if not rows:
-        return None
-    return Table(name, (Column("method", "Method"), *(column for _, column in pairs)), tuple(rows))
-
-
-def energy_columns(measurements: Measurements) -> list[tuple[str, Column]]:
-    """The paper's terms and the total, and any further term that some row of these carries."""
-    further = [term for term in EXTRA_TERMS if f"energy/{term}" in measurements.metrics]
-    names = [*TERMS[:-1], *further, TERMS[-1]]
-    return [(f"energy/{term}", Column(term, term.capitalize(), "J")) for term in names]
-
-
-def energies(rows: Sequence[Row]) -> Table | None:
-    """Table 1 of the paper: energy per term, J per frame, mean over the dressed scenes."""
-    measured = Measurements(suite_rows(rows, "garments"))
-    scenes = dressed_scenes(measured)
-    kept = measured.only(scenes)
-    return _by_method("energies", kept, scenes, energy_columns(kept))
-
-
-def energies_by_scene(rows: Sequence[Row]) -> Table | None:
-    """The same scene by scene, small scenes and cut solvers included."""
-    measured = Measurements(benchmark_cells(rows, "garments"))
-    columns = energy_columns(measured)
-    lines: list[tuple[Cell, ...]] = []
-    for scene in measured.scenes:
-        for method in measured.methods:
-            means = [measured.mean(method, metric, [scene]) for metric, _ in columns]
-            if any(mean is not None for mean in means):
-                lines.append((scene, method, *means))
-    if not lines:
-        return None
-    head = (Column("scene", "Scene"), Column("method", "Method"))
-    return Table("energies_by_scene", (*head, *(column for _, column in columns)), tuple(lines))
-
-
-def _dressed_table(name: str, rows: Sequence[Row], columns: list[tuple[str, Column]]) -> Table | None:
-    measured = Measurements(suite_rows(rows, "garments"))
-    scenes = dressed_scenes(measured)
-    return _by_method(name, measured.only(scenes), scenes, columns)
-
-
-def curvature(rows: Sequence[Row]) -> Table | None:
-    """Table 2 of the paper, with the mean curvature itself beside its error."""
-    return _dressed_table(
-        "curvature",
-        rows,
-        [
-            ("curvature/error", Column("error", "Mean-curvature error", "1/m")),
-            ("curvature/mean", Column("mean", "Mean curvature", "1/m")),
-            ("curvature/mean_difference", Column("mean_difference", "Difference of means", "1/m")),
-        ],
-    )
-
-
-def geometry(rows: Sequence[Row]) -> Table | None:
-    """Distance to the simulation, response to motion and penetration into the body."""
-    return _dressed_table(
-        "penetration",
-        rows,
-        [
-            ("penetration/vertices", Column("vertices", "Below the skin", "%")),
-            ("penetration/deep", Column("deep", "Deeper than 5 mm", "%")),
-            ("penetration/own_part_p999", Column("own_part_p999", "99.9 % own-part depth", "mm")),
-            ("drift/hem", Column("hem_drift", "Hem drift", "mm")),
-            ("distance/rms", Column("distance_rms", "Distance", "mm")),
-            ("dynamics/held_difference", Column("held_difference", "Held-pose difference", "mm")),
-        ],
-    )
-
-
-def cost(rows: Sequence[Row]) -> Table | None:
-    """Table 3 of the paper: data generation, training, run time of one frame, memory."""
-    measured = Measurements(suite_rows(rows, "garments"))
-    return _by_method(
-        "cost",
-        measured,
-        None,
-        [
-            ("cost/data", Column("data_generation", "Data generation", "s")),
-            ("cost/train", Column("training", "Training", "s")),
-            ("cost/frame", Column("run_time", "Run time per frame", "ms")),
-            ("cost/memory", Column("memory", "Memory", "MB")),
-        ],
-    )
 
 
 def speed(rows: Sequence[Row]) -> Table | None:
@@ -239,6 +134,8 @@ MAKERS = (
     energies_by_scene,
     curvature,
     geometry,
+    shape,
+    dynamics,
     cost,
     speed,
     validation,

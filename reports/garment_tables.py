@@ -1,0 +1,144 @@
+"""The tables of garments on moving bodies: the paper's three, and what they leave out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from benchmarks.results import Row
+from reports.summary import EXTRA_TERMS, TERMS, Measurements, benchmark_cells, dressed_scenes, suite_rows
+from reports.table import Cell, Column, Table
+
+# Columns that stand in a table only where the run measured them; any other one is kept, as dashes.
+OPTIONAL = ("distance/p95", "distance/floor", "cost/batch", "cost/peak", "intersections/triangles")
+
+
+def _by_method(
+    name: str, measurements: Measurements, scenes: Sequence[str] | None, columns: Iterable[tuple[str, Column]]
+) -> Table | None:
+    """One row per method with any of the metrics; columns nobody has are dashes, or left out if OPTIONAL."""
+    pairs = [p for p in columns if p[0] not in OPTIONAL or p[0] in measurements.metrics]
+    rows: list[tuple[Cell, ...]] = []
+    for method in measurements.methods:
+        means = [measurements.mean(method, metric, scenes) for metric, _ in pairs]
+        if any(mean is not None for mean in means):
+            rows.append((method, *means))
+    if not rows:
+        return None
+    return Table(name, (Column("method", "Method"), *(column for _, column in pairs)), tuple(rows))
+
+
+def energy_columns(measurements: Measurements) -> list[tuple[str, Column]]:
+    """The paper's terms and the total, and any further term that some row of these carries."""
+    further = [term for term in EXTRA_TERMS if f"energy/{term}" in measurements.metrics]
+    names = [*TERMS[:-1], *further, TERMS[-1]]
+    return [(f"energy/{term}", Column(term, term.capitalize(), "J")) for term in names]
+
+
+def energies(rows: Sequence[Row]) -> Table | None:
+    """Table 1 of the paper: energy per term, J per frame, mean over the dressed scenes."""
+    measured = Measurements(suite_rows(rows, "garments"))
+    scenes = dressed_scenes(measured)
+    kept = measured.only(scenes)
+    return _by_method("energies", kept, scenes, energy_columns(kept))
+
+
+def energies_by_scene(rows: Sequence[Row]) -> Table | None:
+    """The same scene by scene, small scenes and cut solvers included."""
+    measured = Measurements(benchmark_cells(rows, "garments"))
+    columns = energy_columns(measured)
+    lines: list[tuple[Cell, ...]] = []
+    for scene in measured.scenes:
+        for method in measured.methods:
+            means = [measured.mean(method, metric, [scene]) for metric, _ in columns]
+            if any(mean is not None for mean in means):
+                lines.append((scene, method, *means))
+    if not lines:
+        return None
+    head = (Column("scene", "Scene"), Column("method", "Method"))
+    return Table("energies_by_scene", (*head, *(column for _, column in columns)), tuple(lines))
+
+
+def _dressed_table(name: str, rows: Sequence[Row], columns: list[tuple[str, Column]]) -> Table | None:
+    measured = Measurements(suite_rows(rows, "garments"))
+    scenes = dressed_scenes(measured)
+    return _by_method(name, measured.only(scenes), scenes, columns)
+
+
+def curvature(rows: Sequence[Row]) -> Table | None:
+    """Table 2 of the paper, with the mean curvature itself beside its error."""
+    return _dressed_table(
+        "curvature",
+        rows,
+        [
+            ("curvature/error", Column("error", "Mean-curvature error", "1/m")),
+            ("curvature/mean", Column("mean", "Mean curvature", "1/m")),
+            ("curvature/mean_difference", Column("mean_difference", "Difference of means", "1/m")),
+        ],
+    )
+
+
+def geometry(rows: Sequence[Row]) -> Table | None:
+    """Distance to the simulation, response to motion and penetration into the body."""
+    return _dressed_table(
+        "penetration",
+        rows,
+        [
+            ("penetration/vertices", Column("vertices", "Below the skin", "%")),
+            ("penetration/deep", Column("deep", "Deeper than 5 mm", "%")),
+            ("penetration/own_part_p999", Column("own_part_p999", "99.9 % own-part depth", "mm")),
+            ("drift/hem", Column("hem_drift", "Hem drift", "mm")),
+            ("distance/rms", Column("distance_rms", "Distance", "mm")),
+            ("distance/p95", Column("distance_p95", "95 % distance", "mm")),
+            ("distance/floor", Column("distance_floor", "Floor of it", "mm")),
+        ],
+    )
+
+
+def shape(rows: Sequence[Row]) -> Table | None:
+    """How far the cloth is from its rest shape and through itself, and how its curvature is spread."""
+    return _dressed_table(
+        "shape",
+        rows,
+        [
+            ("deformation/edges", Column("edges", "Change of edges", "%")),
+            ("deformation/areas", Column("areas", "Change of areas", "%")),
+            ("dihedral/mean", Column("dihedral", "Mean fold angle", "deg")),
+            ("intersections/triangles", Column("intersections", "Triangles through others", "%")),
+            ("curvature/histogram", Column("histogram", "Distance of curvature histograms", "1/m")),
+        ],
+    )
+
+
+def dynamics(rows: Sequence[Row]) -> Table | None:
+    """How the hem answers to the body's motion, beside the simulation's answer."""
+    return _dressed_table(
+        "dynamics",
+        rows,
+        [
+            ("dynamics/amplitude", Column("amplitude", "Amplitude ratio A")),
+            ("dynamics/correlation", Column("correlation", "Correlation")),
+            ("dynamics/gain", Column("gain", "Gain")),
+            ("dynamics/lag", Column("lag", "Lag", "frames")),
+            ("dynamics/ringing", Column("ringing", "Ringing", "mm")),
+            ("dynamics/spectrum", Column("spectrum", "Distance of spectra")),
+            ("dynamics/held_difference", Column("held_difference", "Held-pose difference", "mm")),
+        ],
+    )
+
+
+def cost(rows: Sequence[Row]) -> Table | None:
+    """Table 3 of the paper: data generation, training, run time of one frame, memory."""
+    measured = Measurements(suite_rows(rows, "garments"))
+    return _by_method(
+        "cost",
+        measured,
+        None,
+        [
+            ("cost/data", Column("data_generation", "Data generation", "s")),
+            ("cost/train", Column("training", "Training", "s")),
+            ("cost/frame", Column("run_time", "Run time per frame", "ms")),
+            ("cost/batch", Column("batch", "In a batch", "ms")),
+            ("cost/memory", Column("memory", "Memory", "MB")),
+            ("cost/peak", Column("peak", "Peak of process", "MB")),
+        ],
+    )
