@@ -20,10 +20,10 @@ def speed(rows: Sequence[Row]) -> Table | None:
     measured = speed_measurements(rows)
     metrics = {
         "cost/frame": Column("run_time", "Run time", "ms"),
-        "gap/relative": Column("gap", "Relative gap"),
-        "gradient/norm": Column("gradient", "Gradient left", "weights"),
-        "curvature/error": Column("curvature_error", "Curvature error", "1/m"),
-        "curvature/histogram": Column("histogram", "Histogram distance", "1/m"),
+        "gap/relative": Column("gap", "Gap"),
+        "gradient/norm": Column("gradient", "Gradient", "weights"),
+        "curvature/error": Column("curvature_error", "Curvature", "1/m"),
+        "curvature/histogram": Column("histogram", "Histogram", "1/m"),
         "distance/rms": Column("distance_rms", "Distance", "mm"),
     }
     lines: list[tuple[Cell, ...]] = []
@@ -36,7 +36,7 @@ def speed(rows: Sequence[Row]) -> Table | None:
     if not lines:
         return None
     head = (Column("scene", "Scene"), Column("method", "Method"))
-    last = Column("excess_energy", "Energy excess", "J")
+    last = Column("excess_energy", "Excess", "J")
     return Table("speed", (*head, *metrics.values(), last), tuple(lines))
 
 
