@@ -11,8 +11,8 @@ class Preset:
 
     frames: at most so many frames of each motion, at 30 per second. steps: optimiser steps per kind
     of network, for ablations those of what they vary. further: whether the ablations and further baselines of
-    a suite take part without being named. settle_frames: frames from the T-pose into the first pose of a motion.
-    sheet_cells: the small scenes are sheets of so many cells along each side. gap_samples: frames of a
+    a suite take part without being named. settle_frames: frames from the T-pose into the first pose of a
+    motion. sheet_cells: the small scenes are sheets of so many cells along each side. gap_samples: frames of a
     trajectory at which suite speed solves the step again to know the gap to its minimum.
     """
 

@@ -1,4 +1,4 @@
-"""Further learned methods, which run when they are named: other baselines, ablations of SNUG, and clean-up."""
+"""Further learned methods, which run when they are named: other baselines, ablations of SNUG, clean-up."""
 
 from __future__ import annotations
 
@@ -21,10 +21,25 @@ def _network(name: str, description: str) -> MethodEntry:
     )
 
 
+def _cleaned(kind: str) -> MethodEntry:
+    return MethodEntry(
+        name=f"{kind}+cleanup",
+        description=f"{kind}, then vertices within 2 mm of the skin pushed out; both are timed",
+        module="benchmarks.methods.clean_up",
+        options={"kind": kind},
+        needs_body=True,
+        dtype="float32",
+        trained=kind,
+        seeded=True,
+    )
+
+
 LEARNED = (
     _network("pbns-springs", "PBNS with its own mass-spring material instead of StVK"),
     _network("santesteban2019", "fit by shape and one GRU of 1500, trained on simulated vertices"),
     _network("tailornet", "low and high frequencies by static networks, trained on simulated vertices"),
     _network("snug-paper", "SNUG by the paper's text to the letter"),
     *(_network(f"snug-{recipe.name}", f"ablation: SNUG, recipe {recipe.name}") for recipe in ABLATIONS),
+    _cleaned("snug"),
+    _cleaned("pbns"),
 )

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from ..methods.learned import LEARNED
 
 METHODS = ("simulation", "skinning", "untrained", "snug", "supervised", "pbns")
-FURTHER = tuple(entry.name for entry in LEARNED)  # only where methods are named, or at a preset that holds all
+# Only where methods are named, or at a preset that holds all.
+FURTHER = tuple(entry.name for entry in LEARNED)
 
 
 def scenes(test_motions: Sequence[str], *, full: bool) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-
 FURTHER = ("pbns-springs", "santesteban2019", "tailornet")  # as in suite garments
 
 
