@@ -31,8 +31,8 @@ CAPTIONS = {
     "shape": "Shape of the cloth: strain of edges and areas, folds, and cloth through cloth.",
     "dynamics": "Dynamics of the hem beside the simulation's, each less its own quasi-static answer.",
     "energies_by_scene": "Energy by term, scene by scene, J per frame.",
-    "speed": "The points of the plots: run time of one frame; relative energy gap, gradient left, errors of mean "
-    "curvature and of its histogram, distance to the simulation, total energy above it.",
+    "speed": "The points of the plots: run time of one frame; relative energy gap, gradient left, errors of "
+    "mean curvature and of its histogram, distance to the simulation, total energy above it.",
     "validation": "Measured and expected value of every check.",
     "extremes": "Every extreme case and how it ended.",
     "refusals": "Inputs that have to be refused before anything is solved, and what each was told.",
