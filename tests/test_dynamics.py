@@ -121,7 +121,7 @@ def test_the_spectrum_peaks_at_the_frequency_of_the_motion():
     assert spectrum[12] == pytest.approx(size * 0.5 * (FRAMES - 1) / 2, rel=1e-3)
     assert spectrum_distance(hem, hem, DT) == 0.0
     assert spectrum_distance(ring(), hem, DT) == pytest.approx(1.0)
-    assert spectrum_distance(2 * hem, DT) == pytest.approx(1.0)
+    assert spectrum_distance(2 * hem, hem, DT) == pytest.approx(1.0)
 
 
 def test_the_stop_is_the_first_frame_of_the_last_pose():

@@ -117,7 +117,7 @@ def stop_frame(poses: Array, translations: Array) -> int | None:
 
 
 def ringing(hem: Array, stop: int) -> Array:
-    """rms distance (6,) [m] to its last frame of a hem (T,H,3) in the root frame, AFTER frames after `stop`."""
+    """rms distance (6,) [m] of a hem (T,H,3) in the root frame to its last, AFTER frames after `stop`."""
     away = hem[[stop + after for after in AFTER]] - hem[-1]
     return np.sqrt((away**2).sum(axis=-1).mean(axis=-1))
 
