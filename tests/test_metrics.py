@@ -9,14 +9,19 @@ import pytest
 
 from benchmarks.checks.meshes import cylinder_patch, icosphere, right_grid, torus
 from benchmarks.metrics.curvature import (
+    CurvatureSeries,
     boundary_mask,
     curvature_error,
     curvature_series,
+    histogram_distance,
     mean_curvature,
 )
 from benchmarks.metrics.energy import energy_series, mean_energy
 from benchmarks.metrics.geometry import distance_rms, hem_drift, own_part_depth, penetration
-from benchmarks.metrics.optimality import first_guess, relative_gap
+from benchmarks.metrics.intersections import intersecting, intersecting_share
+from benchmarks.metrics.optimality import FINDERS, first_guess, optimality
+from benchmarks.metrics.shape import area_change, dihedral_angle, edge_change
+from benchmarks.metrics.time_error import LADDER, time_errors
 from benchmarks.presets import find_preset
 from benchmarks.scenes import hanging_sheet, sheet_on_sphere
 from reference_sim import Obstacle, Potential, minimise, simulate
@@ -153,18 +158,23 @@ def test_energies_are_those_that_the_simulator_minimised():
 def test_the_gap_is_zero_for_the_reference_one_for_the_guess_and_falls_between(module):
     scene = module.build(module.__name__.split(".")[-1], find_preset("smoke"))
 
-    def gap(**options):
+    def judged(**options):
         given = {"obstacle": scene.obstacle, "start": scene.start} | options
         trajectory = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=10, **given)
-        return relative_gap(scene, trajectory.positions, samples=4)
+        return optimality(scene, trajectory.positions, samples=4).metrics()
 
-    cut = [gap(max_iterations=n) for n in (1, 3)]
-    assert 0.0 <= gap() < 1e-9 and 1e-9 < cut[1] < cut[0] < 1.0
+    cut = [judged(max_iterations=n) for n in (1, 3)]
+    whole = judged()
+    gaps = [metrics["gap/relative"] for metrics in (whole, cut[1], cut[0])]
+    assert 0.0 <= gaps[0] < 1e-9 < gaps[1] < gaps[2] < 1.0
+    assert 0.0 <= whole["gap/local"] < 1e-12 and whole["gradient/norm"] < 1e-6
+    assert 1e-6 < cut[1]["gradient/norm"] < cut[0]["gradient/norm"]
+    assert sum(whole[f"gap/found_by_{finder}"] for finder in FINDERS) == 4
     x = [scene.start, scene.start]
     for frame in range(2, 6):
         x.append(first_guess(scene, x[-1], (x[-1] - x[-2]) / scene.dt, frame))
-    assert relative_gap(scene, np.array(x), samples=3) == pytest.approx(1.0)
-    assert np.isnan(relative_gap(scene, np.array(x[:2]), samples=3))
+    assert optimality(scene, np.array(x), samples=3).metrics()["gap/relative"] == pytest.approx(1.0)
+    assert optimality(scene, np.array(x[:2]), samples=3).metrics() == {}
 
 
 def test_own_part_depth_does_not_see_the_limb_beside():
@@ -197,6 +207,74 @@ def test_the_gap_is_taken_to_the_lowest_minimum_found():
     low, high = (minimise(potential, x).energy for x in (guess, crumpled))
     assert low < high  # several minima: the one reached from the frame itself is not the best
     here, free = potential.value(crumpled), potential.value(guess)
-    found = relative_gap(scene, np.array([scene.start, scene.start, crumpled]), samples=1)
-    assert found == pytest.approx((here - low) / (free - low), rel=1e-6)
-    assert abs((here - high) / (free - high) / found - 1) > 1e-5
+    frames = np.array([scene.start, scene.start, crumpled])
+    found = optimality(scene, frames, samples=1).metrics()
+    assert found["gap/relative"] == pytest.approx((here - low) / (free - low), rel=1e-6)
+    assert abs((here - high) / (free - high) / found["gap/relative"] - 1) > 1e-5
+    assert found["gap/local"] == pytest.approx((here - high) / (free - low), rel=1e-6)
+    assert found["gap/found_by_newton"] == 1 and found["gap/found_by_newton_from_frame"] == 0
+    # The denominator of a dressed frame is the skinned garment's energy: half of it, twice the gap.
+    other = frames.copy()
+    other[2] = guess
+    other[2] += 0.5 * (crumpled - guess)
+    skinned = optimality(scene, frames, samples=1, skinned=other).metrics()["gap/relative"]
+    assert skinned == pytest.approx((here - low) / (potential.value(other[2]) - low), rel=1e-6)
+
+
+def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places():
+    random = np.random.default_rng(5)
+    h, area = random.uniform(1.0, 9.0, (2, 50)), random.uniform(0.5, 1.5, (2, 50))
+    still = CurvatureSeries(h, area)
+    order = random.permutation(50)
+    assert histogram_distance(CurvatureSeries(h[:, order], area[:, order]), still) == pytest.approx(0, abs=1e-12)
+    assert histogram_distance(CurvatureSeries(h + 2.5, area), still) == pytest.approx([2.5, 2.5])
+    # Two heaps against one between them: all of the area moves by 3.
+    two = CurvatureSeries(np.array([[1.0, 7.0]]), np.array([[2.0, 2.0]]))
+    one = CurvatureSeries(np.array([[4.0, 99.0]]), np.array([[0.3, 0.0]]))  # boundary vertices weigh nothing
+    assert histogram_distance(two, one) == pytest.approx([3.0])
+    assert histogram_distance(CurvatureSeries(h, 0 * area), still) == pytest.approx([0.0, 0.0])
+
+
+def test_edges_areas_and_folds_of_known_deformations():
+    faces = np.array([[0, 1, 2], [1, 0, 3]])
+    flat = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -1, 0]], float)
+    edges = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3]])
+    lengths = np.linalg.norm(flat[edges[:, 1]] - flat[edges[:, 0]], axis=1)
+    hinge = np.array([[0, 1, 2, 3]])
+    angle = 0.7
+    folded = flat.copy()
+    folded[3] = [0.5, -np.cos(angle), np.sin(angle)]
+    x = np.stack([flat, 1.1 * flat, folded])
+    assert edge_change(x, edges, lengths) == pytest.approx([0.0, 0.1, 0.0], abs=1e-12)
+    assert area_change(x, faces, np.array([0.5, 0.5])) == pytest.approx([0.0, 0.21, 0.0], abs=1e-12)
+    assert dihedral_angle(x, hinge) == pytest.approx([0.0, 0.0, angle], abs=1e-12)
+    assert dihedral_angle(x, hinge[:0]) == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_intersections_are_those_of_two_crossing_strips():
+    plane, faces = right_grid(6, 6, 1.0, 1.0)
+    flat = np.column_stack([plane, 0.0 * plane[:, 0]])
+    upright = np.column_stack([0.0 * plane[:, 0], plane]) + [0.47, 0.013, -0.47]  # crosses the first one
+    both = np.concatenate([faces, faces + len(flat)])
+    above = np.concatenate([flat, flat + [0.0, 0.0, 0.01]])
+    same = np.concatenate([flat, flat])
+    assert intersecting_share(np.array([above, same]), both) == pytest.approx([0.0, 0.0])
+    crossing = np.concatenate([flat, upright])
+    corners = flat[faces]
+    through = (corners[:, :, 0].min(1) < 0.47) & (corners[:, :, 0].max(1) > 0.47)
+    hit = intersecting(crossing, both)
+    assert np.array_equal(hit[: len(faces)], through) and hit[len(faces) :].sum() == through.sum()
+    assert intersecting_share(crossing[None], both) == pytest.approx([hit.mean()])
+    tent = flat + np.abs(flat[:, [0]] - 0.5) * [0.0, 0.0, 2.0]  # folded, and nowhere through itself
+    assert not intersecting(tent, faces).any()
+
+
+def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():
+    found = {
+        name: {"energy/total": 5.0 + 3.0 / n, "energy/strain": 1.0 - 2.0 / n, "curvature/mean": 7.0 + 1.0 / n}
+        for name, n in zip(LADDER, (1, 2, 4, 8))
+    }
+    assert time_errors(found) == pytest.approx(
+        {"time_error/total": 3.0, "time_error/strain": -2.0, "time_error/curvature": 1.0, "time_error/order": 1.0}
+    )
+    assert time_errors({name: found[name] for name in LADDER[:3]}) == {}

@@ -15,8 +15,9 @@ import pytest
 from benchmarks import run
 from benchmarks.cell import Outcome, judge
 from benchmarks.closing import summary
-from benchmarks.evaluate import UNITS, rows_of, seconds_per_frame, unit_of
+from benchmarks.evaluate import rows_of, seconds_per_frame
 from benchmarks.methods import METHODS
+from benchmarks.named_metrics import UNITS, unit_of
 from benchmarks.plan import Cell, Motions, PlanError, choose_cells, choose_motions
 from benchmarks.presets import find_preset
 from benchmarks.results import Row, RunFolder
@@ -312,7 +313,7 @@ def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
 
 def test_every_unit_is_known():
     assert unit_of("energy/strain") == "J" and unit_of("penetration/depth_p99") == "mm"
-    assert set(UNITS.values()) == {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1"}
+    assert set(UNITS.values()) == {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1", "deg", "frames"}
     with pytest.raises(KeyError):
         unit_of("nonsense/x")
 

@@ -102,3 +102,24 @@ def curvature_error(series: CurvatureSeries, reference: CurvatureSeries) -> Floa
 def _weighted(values: Floats, weights: Floats) -> Floats:
     total = weights.sum(1)
     return np.divide((values * weights).sum(1), total, out=np.zeros(len(total)), where=total > 0.0)
+
+
+def histogram_distance(series: CurvatureSeries, reference: CurvatureSeries) -> Floats:
+    """(T,) Wasserstein-1 distance between the area-weighted distributions of H at the same frame [1/m].
+
+    The area between the two cumulated distributions: how much wrinkling there is, wherever it sits. Each
+    side is weighted by its own areas.
+    """
+    pairs = zip(series.curvature, series.area, reference.curvature, reference.area)
+    return np.array([_wasserstein(*pair) for pair in pairs])
+
+
+def _wasserstein(h: Floats, area: Floats, h_ref: Floats, area_ref: Floats) -> float:
+    """Integral of |F - F_ref| over H; 0 where one side has no interior vertex."""
+    if area.sum() == 0.0 or area_ref.sum() == 0.0:
+        return 0.0
+    values = np.concatenate([h, h_ref])
+    steps = np.concatenate([area / area.sum(), -area_ref / area_ref.sum()])
+    order = np.argsort(values, kind="stable")
+    between = np.diff(values[order])
+    return float(np.abs(np.cumsum(steps[order])[:-1]) @ between)
