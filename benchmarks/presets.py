@@ -9,11 +9,13 @@ from dataclasses import dataclass
 class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
-    frames: at most so many frames of each motion, at 30 per second. steps: optimiser steps per kind
+    frames: at most so many frames of each motion, at 30 per second; clip_frames: of its liveliest part. steps: optimiser steps per kind
     of network, for ablations those of what they vary. further: whether the ablations and further baselines of
     a suite take part without being named. settle_frames: frames from the T-pose into the first pose of a
     motion. sheet_cells: the small scenes are sheets of so many cells along each side. gap_samples: frames of a
     trajectory at which suite speed solves the step again to know the gap to its minimum.
+    repeats: times that a cell of suite speed is run, those whose first run took at most repeat_seconds [s].
+    cell_seconds: time after which the process of a cell is ended [s].
     """
 
     name: str
@@ -22,12 +24,16 @@ class Preset:
     train_motions: int | None
     test_motions: int | None
     frames: int
+    clip_frames: int
     settle_frames: int
     steps: dict[str, int]
     sheet_cells: int
     sheet_frames: int
     newton_cuts: tuple[int, ...]
     gap_samples: int
+    repeats: int
+    repeat_seconds: float
+    cell_seconds: float
     further: bool = False
 
     def steps_of(self, model: str) -> int:
@@ -43,12 +49,16 @@ PRESETS = (
         train_motions=1,
         test_motions=1,
         frames=20,
+        clip_frames=10,
         settle_frames=12,
         steps={"snug": 60, "supervised": 60, "pbns": 60, "santesteban2019": 10, "tailornet": 60},
         sheet_cells=6,
         sheet_frames=10,
         newton_cuts=(1, 4),
         gap_samples=3,
+        repeats=2,
+        repeat_seconds=0.5,
+        cell_seconds=120.0,
     ),
     Preset(
         name="quick",
@@ -57,12 +67,16 @@ PRESETS = (
         train_motions=None,
         test_motions=None,
         frames=150,
+        clip_frames=36,
         settle_frames=30,
         steps={"snug": 6000, "supervised": 4000, "pbns": 6000, "santesteban2019": 1000, "tailornet": 4000},
         sheet_cells=14,
         sheet_frames=45,
         newton_cuts=(1, 2, 4, 8),
         gap_samples=8,
+        repeats=3,
+        repeat_seconds=3.0,
+        cell_seconds=600.0,
     ),
     Preset(
         name="paper",
@@ -71,6 +85,7 @@ PRESETS = (
         train_motions=None,
         test_motions=None,
         frames=100_000,
+        clip_frames=100_000,
         settle_frames=60,
         steps=dict.fromkeys(("snug", "supervised", "pbns", "santesteban2019", "tailornet"), 60_000),
         further=True,
@@ -78,6 +93,9 @@ PRESETS = (
         sheet_frames=90,
         newton_cuts=(1, 2, 4, 8),
         gap_samples=20,
+        repeats=3,
+        repeat_seconds=120.0,
+        cell_seconds=86_400.0,
     ),
 )
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from snug.body import Body
     from snug.garments import Garment
     from snug.motion import Motion
@@ -16,25 +18,46 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Wardrobe:
-    """A body, the garment it wears and the motions by name, each at most `preset.frames` long."""
+    """A body, the garment it wears and the motions by name, each at most `preset.frames` long.
+
+    bodies: motion -> posed body (T,B,3) [m], where it is ready made.
+    """
 
     body: Body
     garment: Garment
     motions: dict[str, Motion]
+    bodies: dict[str, np.ndarray] = field(default_factory=dict)
 
     def named(self, names: Iterable[str]) -> list[Motion]:
         """The motions of those names, in that order."""
         return [self.motions[name] for name in names]
 
+    def of_motion(self, name: str) -> Wardrobe:
+        """The same with this motion alone: little to hand to another process."""
+        return replace(self, motions={name: self.motions[name]}, bodies={})
+
+    def posed_body(self, name: str) -> np.ndarray:
+        """The body (T,B,3) [m] in the motion of that name."""
+        motion = self.motions[name]
+        ready = self.bodies.get(name)
+        return self.body.vertices(motion.poses, motion.translations) if ready is None else ready
+
 
 def open_wardrobe(preset: Preset, motions: Iterable[Motion]) -> Wardrobe:
-    """Load the body and tailor the T-shirt (about ten seconds); motions are cut to the preset's length."""
+    """Load the body and tailor the T-shirt (about ten seconds); motions are cut to the preset's length.
+
+    The liveliest part of each is there too, under a name of its own: see clips.
+    """
     from snug.body import Body
     from snug.garments import tailor_tshirt
 
+    from .clips import clip
+
     body = Body.load()
     garment = tailor_tshirt(body, vertices=preset.garment_vertices)
-    return Wardrobe(body, garment, {m.name: m.cut(0, preset.frames) for m in motions})
+    whole = [motion.cut(0, preset.frames) for motion in motions]
+    clips = [clip(body, motion, preset.clip_frames) for motion in whole]
+    return Wardrobe(body, garment, {motion.name: motion for motion in (*whole, *clips)})
 
 
 def embedded_motions(names: Iterable[str]) -> list[Motion]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from ..clips import SUFFIX
 from ..scene import Scene
 
 SMALL_SCENES = (
@@ -48,5 +49,6 @@ def dressed_scene(motion: str) -> Scene:
 
 
 def all_scenes(motions: Iterable[str]) -> dict[str, Scene]:
-    """Every scene by name: the small ones, then one dressed body for each motion."""
-    return {scene.name: scene for scene in (*SMALL_SCENES, *map(dressed_scene, motions))}
+    """Every scene by name: the small ones, then a dressed body for each motion and for its clip."""
+    dressed = [dressed_scene(name) for motion in motions for name in (motion, motion + SUFFIX)]
+    return {scene.name: scene for scene in (*SMALL_SCENES, *dressed)}

@@ -1,19 +1,52 @@
-"""Suite speed: how accurate a method is at what time a frame, one thread, one frame at a time."""
+"""Suite speed: how accurate a method is at what time a frame, one thread, one frame at a time.
+
+Dressed bodies are clips, the liveliest part of a motion: here every solver goes through every frame.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-FURTHER = ("pbns-springs", "santesteban2019", "tailornet")  # as in suite garments
+from ..clips import SUFFIX
+
+SMALL = ("hanging_sheet", "sheet_on_sphere", "flag", "twisted_strip", "free_fall")
+LIVELY = ("sudden_stop", "spin_jump")  # of the library's test motions: a run and its stop, a jump with a turn
+
+# The reference from coarse to fine in tolerance and in time, and from a start moved by a billionth of a metre.
+REFERENCES = (
+    "simulation", "simulation-1e-2", "simulation-1e-4", "simulation-1e-8", "simulation-dt/2", "simulation-dt/4",
+    "simulation-dt/8", "simulation-moved",
+)  # fmt: skip
+LEARNED = ("skinning", "snug", "supervised", "pbns")
+# Only where methods are named, or at a preset that holds all; learned ones as in suite garments.
+FURTHER = (
+    "pbns-springs", "santesteban2019", "tailornet", "vbd-5", "xpbd-10", "skinning+lbfgs-2", "skinning+lbfgs-8",
+    "skinning+newton-1", "skinning+newton-2", "skinning+newton-4", "skinning+newton-8", "snug+newton-2",
+    "snug+newton-8",
+)  # fmt: skip
 
 
 def scenes(test_motions: Sequence[str], *, full: bool) -> list[str]:
-    """Small scenes and dressed bodies; the quick subset is one of each."""
-    small = ["hanging_sheet", "sheet_on_sphere", "free_fall"] if full else ["hanging_sheet"]
-    return small + [f"dressed/{name}" for name in (test_motions if full else test_motions[:1])]
+    """Small scenes and clips of dressed bodies; the quick subset is one of each."""
+    lively = [name for name in test_motions if name in LIVELY] or list(test_motions[:2])
+    if not full:
+        return [SMALL[0], *(f"dressed/{name}{SUFFIX}" for name in lively[:1])]
+    return [*SMALL, *(f"dressed/{name}{SUFFIX}" for name in lively)]
 
 
 def methods(newton_cuts: Sequence[int]) -> list[str]:
-    """The reference, the same solver cut short, and everything learned."""
-    cuts = [f"newton-{cut}" for cut in newton_cuts]
-    return ["simulation", *cuts, "skinning", "snug", "supervised", "pbns"]
+    """The reference, solvers cut short and everything learned; few cuts mean few of each family."""
+    if len(newton_cuts) < 3:
+        rivals = ["gradient-descent-10", "vbd-20", "xpbd-40", "skinning+lbfgs-4", "snug+newton-1"]
+        references = ["simulation", "simulation-1e-2", "simulation-dt/2", "simulation-moved"]
+    else:
+        rivals = [
+            "gradient-descent-10", "gradient-descent-40", "vbd-20", "vbd-80", "xpbd-40", "xpbd-160",
+            "skinning+lbfgs-1", "skinning+lbfgs-4", "snug+newton-1", "snug+newton-4",
+        ]  # fmt: skip
+        references = list(REFERENCES)
+    families = [f"{name}{scale * cut}" for name, scale in FAMILIES for cut in newton_cuts]
+    return [*references, *families, *rivals, *LEARNED]
+
+
+FAMILIES = (("newton-", 1), ("lbfgs-", 5), ("snug+lbfgs-", 1))  # and iterations for each unit of a preset's cuts
