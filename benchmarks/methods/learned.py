@@ -1,4 +1,4 @@
-"""Further learned methods, which run when they are named: other baselines, ablations of SNUG, clean-up."""
+"""Methods that run when they are named: further baselines, ablations of SNUG, clean-up, the free bound."""
 
 from __future__ import annotations
 
@@ -42,4 +42,10 @@ LEARNED = (
     *(_network(f"snug-{recipe.name}", f"ablation: SNUG, recipe {recipe.name}") for recipe in ABLATIONS),
     _cleaned("snug"),
     _cleaned("pbns"),
+    MethodEntry(
+        name="free-bound",
+        description="no network: vertices optimised directly over the whole clip, a lower bound of the energies",
+        module="benchmarks.methods.free_bound",
+        needs_body=True,
+    ),
 )
