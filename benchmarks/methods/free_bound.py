@@ -3,12 +3,12 @@
     min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t) + sum_{t >= 3} inertia(x_t)
     inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
 
-It is what a network could reach whose output were not bound to its input: it sees the whole clip, the future
-too. All frames are one cloth of T copies, minimised by the L-BFGS of reference_sim on the very terms that judge
-every method; its preconditioner couples no frames. Contact planes are frozen for a round and then searched anew
-(towards the closest point, as the judge has them; training takes the skin's normal there). The sum is not
-convex: a bound found from skinning, not proven to be the lowest. Not a method to run a garment with: its time
-a frame is that of the whole clip divided by its frames.
+It is what a network could reach whose output were not bound to its input: it sees the whole clip, the
+future too. All frames are one cloth of T copies, minimised by the L-BFGS of reference_sim on the very terms
+that judge every method; its preconditioner couples no frames. Contact planes are frozen for a round and then
+searched anew (towards the closest point, as the judge has them; training takes the skin's normal there). The
+sum is not convex: a bound found from skinning, not proven to be the lowest. Not a method to run a garment
+with: its time a frame is that of the whole clip divided by its frames.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def _kinds(contact: ContactPenalty) -> list[int]:
 
 
 def _by_kind(values: np.ndarray, kinds: list[int]) -> np.ndarray:
-    """(T, S, 3) of frames -> (T S, 3) in the whole cloth's order: vertices of all frames, edges, centroids."""
+    """(T, S, 3) of frames -> (T S, 3) in the whole cloth's order: all vertices, all edges, all centroids."""
     return np.ascontiguousarray(
         np.concatenate([part.reshape(-1, 3) for part in np.split(values, kinds, axis=1)])
     )

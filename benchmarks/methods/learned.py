@@ -44,7 +44,7 @@ LEARNED = (
     _cleaned("pbns"),
     MethodEntry(
         name="free-bound",
-        description="no network: vertices optimised directly over the whole clip, a lower bound of the energies",
+        description="no network: the vertices of a whole clip optimised directly, a lower bound",
         module="benchmarks.methods.free_bound",
         needs_body=True,
     ),
