@@ -61,13 +61,17 @@ class DressedBody:
         mean = torch.as_tensor(self.garment.rest_positions, dtype=torch.float32)
         if betas is None:
             return mean
+        shapes = torch.as_tensor(np.asarray(betas), dtype=torch.float32)
+        return mean + torch.einsum("...s,svi->...vi", shapes, self.rest_directions())
+
+    def rest_directions(self) -> Tensor:
+        """What one unit of each shape number adds to the unposed garment, (10, V, 3) [m]."""
         if self._rest_directions is None:
             # The garment follows the body linearly, so one call for each direction tells all shapes.
             units = np.eye(self.body.shape_count)
             moved = [self.garment.rest_for(self.body, unit) - self.garment.rest_positions for unit in units]
             self._rest_directions = torch.as_tensor(np.stack(moved), dtype=torch.float32)
-        shapes = torch.as_tensor(np.asarray(betas), dtype=torch.float32)
-        return mean + torch.einsum("...s,svi->...vi", shapes, self._rest_directions)
+        return self._rest_directions
 
     def pelvis(self, motion: Any, betas: np.ndarray | None = None) -> np.ndarray:
         """World position of the pelvis in each frame, (T, 3) [m] float64."""

@@ -8,14 +8,15 @@ in joules a frame: a frame without two frames before it in the window has no ine
 three holds three static terms and one inertia. Its gradient reaches all three frames.
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
-kernels beside it give the same values and gradients in a tenth of the time, so
-autograd is told to use those.
+kernels (snug.lanes, or those beside the definition) give the same values and gradients in a small part of
+the time, so autograd is told to use those. On a GPU the definitions run as they are.
 The contact planes are the one difference: training keeps an anchor for each sample and takes the skin's
 normal there, where the simulator searches anew in every step and takes the direction to the closest point.
 """
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,10 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from snug.baselines.springs import SquaredContact, spring_terms
+from snug.lanes import lane_kernel
 from snug.recipe import Recipe
 
+CPU = torch.device("cpu")
 STATIC = ("strain", "bending", "gravity")
 
 
@@ -70,11 +73,14 @@ class ClosedForm(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, energy: Any, *frame_data: np.ndarray) -> Tensor:
         flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
-        rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
-        values = np.empty(len(flat), flat.dtype)
-        gradients = np.empty_like(flat)
-        for n in range(len(flat)):
-            values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
+        together = lane_kernel(energy) if flat.dtype == np.float32 and not frame_data else None
+        if together is not None:
+            values, gradients = together(flat)
+        else:
+            rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
+            values, gradients = np.empty(len(flat), flat.dtype), np.empty_like(flat)
+            for n in range(len(flat)):
+                values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
         ctx.gradients = torch.from_numpy(gradients).reshape(x.shape)
         ctx.extra = len(frame_data)
         return torch.from_numpy(values).reshape(x.shape[:-2])
@@ -84,41 +90,55 @@ class ClosedForm(torch.autograd.Function):
         return above[0][..., None, None] * ctx.gradients, None, *([None] * ctx.extra)
 
 
-def summed(energy: Any, x: Tensor, *frame_data: np.ndarray) -> Tensor:
-    """Energy of each configuration, (..., V, 3) -> (...) [J]: by kernel on a CPU, by its definition
-    elsewhere.
+def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Tensor:
+    """Energy of each configuration, (..., V, 3) -> (...) [J]: by kernel from frame data in numpy, or by its
+    definition from tensors.
     """
-    if x.device.type == "cpu":
+    if kernels:
         return ClosedForm.apply(x, energy, *frame_data)
-    data = (torch.as_tensor(part).to(x) for part in frame_data)
-    return energy.energy(x, *data).sum(-1)
+    return energy.energy(x, *frame_data).sum(-1)
+
+
+def held_on(energy: Any, device: torch.device) -> Any:
+    """The same energy with its arrays as tensors on a device: evaluating its definition copies nothing."""
+    twin = copy.copy(energy)
+    for name, value in vars(energy).items():
+        if isinstance(value, np.ndarray):
+            tensor = torch.as_tensor(value, device=device)
+            setattr(twin, name, tensor.float() if tensor.is_floating_point() else tensor)
+    return twin
 
 
 class PhysicsLoss:
-    """Energies of sub-sequences, by term. dt: seconds between frames [s]."""
+    """Energies of sub-sequences, by term. dt: seconds between frames [s].
+
+    kernels: by closed forms on a CPU (in numpy and numba), else by the definitions on `device`.
+    """
 
     def __init__(
-        self, cloth: Cloth, recipe: Recipe, *, dt: float, contact: ContactPenalty | None = None
+        self, cloth: Cloth, recipe: Recipe, *, dt: float, device: torch.device = CPU, kernels: bool = True
     ) -> None:
-        self.terms = recipe.terms
-        self.static = static_terms(cloth, recipe)
+        self.terms, self.kernels = recipe.terms, kernels
+        self.contact = make_contact(cloth, recipe)
         self.inertia = Inertia(cloth, dt)
-        self.contact = contact or make_contact(cloth, recipe)
+        self.static = static_terms(cloth, recipe)
+        self._contact = self.contact
+        if not kernels:
+            self.inertia, self._contact = held_on(self.inertia, device), held_on(self.contact, device)
+            self.static = {name: held_on(term, device) for name, term in self.static.items()}
 
-    def __call__(
-        self, x: Tensor, ahead: Tensor, planes: tuple[np.ndarray, np.ndarray] | None
-    ) -> dict[str, Tensor]:
+    def __call__(self, x: Tensor, ahead: Tensor, planes: tuple[Any, Any] | None) -> dict[str, Tensor]:
         """Joules of each window and frame, term -> (N, T).
 
         x: (N, T, V, 3) [m], each frame relative to its own pelvis p. ahead: (N, T, 3) [m],
         2 p_{t-1} - p_{t-2} - p_t: where the pelvis would be if it kept its velocity, seen from where it is.
-        planes: points and normals (N, T, S, 3) of the contact samples.
+        planes: points and normals (N, T, S, 3) of the contact samples; numpy for kernels, else tensors.
         """
-        terms = {name: summed(energy, x) for name, energy in self.static.items()}
+        terms = {name: summed(energy, x, kernels=self.kernels) for name, energy in self.static.items()}
         if "inertia" in self.terms and x.shape[1] >= 3:
             x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
             inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
             terms["inertia"] = torch.nn.functional.pad(inertia, (2, 0))
         if "collision" in self.terms and planes is not None:
-            terms["collision"] = summed(self.contact, x, *planes)
+            terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
         return terms

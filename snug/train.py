@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snug.recipe import DEFAULT, RECIPES, TRAININGS, Recipe, find_recipe
+from snug.recipe import DEFAULT, TRAININGS, Recipe, find_recipe
+from snug.train_options import parse
 
 if TYPE_CHECKING:
     from snug.dresser import DressedBody
+    from snug.parallel import Group
     from snug.trained_model import TrainedModel
+    from snug.training_run import Saving
+    from snug.validation import Validation
 
 
 def train(
@@ -28,6 +35,12 @@ def train(
     log: Callable[[dict[str, float]], None] | None = None,
     progress: bool = True,
     every: int = 50,
+    device: str = "cpu",
+    kernels: bool | None = None,
+    saving: Saving | None = None,
+    validation: Validation | None = None,
+    group: Group | None = None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> TrainedModel:
     """Train one network for a number of steps; on a CPU equal arguments give equal weights, bit for bit.
 
@@ -35,16 +48,32 @@ def train(
     simulation. trajectories: for those, motion name -> simulated world vertices (T, V, 3) [m].
     recipe: None takes the one of that name in TRAININGS.
     log: called with each row of the history, every `every` steps. progress: a bar on standard error.
-    Raises ValueError (TrainingError, TargetError, RecipeError) naming what is missing or diverged.
+    device: `cpu` or `cuda`, for the whole step. kernels: closed forms in numba (the default on a CPU) or the
+    definitions of the energies in torch (everywhere else).
+    saving: checkpoints; a run resumed from one ends, on a CPU, with the bits of an unbroken run.
+    validation: held-out motions; the weights that do best on them are kept.
+    group: processes of torchrun that share the batch. stop: asked after each step; True writes a checkpoint
+    and raises snug.training_run.Interrupted.
+    Raises ValueError (TrainingError, TargetError, RecipeError, DeviceError, TensorFileError) naming what is
+    missing or diverged.
     """
+    from snug.device import find_device
+    from snug.parallel import ALONE
     from snug.trainer import Trainer
+    from snug.training_run import TrainingRun
 
+    start = time.perf_counter()
     if recipe is None:
         recipe = TRAININGS[model_kind].recipe if model_kind in TRAININGS else DEFAULT
     trainer = Trainer(
-        model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories
-    )
-    return trainer.run(log=log, progress=progress, every=every)
+        model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
+        device=find_device(device), kernels=kernels, group=group or ALONE,
+    )  # fmt: skip
+    run = TrainingRun(
+        trainer, log=log, progress=progress, every=every, saving=saving, validation=validation, stop=stop,
+        setup_seconds=time.perf_counter() - start,
+    )  # fmt: skip
+    return run.go()
 
 
 def untrained_model(
@@ -69,38 +98,12 @@ def untrained_model(
     return TrainedModel(model_kind, network.eval(), recipe, seed=seed)
 
 
-def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog="python -m snug.train",
-        description="Train a garment network on a dressed body and write it to one file.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="""examples:
-  python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
-  python -m snug.train --model pbns --steps 8000         the static baseline
-  python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
-  python -m snug.train --recipe paper --vertices 4400    the paper's text to the letter
-
-The supervised model needs simulated motions: python -m benchmarks.run makes them and trains it.""",
-    )
-    add = parser.add_argument
-    add("--model", choices=("snug", "pbns"), default="snug", help="network and loss (default: %(default)s)")
-    add("--recipe", choices=tuple(RECIPES), default="default", help="named options (default: %(default)s)")
-    add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
-    add("--vertices", type=int, default=1000, help="of the T-shirt (default: %(default)s)")
-    add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
-    add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
-    add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
-    add("--threads", type=int, default=1, help="of torch on the CPU (default: %(default)s)")
-    add("-o", "--out", default="snug.safetensors", help="file to write (default: %(default)s)")
-    return parser.parse_args(arguments)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     options = parse(arguments)
     try:
         return _run(options)
     except ValueError as error:
-        print(f"snug.train: {error}", file=sys.stderr)
+        print(f"snug.train: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
 
 
@@ -108,35 +111,127 @@ def _run(options: argparse.Namespace) -> int:
     import torch
 
     from snug.body import Body
-    from snug.dresser import DressedBody
-    from snug.garments import tailor_tshirt
+    from snug.device import find_device
+    from snug.garments import find_pattern
+    from snug.parallel import join_group, leave_group
+    from snug.training_run import Interrupted
+
+    patterns = [find_pattern(name) for name in dict.fromkeys(options.garment or ["tshirt"])]
+    device = find_device(options.device)
+    torch.set_num_threads(options.threads)
+    motions, held_out = _motions(options)
+    stop = _StopRequest()
+    group, device = join_group(device)
+    try:
+        body = Body.load()
+        for pattern in patterns:
+            out = Path(options.out)
+            if len(patterns) > 1:
+                out = out.with_name(f"{out.stem}-{pattern.name}{out.suffix}")
+            garment = (body, pattern)
+            _train_one(options, garment, motions, held_out, out, str(device), group, stop)
+    except Interrupted as interrupted:
+        if group.writes:
+            print(f"snug.train: {interrupted}; go on with --resume", file=sys.stderr)
+        return 130
+    finally:
+        leave_group()
+    return 0
+
+
+def _motions(options: argparse.Namespace) -> tuple[list[Any], list[Any]]:
+    """Motions to train on and to validate with. Raises ValueError for a name that is not there."""
     from snug.motion import TRAIN, load_motions, make_motion
 
-    torch.set_num_threads(options.threads)
     motions = load_motions(options.motions) if options.motions else [make_motion(name) for name in TRAIN]
-    unknown = set(options.hold_out) - {motion.name for motion in motions}
-    if unknown:
-        raise ValueError(f"--hold-out {sorted(unknown)[0]}: no such motion among {[m.name for m in motions]}")
-    motions = [motion for motion in motions if motion.name not in options.hold_out]
-    body = Body.load()
-    dressed = DressedBody(body, tailor_tshirt(body, vertices=options.vertices))
+    names = [motion.name for motion in motions]
+    for word in ("hold_out", "validation"):
+        for name in getattr(options, word):
+            if name not in names:
+                raise ValueError(
+                    f"--{word.replace('_', '-')} {name}: no such motion among {', '.join(names)}"
+                )
+    left_out = {*options.hold_out, *options.validation}
+    training = [motion for motion in motions if motion.name not in left_out]
+    return training, [motion for motion in motions if motion.name in options.validation]
+
+
+class _StopRequest:
+    """True once the process was asked to end; a second request ends it at once."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._ask)
+
+    def _ask(self, number: int, frame: Any) -> None:
+        self.asked = True
+        signal.signal(number, signal.SIG_DFL)
+
+    def __call__(self) -> bool:
+        return self.asked
+
+
+def _train_one(
+    options: argparse.Namespace,
+    garment: tuple[Any, Any],
+    motions: list[Any],
+    held_out: list[Any],
+    out: Path,
+    device: str,
+    group: Group,
+    stop: Callable[[], bool],
+) -> None:
+    from snug.dresser import DressedBody
+    from snug.logbook import Logbook
+    from snug.training_run import Saving
+    from snug.validation import Validation
+
+    saving = Saving(
+        path=out.with_name(f"{out.stem}.checkpoint.safetensors"), steps=options.checkpoint_steps,
+        minutes=options.checkpoint_minutes, resume=options.resume,
+    )  # fmt: skip
+    say = print if group.writes else lambda *_: None
+    if options.resume and out.is_file() and not saving.path.is_file():
+        say(f"{out}: is there, and no checkpoint beside it; nothing to resume")
+        return
+    body, pattern = garment
+    dressed = DressedBody(body, pattern.tailor(body, vertices=options.vertices))
     frames = sum(motion.frames for motion in motions)
-    print(f"{len(motions)} motions, {frames} frames, {dressed.vertices} vertices, recipe {options.recipe}")
-    model = train(
-        options.model,
-        dressed,
-        motions,
-        steps=options.steps,
-        seed=options.seed,
-        recipe=find_recipe(options.recipe),
-    )
-    last = {name: value for name, value in model.history[-1].items() if name not in ("step", "seconds")}
-    print("last steps, J per frame: " + "  ".join(f"{name} {value:.4g}" for name, value in last.items()))
+    say(f"{pattern.description}: {dressed.vertices} vertices, {len(motions)} motions, {frames} frames, "
+        f"recipe {options.recipe}")  # fmt: skip
+    validation = None
+    if held_out:
+        validation = Validation(motions=held_out, every=options.validate_every, patience=options.patience)
+    logbook = None
+    if options.tensorboard and group.writes:
+        logbook = Logbook(Path(options.tensorboard) / out.stem)
+    try:
+        model = train(
+            options.model, dressed, motions, steps=options.steps, seed=options.seed,
+            recipe=find_recipe(options.recipe), log=logbook.write if logbook else None, device=device,
+            saving=saving, validation=validation, group=group, stop=stop,
+        )  # fmt: skip
+    finally:
+        if logbook:
+            logbook.close()
+    if group.writes:
+        _tell(model)
+        print(model.save(out))
+
+
+def _tell(model: TrainedModel) -> None:
+    last = {name: value for name, value in model.history[-1].items() if "/" not in name}
+    parts = {name: value for name, value in model.history[-1].items() if "/" in name}
+    terms = [f"{name} {value:.4g}" for name, value in last.items() if name not in ("step", "seconds")]
+    print("last steps, J per frame: " + "  ".join(terms))
+    print("ms a step: " + "  ".join(f"{n.removeprefix('seconds/')} {1e3 * s:.1f}" for n, s in parts.items()))
     for window in model.summary["named_windows"][:5]:
         print("step {step}: {window} at {joules} J, {action}".format(**window))
-    print(f"{model.steps} steps in {model.seconds:.0f} s, {model.megabytes:.1f} MB")
-    print(model.save(options.out))
-    return 0
+    if found := model.summary.get("validation"):
+        print("validation {best:.4g} J at step {best_step}, whose weights are kept".format(**found))
+    print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
+          f"{model.megabytes:.1f} MB")  # fmt: skip
 
 
 if __name__ == "__main__":

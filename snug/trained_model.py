@@ -4,8 +4,6 @@ file.
 
 from __future__ import annotations
 
-import json
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ from snug.baselines.supervised import VertexTargets
 from snug.baselines.tailornet import BandTargets, FrequencyMixture
 from snug.recipe import Recipe, RecipeError
 from snug.regressor import Regressor, parameter_megabytes
+from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 
 FORMAT = "snug-model-1"
 
@@ -49,7 +48,7 @@ KINDS = {
 }
 
 
-class ModelFileError(ValueError):
+class ModelFileError(TensorFileError):
     """A file that is no model of this project; the message names the file and what is wrong."""
 
 
@@ -57,9 +56,11 @@ class ModelFileError(ValueError):
 class TrainedModel:
     """A network and how it came to be.
 
-    history: one dict for every few steps: step, seconds, loss and each energy [J per frame].
-    summary: steps, windows above the spike limit and updates left out, with the windows' names.
-    seconds: wall time of training, contact search included.
+    history: one dict for every few steps: step, seconds, loss and each energy [J per frame], and as
+        `seconds/<part>` what the parts of a step took on the mean (snug.stopwatch).
+    summary: windows above the spike limit, updates left out, returns to good weights, with names.
+    seconds: wall time of the steps, contact search included; setup_seconds: of making ready the motions and
+        the first anchors.
     """
 
     kind: str
@@ -68,6 +69,7 @@ class TrainedModel:
     seed: int = 0
     steps: int = 0
     seconds: float = 0.0
+    setup_seconds: float = 0.0
     history: list[dict[str, float]] = field(default_factory=list)
     summary: dict[str, Any] = field(default_factory=dict)
 
@@ -82,9 +84,6 @@ class TrainedModel:
 
     def save(self, path: str | Path) -> Path:
         """Write weights and metadata to one safetensors file, whole or not at all."""
-        from safetensors.torch import save
-
-        path = Path(path)
         metadata = {
             "format": FORMAT,
             "kind": self.kind,
@@ -94,44 +93,29 @@ class TrainedModel:
             "seed": self.seed,
             "steps": self.steps,
             "seconds": self.seconds,
+            "setup_seconds": self.setup_seconds,
             "history": self.history,
             "summary": self.summary,
         }
-        path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-        try:
-            tensors = {name: tensor.contiguous() for name, tensor in self.network.state_dict().items()}
-            unfinished.write_bytes(save(tensors, metadata={"snug": json.dumps(metadata)}))
-            os.replace(unfinished, path)
-        finally:
-            unfinished.unlink(missing_ok=True)
-        return path
+        return write_tensors(Path(path), self.network.state_dict(), metadata)
 
     @classmethod
     def load(cls, path: str | Path) -> TrainedModel:
         """Read a model. Raises ModelFileError for a missing, broken or foreign file."""
-        from safetensors import SafetensorError, safe_open
-
         path = Path(path)
-        if not path.is_file():
-            raise ModelFileError(f"{path}: no such model file")
         try:
-            with safe_open(path, framework="pt") as stored:
-                header = (stored.metadata() or {}).get("snug")
-                tensors = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
-        except (SafetensorError, OSError) as error:
-            raise ModelFileError(f"{path}: not a safetensors file ({error})") from error
-        if header is None:
-            raise ModelFileError(f"{path}: no model of this project (its header has no 'snug' entry)")
+            tensors, data = read_tensors(path)
+        except TensorFileError as error:
+            raise ModelFileError(str(error)) from error
         try:
-            data = json.loads(header)
             if data["format"] != FORMAT:
                 raise ModelFileError(f"{path}: format {data['format']!r}, this version reads {FORMAT!r}")
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"])
             network.load_state_dict(tensors)
             rest = {name: data[name] for name in ("seed", "steps", "seconds", "history", "summary")}
-        except (KeyError, RecipeError, RuntimeError, json.JSONDecodeError) as error:
+            rest["setup_seconds"] = data.get("setup_seconds", 0.0)
+        except (KeyError, RecipeError, RuntimeError) as error:
             raise ModelFileError(f"{path}: broken model file ({error})") from error
         return cls(data["kind"], network.eval(), recipe, **rest)
 

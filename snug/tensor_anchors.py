@@ -1,0 +1,121 @@
+"""Contact anchors held and searched in torch: what `snug.contact.Anchors` does on a CPU, on any device.
+
+Normals are rounded to the same 127 steps as there, so that both give the same planes. The search is by brute
+force: of all allowed body vertices the nearest few, and of the faces around those the one that comes closest.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from snug.contact import Anchors, Patch
+
+NEAREST = 3  # body vertices whose faces are tried for each sample
+CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances
+FORBIDDEN = (
+    1.0  # m^2 added to the squared distance of a face out of the region: taken only for want of others
+)
+
+
+class TensorAnchors:
+    """One anchor per frame and sample, on `device`; when each was last searched is remembered on the CPU."""
+
+    def __init__(self, patch: Patch, frames: int, device: torch.device) -> None:
+        start = Anchors(patch, 1)
+        self.patch, self.age = patch, np.zeros(frames, np.int64)
+        self.faces = torch.as_tensor(start.faces, device=device).repeat(frames, 1)
+        self.barycentric = torch.as_tensor(start.barycentric, device=device).repeat(frames, 1, 1)
+        self.corners = torch.as_tensor(patch.faces, device=device).long()  # (Q, 3)
+        self.rest, self.centroids, self.sample_rest = (
+            torch.as_tensor(array, device=device)
+            for array in (patch.rest, patch.centroids, patch.sample_rest)
+        )
+        self.around = torch.as_tensor(
+            _padded(patch.incident), device=device
+        )  # (P, K) faces, -1 beyond the last
+
+    def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
+        """See Anchors.oldest."""
+        return Anchors.oldest(cast(Anchors, self), frames, count)
+
+    def normals(self, positions: Tensor) -> Tensor:
+        """Area-weighted vertex normals (N, P, 3) of positions (N, P, 3), rounded to 1/127."""
+        a, b, c = (positions[:, self.corners[:, corner]] for corner in range(3))
+        of_faces = torch.linalg.cross(b - a, c - a)
+        # Gathered, not scattered: sums are then taken in one order on a GPU too.
+        there = (self.around >= 0)[..., None]
+        normals = (of_faces[:, self.around.clamp(min=0)] * there).sum(-2)
+        return (127.0 * normals / (torch.linalg.vector_norm(normals, dim=-1, keepdim=True) + 1e-30)).round()
+
+    def planes(
+        self, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """See Anchors.planes; positions and normals (R, P, 3) and the result are tensors."""
+        device = positions.device
+        chosen = torch.as_tensor(frames, device=device)
+        corners = self.corners[self.faces[chosen].long()]  # (N, S, 3)
+        row = torch.as_tensor(rows, device=device)[:, None, None]
+        last = self.barycentric[chosen]
+        weights = torch.cat([1 - last.sum(-1, keepdim=True), last], -1)[..., None]
+        points = (weights * positions[row, corners]).sum(-2)
+        directions = (weights * normals[row, corners]).sum(-2)
+        return points, directions / (torch.linalg.vector_norm(directions, dim=-1, keepdim=True) + 1e-30)
+
+    def renew(self, frame: int, points: Tensor, positions: Tensor) -> None:
+        """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame."""
+        for start in range(0, len(points), CHUNK):
+            part = slice(start, start + CHUNK)
+            faces, barycentric = self._searched(points[part], self.sample_rest[part], positions)
+            self.faces[frame, part], self.barycentric[frame, part] = faces.to(self.faces.dtype), barycentric
+        self.age[frame] = 0
+
+    def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
+        distances = torch.cdist(points, positions)
+        allowed = torch.cdist(home, self.rest) < self.patch.region
+        distances = torch.where(allowed | ~allowed.any(1, keepdim=True), distances, torch.inf)
+        nearest = distances.topk(min(NEAREST, len(positions)), largest=False).indices
+        faces = self.around[nearest].flatten(1)  # (S, NEAREST K)
+        a, b, c = positions[self.corners[faces.clamp(min=0)]].unbind(-2)
+        s, t, r = b - a, c - a, points[:, None] - a
+        v, w = closest_on_triangle(s, t, r)
+        squared = (r - v[..., None] * s - w[..., None] * t).square().sum(-1)
+        far = (self.centroids[faces.clamp(min=0)] - home[:, None]).square().sum(-1) >= self.patch.region**2
+        squared = torch.where(faces < 0, torch.inf, squared + FORBIDDEN * far)
+        best = squared.argmin(1, keepdim=True)
+        pick = [table.gather(1, best)[:, 0] for table in (faces, v, w)]
+        return pick[0], torch.stack(pick[1:], -1)
+
+
+def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor]:
+    """Weights v, w of the second and third corner where a triangle comes closest to a point.
+
+    s, t (..., 3): sides from the first corner; r (..., 3): from it to the point [m].
+    """
+    aa, cc, m = (s * s).sum(-1), (t * t).sum(-1), (s * t).sum(-1)
+    d, e = (s * r).sum(-1), (t * r).sum(-1)
+    determinant = aa * cc - m * m
+    v, w = (cc * d - m * e) / determinant, (aa * e - m * d) / determinant
+    inside = (determinant > 0) & (v >= 0) & (w >= 0) & (v + w <= 1)
+    # Where the foot is outside: the nearest of the three edges, each clamped to its ends.
+    zero = torch.zeros_like(d)
+    on_s, on_t = (d / aa).clamp(0, 1), (e / cc).clamp(0, 1)
+    on_u = ((e - d + aa - m) / (aa + cc - 2 * m)).clamp(0, 1)
+    edges_v, edges_w = torch.stack([on_s, zero, 1 - on_u]), torch.stack([zero, on_t, on_u])
+    q = edges_v**2 * aa + edges_w**2 * cc + 2 * edges_v * edges_w * m - 2 * edges_v * d - 2 * edges_w * e
+    best = q.argmin(0, keepdim=True)
+    edge_v, edge_w = edges_v.gather(0, best)[0], edges_w.gather(0, best)[0]
+    return torch.where(inside, v, edge_v), torch.where(inside, w, edge_w)
+
+
+def _padded(lists: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """(start, flat) lists as rows (P, K) int64 of equal length, filled up with -1."""
+    start, flat = lists
+    counts = np.diff(start)
+    table = np.full((len(counts), counts.max()), -1, np.int64)
+    rows = np.repeat(np.arange(len(counts)), counts)
+    table[rows, np.arange(len(flat)) - start[rows]] = flat
+    return table

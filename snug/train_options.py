@@ -1,0 +1,58 @@
+"""The words of `python -m snug.train`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from snug.recipe import RECIPES
+
+EXAMPLES = """examples:
+  python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
+  python -m snug.train --garment tshirt --garment tunic  one network for each garment
+  python -m snug.train --model pbns --steps 8000         the static baseline
+  python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
+  python -m snug.train --validation bow --patience 10    stop when a held-out motion gets no better
+  python -m snug.train --recipe paper --vertices 4400    the paper's text to the letter
+  python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
+  torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
+
+Models taught by simulated motions are trained by python -m benchmarks.run, which makes those."""
+
+
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m snug.train",
+        description="Train a garment network on a dressed body and write it to one file.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog=EXAMPLES,
+    )
+    add = parser.add_argument_group("what").add_argument
+    add("--model", choices=("snug", "pbns"), default="snug", help="network and loss (default: %(default)s)")
+    add("--recipe", choices=tuple(RECIPES), default="default", help="named options (default: %(default)s)")
+    add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
+    add("--garment", metavar="NAME", action="append", default=[],
+        help="tshirt or tunic; repeat for one model each (default: tshirt)")  # fmt: skip
+    add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
+    add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
+    add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
+    add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
+    add("-o", "--out", default="snug.safetensors",
+        help="file to write; of several garments each adds its name (default: %(default)s)")  # fmt: skip
+    add = parser.add_argument_group("early stop").add_argument
+    add("--validation", metavar="NAME", action="append", default=[],
+        help="hold a motion out of training and roll it out now and then; may be repeated. The weights that "
+        "do best are kept")  # fmt: skip
+    add("--validate-every", metavar="STEPS", type=int, default=200, help="(default: %(default)s)")
+    add("--patience", metavar="N", type=int, default=0,
+        help="validations without a better value, after which training stops (default: never)")  # fmt: skip
+    add = parser.add_argument_group("where and how long").add_argument
+    add("--device", default="cpu", metavar="cpu|cuda", help="where the whole step runs (default: cpu)")
+    add("--threads", type=int, default=1, help="of torch on the CPU (default: %(default)s)")
+    add(
+        "--checkpoint-minutes", metavar="M", type=float, default=5.0, help="0 for none (default: %(default)s)"
+    )
+    add("--checkpoint-steps", metavar="N", type=int, default=0, help="a checkpoint every N steps as well")
+    add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
+    add("--tensorboard", metavar="DIR", help="write curves for TensorBoard (extra: tensorboard)")
+    return parser.parse_args(arguments)
