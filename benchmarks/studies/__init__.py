@@ -13,4 +13,10 @@ STUDIES = (
         suite="validation",
         module="benchmarks.studies.laws",
     ),
+    Study(
+        name="long_roll_outs",
+        description="every network for a thousand frames there and back: energy at both ends, and drift",
+        suite="garments",
+        module="benchmarks.studies.long_roll_outs",
+    ),
 )
