@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +32,7 @@ class MethodEntry:
     needs_body: whether it works on dressed scenes alone. trained: the kind of network it needs, if any.
     seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
     dtype: the numbers it computes with; trajectories and metrics are float64 in any case.
+    needs_no_obstacle: whether it knows no contact. package: what it needs installed besides this project.
     cut_short: whether it stops before the minimum on purpose, so that running out of iterations is its end.
     """
 
@@ -43,14 +45,26 @@ class MethodEntry:
     seeded: bool = False
     dtype: str = "float64"
     cut_short: bool = False
+    needs_no_obstacle: bool = False
+    package: str | None = None
 
     def skip(self, scene: Scene) -> str | None:
         """Why this method cannot do that scene, or None."""
         if self.needs_body and not scene.dressed:
             return f"{self.name} moves a garment with a body's joints; this scene has no body"
+        if self.needs_no_obstacle and (scene.dressed or scene.obstacle):
+            return f"{self.name} is compared without contact, where its energies and ours are alike"
+        if self.package is not None and not installed(self.package):
+            return f"{self.name} needs the package {self.package}, which is not installed"
         return None
 
     def make(self, *, models: Path, seed: int, device: str = "cpu") -> Method:
         """A fresh method for one cell; `models` is the folder of trained networks."""
         module = importlib.import_module(self.module)
         return module.make(models=models, seed=seed, device=device, **self.options)
+
+
+def installed(package: str) -> bool:
+    """Whether a package can be imported; a mere folder of that name cannot."""
+    spec = importlib.util.find_spec(package)
+    return spec is not None and spec.origin is not None

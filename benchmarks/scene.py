@@ -26,12 +26,14 @@ class Scene:
     """The declaration of a scene: cheap to list. Its module is imported when it is built.
 
     `dressed` says that it needs a body wearing a garment, hence the wardrobe; networks work on no other.
+    `obstacle` says that there is another thing to touch.
     """
 
     name: str
     description: str
     module: str
     dressed: bool = False
+    obstacle: bool = False
 
     def build(self, preset: Preset, wardrobe: Wardrobe | None = None) -> BuiltScene:
         """Make everything the scene declares. Deterministic. A dressed scene needs the wardrobe."""

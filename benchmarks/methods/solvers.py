@@ -81,6 +81,18 @@ SOLVERS = (
         "xpbd", "sweep", "position-based dynamics with our energies, {} a step",
         "benchmarks.methods.xpbd", (10, 40, 160),
     ),
+    *(
+        MethodEntry(
+            name=f"newton-{solver.lower()}",
+            description=f"{solver} of the package newton on its own energies, {iterations} x {substeps} a frame",
+            module="benchmarks.methods.peers",
+            options={"solver": solver, "iterations": iterations, "substeps": substeps},
+            dtype="float32",
+            needs_no_obstacle=True,
+            package="newton",
+        )
+        for solver, iterations, substeps in (("VBD", 10, 20), ("XPBD", 1, 128))
+    ),
     *_hybrids("skinning", "lbfgs", None),
     *_hybrids("skinning", "newton", None),
     *_hybrids("snug", "lbfgs", "snug"),

@@ -17,6 +17,7 @@ SMALL_SCENES = (
         name="sheet_on_sphere",
         description="a square sheet dropped onto a resting sphere; contact without a body",
         module="benchmarks.scenes.sheet_on_sphere",
+        obstacle=True,
     ),
     Scene(
         name="flag",

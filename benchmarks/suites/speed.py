@@ -17,6 +17,7 @@ REFERENCES = (
     "simulation", "simulation-1e-2", "simulation-1e-4", "simulation-1e-8", "simulation-dt/2", "simulation-dt/4",
     "simulation-dt/8", "simulation-moved",
 )  # fmt: skip
+PEERS = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
 LEARNED = ("skinning", "snug", "supervised", "pbns")
 # Only where methods are named, or at a preset that holds all; learned ones as in suite garments.
 FURTHER = (
@@ -46,7 +47,7 @@ def methods(newton_cuts: Sequence[int]) -> list[str]:
         ]  # fmt: skip
         references = list(REFERENCES)
     families = [f"{name}{scale * cut}" for name, scale in FAMILIES for cut in newton_cuts]
-    return [*references, *families, *rivals, *LEARNED]
+    return [*references, *families, *rivals, *PEERS, *LEARNED]
 
 
 FAMILIES = (("newton-", 1), ("lbfgs-", 5), ("snug+lbfgs-", 1))  # and iterations for each unit of a preset's cuts
