@@ -12,9 +12,9 @@ from functools import cached_property
 import igl
 import numpy as np
 from numba import njit
-from scipy.spatial import cKDTree
 
 from .closed_mesh import check_closed
+from .closest_point import Closest, FaceTree
 from .cloth import MeshError
 from .resume import fingerprint
 
@@ -75,9 +75,8 @@ class Obstacle:
         self._forget()
 
     def _forget(self) -> None:
-        self._seen: list[np.ndarray] = []  # rest points asked about so far, and
-        self._reachable = np.arange(len(self.faces))  # the faces that any of them may meet
-        self._trees: dict[bool, tuple[int, igl.AABB, np.ndarray, np.ndarray]] = {}
+        self._tree: tuple[int, FaceTree] | None = None  # and the frame that it is fitted to
+        self._last: dict[tuple[int, bool], np.ndarray] = {}  # faces found for so many points, held or free
 
     @property
     def frames(self) -> int:
@@ -103,55 +102,39 @@ class Obstacle:
         """Hash of everything that decides how it touches."""
         return fingerprint(self.positions, self.faces, self.rest_centroids, np.array(self.region))
 
-    def _closest(self, points: np.ndarray, frame: int, *, reachable: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Nearest face and point, on the whole mesh or on the reachable faces; the last tree is kept."""
-        frame = min(frame, self.frames - 1)
-        if reachable not in self._trees or self._trees[reachable][0] != frame:
-            vertices = np.asfortranarray(self.at(frame))
-            faces = self.faces[self._reachable] if reachable else self.faces
-            tree = igl.AABB()
-            tree.init(vertices, faces)
-            self._trees[reachable] = (frame, tree, vertices, faces)
-        _, tree, vertices, faces = self._trees[reachable]
-        _, face, nearest = tree.squared_distance(vertices, faces, np.asfortranarray(points))
-        face = np.asarray(face, dtype=np.int64).ravel()
-        return self._reachable[face] if reachable else face, np.ascontiguousarray(nearest)
+    def _nearest(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Closest:
+        """Closest points under the rule of regions; anywhere for a sample that it leaves no face.
 
-    def _reach(self, rest_points: np.ndarray) -> None:
-        """Let the tree of reachable faces cover what these rest points may meet.
-
-        Most of a body is head, hands and feet; leaving them out makes the tree several times smaller and
-        changes no answer.
+        The answers to the last call for as many points are where the search begins: the simulator asks for
+        the same samples in every frame.
         """
-        if any(rest_points is seen for seen in self._seen):
-            return
-        assert self.rest_centroids is not None
-        self._seen.append(rest_points)
-        gap, _ = cKDTree(np.concatenate(self._seen)).query(
-            self.rest_centroids, distance_upper_bound=self.region
-        )
-        near = np.flatnonzero(np.isfinite(gap))
-        self._reachable = near if near.size else np.arange(len(self.faces))
-        self._trees.pop(True, None)
-
-    def _nearest_allowed(
-        self, points: np.ndarray, frame: int, rest_points: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Face (S,), closest point (S, 3) and its barycentric place (S, 3), under the rule of regions."""
-        vertices = self.at(frame)
-        if self.rest_centroids is None or rest_points is None:
-            face, nearest = self._closest(points, frame, reachable=False)
+        frame = min(frame, self.frames - 1)
+        if self._tree is None:
+            centroids = self.rest_centroids
+            tree = FaceTree(
+                self.faces, self.at(0)[self.faces].mean(axis=1) if centroids is None else centroids
+            )
         else:
-            self._reach(rest_points)
-            face, nearest = self._closest(points, frame, reachable=True)
-            offset = self.rest_centroids[face] - rest_points
-            far = np.flatnonzero(np.einsum("si,si->s", offset, offset) > self.region**2)
-            rest = (rest_points, self.rest_centroids, self.region)
-            _closest_allowed(points, far, *rest, vertices, self.faces, face, nearest)
-            lost = np.flatnonzero(face < 0)
-            if lost.size:
-                face[lost], nearest[lost] = self._closest(points[lost], frame, reachable=False)
-        return face, nearest, _barycentric(nearest, vertices[self.faces[face]])
+            tree = self._tree[1]
+        if self._tree is None or self._tree[0] != frame:
+            tree.refit(self.at(frame))
+            self._tree = frame, tree
+        if self.rest_centroids is None:
+            rest_points = None
+        kind = len(points), rest_points is not None
+        found = tree.nearest(points, hints=self._last.get(kind), rest_points=rest_points, region=self.region)
+        self._last[kind] = found.faces
+        lost = np.flatnonzero(found.faces < 0)
+        if lost.size:
+            anywhere = tree.nearest(points[lost])
+            faces, barycentric, closest = found.faces.copy(), found.barycentric, found.points
+            faces[lost], barycentric[lost], closest[lost] = (
+                anywhere.faces,
+                anywhere.barycentric,
+                anywhere.points,
+            )
+            found = Closest(faces, barycentric, closest)
+        return found
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         """Contact planes at `frame` for samples at points (S, 3) with rest positions rest_points (S, 3).
@@ -160,32 +143,30 @@ class Obstacle:
         sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
         sample's own position.
         """
-        face, nearest, barycentric = self._nearest_allowed(points, frame, rest_points)
-        smooth = np.einsum("sa,sai->si", barycentric, self._vertex_normals(frame)[self.faces[face]])
-        smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
-        offset = points - nearest
-        length = np.linalg.norm(offset, axis=1, keepdims=True)
-        cosine = np.einsum("si,si->s", offset, smooth)[:, None] / np.maximum(length, 1e-300)
-        # Within a micrometre, or looking along the surface, the offset has no direction to trust.
-        trusted = (length > 1e-6) & (np.abs(cosine) > 0.3)
-        normals = np.where(trusted, np.sign(cosine) * offset / np.maximum(length, 1e-300), smooth)
-        return Planes(nearest, normals, face, barycentric)
+        found = self._nearest(points, frame, rest_points)
+        vertices = self.at(frame)
+        normals = np.empty_like(found.points)
+        _plane_normals(
+            points, found.points, found.faces, found.barycentric, vertices, self.faces,
+            vertex_normals(vertices, self.faces), normals,
+        )  # fmt: skip
+        return Planes(found.points, normals, found.faces, found.barycentric)
 
     def carried(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> np.ndarray:
         """Where points (N, 3) at frame - 1 would go if each kept its place beside its nearest face.
 
         The best known initial guess for a garment: the body's own motion, face by face.
         """
-        face, nearest, barycentric = self._nearest_allowed(points, frame - 1, rest_points)
-        corners = self.at(frame)[self.faces[face]]
-        before, after = _face_frames(self.at(frame - 1)[self.faces[face]]), _face_frames(corners)
-        local = np.einsum("sij,si->sj", before, points - nearest)
-        return np.einsum("sa,sai->si", barycentric, corners) + np.einsum("sij,sj->si", after, local)
+        found = self._nearest(points, frame - 1, rest_points)
+        faces = self.faces[found.faces]
+        corners = self.at(frame)[faces]
+        before, after = _face_frames(self.at(frame - 1)[faces]), _face_frames(corners)
+        local = np.einsum("sij,si->sj", before, points - found.points)
+        return np.einsum("sa,sai->si", found.barycentric, corners) + np.einsum("sij,sj->si", after, local)
 
     def signed_distance(self, points: np.ndarray, frame: int) -> np.ndarray:
         """True distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
-        _, nearest = self._closest(points, frame, reachable=False)
-        distance = np.linalg.norm(points - nearest, axis=1)
+        distance = np.linalg.norm(points - self._nearest(points, frame).points, axis=1)
         vertices = np.asfortranarray(self.at(frame))
         # Only what lies in the bounding box can be inside.
         low, high = vertices.min(axis=0), vertices.max(axis=0)
@@ -193,9 +174,6 @@ class Obstacle:
         winding = igl.fast_winding_number(vertices, self.faces, np.asfortranarray(points[boxed]))
         distance[boxed] *= np.where(np.asarray(winding).ravel() > 0.5, -1.0, 1.0)
         return distance
-
-    def _vertex_normals(self, frame: int) -> np.ndarray:
-        return np.asarray(igl.per_vertex_normals(np.asfortranarray(self.at(frame)), self.faces))
 
 
 def _face_frames(corners: np.ndarray) -> np.ndarray:
@@ -207,72 +185,57 @@ def _face_frames(corners: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first), normal], axis=-1)
 
 
-def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (N, 3) of points on triangles (N, 3, 3)."""
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    r = points - corners[:, 0]
-    aa, ab, bb = (np.einsum("ni,ni->n", p, q) for p, q in ((a, a), (a, b), (b, b)))
-    ra, rb = np.einsum("ni,ni->n", r, a), np.einsum("ni,ni->n", r, b)
-    det = np.maximum(aa * bb - ab * ab, 1e-300)
-    v, w = (bb * ra - ab * rb) / det, (aa * rb - ab * ra) / det
-    return np.clip(np.stack([1 - v - w, v, w], axis=1), 0.0, 1.0)
+@njit(cache=True, error_model="numpy", inline="always")
+def _cross_of_face(x, i, j, k):
+    """Twice the area of a triangle times its normal."""
+    a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+    b0, b1, b2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
-@njit(cache=True)
-def _closest_allowed(points, which, rest_points, rest_centroids, region, vertices, faces, face, nearest):
-    """For the samples `which`, replace face and nearest by the closest among allowed faces.
-
-    A sample with no allowed face at all gets face -1.
-    """
-    best_point = np.empty(3)
-    q = np.empty(3)
-    for s in which:
-        best = np.inf
-        face[s] = -1
-        for f in range(faces.shape[0]):
-            dx = rest_centroids[f, 0] - rest_points[s, 0]
-            dy = rest_centroids[f, 1] - rest_points[s, 1]
-            dz = rest_centroids[f, 2] - rest_points[s, 2]
-            if dx * dx + dy * dy + dz * dz > region * region:
-                continue
-            distance = _closest_on_triangle(
-                points[s], vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], q
-            )
-            if distance < best:
-                best = distance
-                face[s] = f
-                best_point[:] = q
-        if best < np.inf:
-            nearest[s] = best_point
+@njit(cache=True, error_model="numpy")
+def vertex_normals(positions, faces):
+    """Unit normals (B, 3) of the vertices of a mesh (B, 3) [m], (F, 3): of its faces, weighted by area."""
+    normals = np.zeros_like(positions)
+    for f in range(len(faces)):
+        n = _cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
+        for a in range(3):
+            for c in range(3):
+                normals[faces[f, a], c] += n[c]
+    for v in range(len(normals)):
+        _normalise(normals[v])
+    return normals
 
 
-@njit(cache=True)
-def _closest_on_triangle(p, a, b, c, q):
-    """Squared distance from p to triangle abc, the point itself in q (Ericson 2005, section 5.1.5)."""
-    ab, ac, ap = b - a, c - a, p - a
-    d1, d2 = np.dot(ab, ap), np.dot(ac, ap)
-    bp = p - b
-    d3, d4 = np.dot(ab, bp), np.dot(ac, bp)
-    cp = p - c
-    d5, d6 = np.dot(ab, cp), np.dot(ac, cp)
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    if d1 <= 0 and d2 <= 0:
-        v, w = 0.0, 0.0
-    elif d3 >= 0 and d4 <= d3:
-        v, w = 1.0, 0.0
-    elif d6 >= 0 and d5 <= d6:
-        v, w = 0.0, 1.0
-    elif vc <= 0 and d1 >= 0 and d3 <= 0:
-        v, w = d1 / (d1 - d3), 0.0
-    elif vb <= 0 and d2 >= 0 and d6 <= 0:
-        v, w = 0.0, d2 / (d2 - d6)
-    elif va <= 0 and d4 - d3 >= 0 and d5 - d6 >= 0:
-        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        v = 1.0 - w
-    else:
-        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
-    total = 0.0
-    for i in range(3):
-        q[i] = a[i] + v * ab[i] + w * ac[i]
-        total += (p[i] - q[i]) ** 2
-    return total
+@njit(cache=True, error_model="numpy", inline="always")
+def _normalise(v):
+    length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    v[0], v[1], v[2] = v[0] / length, v[1] / length, v[2] / length
+    return length
+
+
+@njit(cache=True, error_model="numpy")
+def _plane_normals(points, closest, found, barycentric, vertices, faces, of_vertices, normals):
+    """normals (S, 3): from the closest point to the sample, turned outwards."""
+    offset, smooth = np.empty(3), np.empty(3)
+    for s in range(len(points)):
+        i, j, k = faces[found[s], 0], faces[found[s], 1], faces[found[s], 2]
+        u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
+        for c in range(3):
+            smooth[c] = u * of_vertices[i, c] + v * of_vertices[j, c] + w * of_vertices[k, c]
+            offset[c] = points[s, c] - closest[s, c]
+        _normalise(smooth)
+        length = _normalise(offset)
+        cosine = offset[0] * smooth[0] + offset[1] * smooth[1] + offset[2] * smooth[2]
+        # Within a micrometre, or looking along the surface, the offset has no direction to trust.
+        if not (length > 1e-6 and np.abs(cosine) > 0.3):
+            normals[s] = smooth
+            continue
+        if min(u, v, w) > 0.0:  # inside the face its normal is the direction, and has no cancellation
+            n = _cross_of_face(vertices, i, j, k)
+            side = np.sign(n[0] * offset[0] + n[1] * offset[1] + n[2] * offset[2])
+            for c in range(3):
+                offset[c] = side * n[c]
+            _normalise(offset)
+        for c in range(3):
+            normals[s, c] = np.sign(cosine) * offset[c]
