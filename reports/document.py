@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from benchmarks.results import Row
+from reports import findings as paper_findings
 from reports.canvas import Picture
 from reports.configuration import configuration
 from reports.layout import Block, figure_block, list_block, table_block
@@ -37,6 +38,7 @@ CAPTIONS = {
     "extremes": "Every extreme case and how it ended.",
     "refusals": "Inputs that have to be refused before anything is solved, and what each was told.",
     "unfinished": "Cells that failed or were skipped, with the reason each gave.",
+    **paper_findings.CAPTIONS,
 }
 
 # Tables 1 to 3 of the paper, as it prints them, by column. A column that it does not report is a dash.
@@ -164,6 +166,7 @@ def _garments(tables: dict[str, Table], pictures: Sequence[Picture]) -> list[Blo
         *_with_paper(tables, "curvature"),
         *_tables(tables, "dynamics", "penetration", "shape"),
         *_with_paper(tables, "cost"),
+        *_tables(tables, "findings", "recipes"),
         *_figures(pictures, "garments", "speed"),
         *_figures(pictures, "garments", "training"),
         *_tables(tables, "energies_by_scene"),

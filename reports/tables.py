@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from benchmarks.results import Row
 from reports.garment_tables import cost, curvature, dynamics, energies, energies_by_scene, geometry, shape
+from reports.findings import findings, recipes
 from reports.stability import refusals
 from reports.summary import Measurements, excess_energy, speed_measurements, suite_rows
 from reports.table import Cell, Column, Table
@@ -137,6 +138,8 @@ MAKERS = (
     shape,
     dynamics,
     cost,
+    findings,
+    recipes,
     speed,
     validation,
     extremes,

@@ -1,0 +1,65 @@
+"""The table of the paper's findings: numbers decide, ties and what was not run are said."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.results import Row
+from reports.findings import claims, findings, recipes
+from snug.recipe import TRAININGS
+
+
+def row(method, metric, value, *, seed=0, suite="garments", scene="dressed/kick", unit="J"):
+    return Row(suite, scene, method, seed, metric, unit, value)
+
+
+def told(rows):
+    return {line[0]: line for line in findings(rows).rows}
+
+
+def test_every_method_of_a_claim_is_one_that_can_be_run():
+    known = {*TRAININGS, "free-bound"}
+    assert {name for claim in claims() for name in (claim.lower, claim.higher)} <= known
+
+
+@pytest.mark.parametrize(
+    ("snug", "pbns", "verdict"),
+    [
+        ((0.5,), (1.0,), "reproduced"),
+        ((0.97,), (1.0,), "not reproduced: a tie"),
+        ((1.0,), (0.5,), "not reproduced: the other way round"),
+        ((0.5, 0.9), (1.0, 1.0), "reproduced"),  # 0.3 apart, 0.28 of scatter
+        ((0.6, 1.0), (1.0, 1.0), "not reproduced: a tie"),  # 0.2 apart, 0.28 of scatter
+    ],
+)
+def test_a_term_is_reproduced_beyond_a_tie_and_beyond_the_scatter_of_seeds(snug, pbns, verdict):
+    rows = [row("snug", "energy/strain", value, seed=k) for k, value in enumerate(snug)]
+    rows += [row("pbns", "energy/strain", value, seed=k) for k, value in enumerate(pbns)]
+    line = told(rows)["SNUG is below PBNS in strain"]
+    assert line[1].value == pytest.approx(sum(snug) / len(snug)) and line[3:] == ("J", verdict)
+    assert (line[1].spread is None) == (len(snug) == 1)
+    assert told(rows)["SNUG is below PBNS in gravity"][1:] == (None, None, "-", "-")
+
+
+def test_the_bound_and_a_steady_roll_out_allow_a_share():
+    rows = [row("snug", "energy/total", 1.07), row("free-bound", "energy/total", 1.0)]
+    ends = {"roll_out/first": 1.0, "roll_out/last": 1.06}
+    rows += [row("snug", k, v, suite="roll-outs", scene="there_and_back") for k, v in ends.items()]
+    lines = told(rows)
+    assert lines["SNUG ends within 8 % of the free lower bound"][-1] == "reproduced"
+    assert lines["A thousand frames end where they began"][-1] == "not reproduced"
+
+
+def test_without_a_network_there_is_no_table():
+    assert findings([row("simulation", "energy/strain", 1.0)]) is None and recipes([]) is None
+
+
+def test_recipes_keep_their_order_and_their_dashes():
+    rows = [
+        row(name, "energy/total", value, suite="recipes", scene="lunge", seed=seed)
+        for name, value in (("default", 1.0), ("paper", 9.0), ("default, no zero start", 2.0))
+        for seed in (0, 1)
+    ]
+    table = recipes(rows)
+    assert [line[0] for line in table.rows] == ["default", "paper", "default, no zero start"]
+    assert table.rows[1][1].value == 9.0 and table.rows[1][1].seeds == 2 and table.rows[1][2] is None
