@@ -17,7 +17,9 @@ LONG = 24  # rows from which a table may run over pages
 # Texts that need room get a share of the page's width; every other column is as wide as its content.
 WIDTHS = {"reason": "2fr", "check": "1fr", "finding": "2fr", "case": "1fr", "scene": "1fr"}
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
-TEXTS = ("method", "finding", "recipe", "scene", "suite", "check", "case", "outcome", "status", "reason", "unit")
+TEXTS = (
+    "method", "finding", "recipe", "scene", "suite", "check", "case", "outcome", "status", "reason", "unit",
+)  # fmt: skip
 COSTS = ("data_generation", "training", "run_time", "memory")
 REMARKS = {
     "*": "* A mean over fewer scenes than in the other rows, for want of the rest.",
