@@ -1,65 +1,151 @@
-"""Runs one cell: the only place that holds a clock. The raw trajectory is written before it is measured."""
+"""One cell, in a process of its own: prepare off the clock, run on it, write the raw trajectory.
+
+Metrics come later, from the files. The process loads what its scene and method need and nothing else; the
+modules of ours and the heavy ones that it has loaded are in its record.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-import time
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .methods import find_method
-from .plan import Cell
+from .clock import Reading, clocked
+from .method import MethodEntry
 from .results import RunFolder
 
 if TYPE_CHECKING:
     from reference_sim import Trajectory
 
+    from .plan import Cell
+    from .presets import Preset
     from .scene import BuiltScene
+    from .wardrobe import Wardrobe
 
 # What a trajectory says of itself, in the words of a result row. A solver cut short on purpose is ok.
 WORDS = {"converged": "ok", "ok": "ok", "stalled": "stalled", "diverged": "diverged", "timeout": "timeout"}
+OURS = ("reference_sim", "snug", "benchmarks")
+HEAVY = ("torch", "igl", "numba", "scipy", "h5py")  # what a scene may do without
+BATCH = 16  # frames at once, where a method can
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a cell ended. seconds: wall time of run() alone. A failed cell has left no trajectory."""
+    """How a cell ended. A cell that is not recorded has left no trajectory.
+
+    seconds: of run(), on the clock, repeats included. frames: those it computed. batch_seconds: per frame,
+    many at once. peak: most memory of the process [MB]. modules: loaded when the run had ended. terms: the
+    energies of the scene, joined by "+".
+    """
 
     cell: Cell
     status: str
     reason: str = ""
-    seconds: float = 0.0
+    seconds: tuple[float, ...] = ()
+    frames: int = 0
+    batch_seconds: float | None = None
+    peak: float | None = None
+    modules: tuple[str, ...] = ()
+    terms: str = ""
     recorded: bool = False
 
 
-def run_cell(cell: Cell, scene: BuiltScene, run: RunFolder, *, device: str) -> Outcome:
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """All that a cell's process is told; what is ready made lies in files."""
+
+    cell: Cell
+    entry: MethodEntry
+    preset: Preset
+    wardrobe: Wardrobe | None
+    folder: Path
+    device: str
+
+
+def perform(task: Task) -> Outcome:
+    """Build the scene and run the cell in this process, whose memory and modules are looked at afterwards."""
+    try:
+        scene = built(task)
+        outcome = run_cell(task.cell, task.entry, scene, RunFolder(task.folder), device=task.device)
+    except Exception as error:
+        outcome = failed(task.cell, error)
+    return dataclasses.replace(outcome, peak=peak_memory(), modules=loaded())
+
+
+def perform_again(task: Task) -> Outcome:
+    """Build the scene and take the time of one more run."""
+    try:
+        method = task.entry.make(
+            models=RunFolder(task.folder).models, seed=task.cell.seed, device=task.device
+        )
+        method.prepare(built(task))
+        _, reading = clocked(method.run)
+    except Exception as error:
+        return failed(task.cell, error)
+    status = "failed" if reading.complaint else "ok"
+    return Outcome(task.cell, status, reading.complaint, (reading.seconds,))
+
+
+def built(task: Task) -> BuiltScene:
+    """The scene, a dressed one with the start and the posed body that the run's folder has ready."""
+    scene = task.cell.scene
+    if not scene.dressed or task.wardrobe is None:
+        return scene.build(task.preset, task.wardrobe)
+    import numpy as np
+
+    run, motion = RunFolder(task.folder), scene.name.split("/", 1)[1]
+    bodies = {motion: np.load(run.body_path(scene.name))}
+    start = np.load(run.start_path(scene.name))
+    dressed = scene.build(task.preset, dataclasses.replace(task.wardrobe, bodies=bodies))
+    return dataclasses.replace(dressed, settle=lambda: start)
+
+
+def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder, *, device: str) -> Outcome:
     """Prepare off the clock, run on it, write the trajectory. Whatever is raised becomes a failed outcome."""
-    entry = find_method(cell.method)
     if reason := entry.skip(cell.scene):
         return Outcome(cell, "skipped", reason)
     path = run.trajectory_path(cell.scene.name, cell.method, cell.seed)
     try:
         method = entry.make(models=run.models, seed=cell.seed, device=device)
         method.prepare(scene)
-        clock = time.perf_counter()
-        trajectory = method.run()
-        seconds = time.perf_counter() - clock
-        status, reason = judge(trajectory, scene, cut_short=entry.cut_short)
-        provenance = trajectory.provenance | {"run_seconds": seconds, "scene": scene.name, "seed": cell.seed}
+        trajectory, reading = clocked(method.run)
+        status, reason = judge(trajectory, reading, scene, cut_short=entry.cut_short)
+        if status == "failed":
+            return Outcome(cell, status, reason)
+        batch = getattr(method, "run_batch", None)
+        at_once = clocked_batch(batch) if batch is not None else None
         path.parent.mkdir(parents=True, exist_ok=True)
-        dataclasses.replace(trajectory, provenance=provenance).save(path)
+        provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
+        dataclasses.replace(trajectory, provenance=trajectory.provenance | provenance).save(path)
         held = getattr(method, "held", None)
         if held is not None:
             held().save(run.trajectory_path(cell.scene.name, f"{cell.method}-held", cell.seed))
     except Exception as error:
-        return Outcome(cell, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
-    return Outcome(cell, status, reason, seconds, recorded=True)
+        return failed(cell, error)
+    frames = frames_computed(trajectory)
+    return Outcome(
+        cell, status, reason, (reading.seconds,), frames, at_once, terms="+".join(scene.terms), recorded=True
+    )
 
 
-def judge(trajectory: Trajectory, scene: BuiltScene, *, cut_short: bool) -> tuple[str, str]:
-    """Status and reason of a row, from the trajectory's own status and from what is in it."""
+def clocked_batch(run_batch: Callable[[int], Trajectory]) -> float:
+    """Seconds per frame of a method that computes many frames at once."""
+    trajectory, reading = clocked(lambda: run_batch(BATCH))
+    return reading.seconds / trajectory.frames
+
+
+def judge(
+    trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, cut_short: bool
+) -> tuple[str, str]:
+    """Status and reason of a row: what the trajectory says of itself, what is in it, and what the clock says."""
     import numpy as np
 
     reason = " ".join(trajectory.reason.split())
+    if reading.complaint:
+        return "failed", f"its time cannot be believed: {reading.complaint}"
     if not np.isfinite(trajectory.positions).all():
         return "diverged", reason or "a position is not finite"
     if trajectory.frames < scene.frames:
@@ -73,3 +159,40 @@ def judge(trajectory: Trajectory, scene: BuiltScene, *, cut_short: bool) -> tupl
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
     return status, ("" if status == "ok" else reason)
+
+
+def frames_computed(trajectory: Trajectory) -> int:
+    """Frames that the run has made: a simulator is given the first one, and takes no time for it."""
+    given = not trajectory.frame_seconds[0] > 0.0  # zero or nan
+    return max(trajectory.frames - int(given), 1)
+
+
+def peak_memory() -> float:
+    """Most memory that this process has held at once [MB].
+
+    Linux keeps it per memory image; ru_maxrss there would still hold what the parent had before this process
+    loaded its own program.
+    """
+    import resource
+
+    try:
+        for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
+            if line.startswith("VmHWM:"):
+                return float(line.split()[1]) * 1024 / 1e6
+    except OSError:
+        pass  # not Linux
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak * (1 if sys.platform == "darwin" else 1024) / 1e6
+
+
+def loaded() -> tuple[str, ...]:
+    """Modules of ours, and the heavy packages, that this process has loaded."""
+    ours = {name for name in sys.modules if name.split(".")[0] in OURS}
+    return tuple(sorted(ours | {name for name in HEAVY if name in sys.modules}))
+
+
+def failed(cell: Cell, error: Exception) -> Outcome:
+    """The outcome of a cell that raised."""
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    memory = isinstance(error, MemoryError) or type(error).__name__ == "OutOfMemoryError"
+    return Outcome(cell, "out-of-memory" if memory else "failed", text)

@@ -1,19 +1,34 @@
 """Work that may hang or crash: done in a process of its own, which is ended at a deadline.
 
 A solver's own timeout is looked at between its iterations; a loop that never ends, or compiled code that
-takes the interpreter down with it, has to be stopped from outside.
+takes the interpreter down with it, has to be stopped from outside. The process leads a group of its own, so
+that what it has started ends with it; and it ends by itself when the parent does, however that went.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
+import sys
+import threading
 from collections.abc import Callable
+from multiprocessing.connection import wait
 from typing import Any
 
 
+PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
+
+
 class Broken(RuntimeError):
-    """The work did not come back: it ran past its deadline, or its process ended; the message says which."""
+    """The work did not come back; the message says why.
+
+    status: the word of a result row, "timeout", "out-of-memory" or "failed".
+    """
+
+    def __init__(self, message: str, status: str = "failed") -> None:
+        super().__init__(message)
+        self.status = status
 
 
 class Guarded:
@@ -40,23 +55,30 @@ class Guarded:
         try:
             self._pipe.send((function, arguments))
             if not self._pipe.poll(seconds):
-                raise Broken(f"no answer within {seconds:g} s")
+                raise Broken(f"no answer within {seconds:g} s", "timeout")
             fine, answer = self._pipe.recv()
         except (EOFError, ConnectionError):
             self._process.join()
             code = self._process.exitcode
-            self.close()
-            raise Broken(f"the process ended with status {code}") from None
-        except Broken:
-            self.close()
+            self._kill()
+            raise Broken(*how_it_ended(code)) from None
+        except BaseException:
+            self._kill()
             raise
         if fine:
             return answer
         raise answer
 
     def close(self) -> None:
-        """End the worker, whatever it does."""
+        """Let the worker end by itself, for it has nothing to do; then end all that it has started."""
         if self._process is not None:
+            self._pipe.close()
+            self._process.join(PATIENCE)
+            self._kill()
+
+    def _kill(self) -> None:
+        if self._process is not None:
+            end_group(self._process.pid)
             self._process.kill()
             self._process.join()
             self._pipe.close()
@@ -69,8 +91,53 @@ class Guarded:
         self.close()
 
 
+def how_it_ended(code: int) -> tuple[str, str]:
+    """Reason and status of a process that ended by itself with this exit code.
+
+    Nobody here kills a process that answers in time: a SIGKILL comes from a system that is out of memory.
+    """
+    if code >= 0:
+        return f"the process ended with status {code}", "failed"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    if name == "SIGKILL":
+        return "the process was killed by SIGKILL: the system was out of memory", "out-of-memory"
+    return f"the process was ended by {name}", "failed"
+
+
+def end_group(pid: int) -> None:
+    """Kill the process group led by `pid`, where the system has groups and this one still exists."""
+    if hasattr(os, "killpg"):
+        try:
+            if os.getpgid(pid) == pid:  # before it leads a group of its own it is in ours
+                os.killpg(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass  # it has ended
+
+
+def lead_a_group() -> None:
+    """Make this process the leader of its group, and end both when the parent is gone.
+
+    The parent alone answers an interrupt; it ends its workers.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "setpgrp"):
+        os.setpgrp()
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_follow, args=(parent.sentinel,), name="follow-parent", daemon=True).start()
+
+
+def _follow(parent: int) -> None:
+    wait([parent])
+    end_group(os.getpid())
+    os._exit(1)
+
+
 def _serve(pipe: Any) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent alone answers an interrupt
+    lead_a_group()
     while True:
         try:
             function, arguments = pipe.recv()
@@ -80,4 +147,5 @@ def _serve(pipe: Any) -> None:
             answer = (True, function(*arguments))
         except Exception as error:
             answer = (False, error)
+        sys.stderr.flush()
         pipe.send(answer)

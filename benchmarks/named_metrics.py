@@ -23,7 +23,8 @@ UNITS = {
     "penetration/deep": "%", "penetration": "mm", "intersections": "%", "deformation": "%",
     "dihedral": "deg", "drift": "mm", "dynamics": "mm", "gap": "1", "gradient": "1", "exact": "m",
     "time_error/curvature": "1/m", "time_error/order": "1", "time_error": "J",
-    "cost/frame": "ms", "cost/data": "s", "cost/train": "s", "cost/memory": "MB",
+    "cost/frame": "ms", "cost/batch": "ms", "cost/spread": "%", "cost/peak": "MB",
+    "cost/data": "s", "cost/train": "s", "cost/memory": "MB",
 } | {f"gap/found_by_{finder}": "frames" for finder in FINDERS}  # fmt: skip
 
 

@@ -50,7 +50,11 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Everything to be done. train and test are names of motions; files holds those read from files."""
+    """Everything to be done. train and test are names of motions; files holds those read from files.
+
+    only: states of the folder's records in which a piece of work is done again; fresh: all records are
+    forgotten first. workers: processes side by side where nothing is timed against another.
+    """
 
     preset: Preset
     suites: tuple[str, ...]
@@ -65,6 +69,9 @@ class Plan:
     device: str
     folder: Path
     command: str
+    only: frozenset[str] = frozenset(("stale", "missing"))
+    fresh: bool = False
+    workers: int = 1
 
     @property
     def scenes(self) -> tuple[Scene, ...]:
@@ -134,7 +141,8 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     train = train if test_names else tuple(name for name in train if name not in TEST)
     if not train:
         train = tuple(name for name in TRAIN if name not in test)
-    return Motions(train[: preset.train_motions], test[: preset.test_motions], files)
+    # Whoever names the test motions means all of them, whatever the size of the preset.
+    return Motions(train[: preset.train_motions], test if test_names else test[: preset.test_motions], files)
 
 
 def names_no_motion(scenes: Sequence[str]) -> bool:

@@ -12,6 +12,7 @@ from typing import Any
 
 from . import provenance
 from .plan import Plan
+from .records import Records
 from .results import Row, RunFolder, with_provenance
 
 
@@ -23,6 +24,8 @@ class Record:
         self.folder = RunFolder(plan.folder)
         self.hardware = provenance.hardware(plan.device)
         self.commit = provenance.commit()
+        self.records = Records(self.folder, only=plan.only, commit=self.commit)
+        self.reused: list[str] = []  # labels of what an earlier run in this folder had finished
         self.rows: list[Row] = []
         self.stages: list[dict[str, Any]] = []
         self.config: dict[str, Any] = {
@@ -33,6 +36,8 @@ class Record:
             "methods": list(dict.fromkeys(cell.method for cell in plan.cells)),
             "motions": {"train": list(plan.train), "test": list(plan.test)} if plan.needs_wardrobe else {},
             "seeds": list(plan.seeds),
+            "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
+            "workers": plan.workers,
             "commit": self.commit,
             "started": now(),
             "finished": None,
@@ -40,9 +45,20 @@ class Record:
             "versions": provenance.versions(),
             "preset_values": dataclasses.asdict(plan.preset),
             "stages": self.stages,
+            "earlier": self._earlier(),
         }
         plan.folder.mkdir(parents=True, exist_ok=True)
+        if plan.fresh:
+            self.records.forget_all()
         self.folder.write_config(self.config)
+
+    def _earlier(self) -> list[dict[str, Any]]:
+        """Earlier runs in this folder: their stages are the times of what this one reuses."""
+        if not self.folder.config_path.is_file():
+            return []
+        before = self.folder.read_config()
+        names = ("command", "commit", "started", "finished", "stages")
+        return [*before.get("earlier", []), {name: before.get(name) for name in names}]
 
     def note(self, name: str, value: Any) -> None:
         """Set an entry of run.json and write it."""

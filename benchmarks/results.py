@@ -151,10 +151,22 @@ class RunFolder:
     def records(self) -> Path:
         return self.path / "records"
 
+    def relative(self, path: Path) -> str:
+        """The name of a file inside the folder, as records keep it."""
+        return path.relative_to(self.path).as_posix()
+
     def trajectory_path(self, scene: str, method: str, seed: int = 0) -> Path:
         """trajectories/<scene>/<method>.vtkhdf; a slash, as in "dressed/walk", becomes a hyphen."""
         suffix = "" if seed == 0 else f"-seed{seed}"
         return self.trajectories / scene.replace("/", "-") / f"{method.replace('/', '-')}{suffix}.vtkhdf"
+
+    def start_path(self, scene: str) -> Path:
+        """The settled start (V,3) [m] of a dressed scene."""
+        return self.trajectory_path(scene, "settled").with_suffix(".npy")
+
+    def body_path(self, scene: str) -> Path:
+        """The posed body (T,B,3) [m] of a dressed scene: a process that simulates then needs no torch."""
+        return self.trajectory_path(scene, "body").with_suffix(".npy")
 
     def write_config(self, config: dict[str, Any]) -> None:
         """Write run.json whole or not at all."""

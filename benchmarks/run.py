@@ -27,6 +27,9 @@ from .plan import (
     runs,
 )
 from .presets import PRESETS, find_preset
+from .records import DEFAULT_ONLY, STATES
+from .results import RunFolder
+from .workers import worker_count
 
 PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:
@@ -80,6 +83,13 @@ def make_parser() -> argparse.ArgumentParser:
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks run (default cpu)")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
+    add("--only", action="append", default=[], metavar="STATE,...",
+        help="of what the folder holds already, do again what is failed, stale or missing (default "
+        "stale,missing; the finished is reused)")  # fmt: skip
+    add("--fresh", action="store_true", help="reuse nothing from the folder")
+    add("--workers", type=int, metavar="N",
+        help="processes side by side for ground truth, training and metrics (default 2, or the cores there "
+        "are); cells always run alone")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
     add("--dry-run", action="store_true", help="say what would be done; run nothing, write nothing")
     return parser
@@ -122,6 +132,10 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     seeds = parse_seeds(options.seeds)
     check_device(options.device)
     folder = choose_folder(options.out)
+    only = choose_states(split(options.only), fresh=options.fresh)
+    workers = worker_count() if options.workers is None else options.workers
+    if workers < 1:
+        raise PlanError(f"--workers {workers}: give a whole number, 1 or more")
     scenes = split(options.scenes)
     motions = Motions((), (), {})
     if options.motions or options.test_motions or not names_no_motion(scenes):
@@ -152,6 +166,9 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         seeds=seeds,
         device=options.device,
         folder=folder,
+        only=only,
+        fresh=options.fresh,
+        workers=workers,
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
 
@@ -172,6 +189,16 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     return seeds
 
 
+def choose_states(words: Sequence[str], *, fresh: bool) -> frozenset[str]:
+    """The states of records whose work is done again. Raises PlanError."""
+    for word in words:
+        if word not in STATES[1:]:
+            raise PlanError(f"--only: unknown state '{word}'; choose from {', '.join(STATES[1:])}")
+    if words and fresh:
+        raise PlanError("--fresh does everything again: leave out --only")
+    return frozenset(words or DEFAULT_ONLY)
+
+
 def check_device(device: str) -> None:
     """Raises PlanError where the device is unknown, absent or of no use."""
     if device not in ("cpu", "cuda"):
@@ -183,7 +210,10 @@ def check_device(device: str) -> None:
 
 
 def choose_folder(out: str | None) -> Path:
-    """The folder of the run, not created yet. Raises PlanError where it cannot be made or holds a run."""
+    """The folder of the run, not created yet. Raises PlanError where it cannot be made or holds other things.
+
+    A folder that holds a run is gone on with.
+    """
     if out is None:
         root = Path("reports") / "runs"
         stamp = datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
@@ -193,8 +223,8 @@ def choose_folder(out: str | None) -> Path:
         folder = Path(out)
         if folder.exists() and not folder.is_dir():
             raise PlanError(f"--out {out}: is a file; name a folder")
-        if folder.is_dir() and any(folder.iterdir()):
-            raise PlanError(f"--out {out}: is not empty; name a new folder")
+        if folder.is_dir() and any(folder.iterdir()) and not RunFolder(folder).config_path.is_file():
+            raise PlanError(f"--out {out}: is not empty and holds no run; name a new folder")
     parent = folder
     while not parent.exists():
         parent = parent.parent

@@ -1,25 +1,32 @@
 """The stages of a run, in order, each timed: wardrobe, ground truth, training, cells, metrics, report.
 
-What is written is written whole. A cell that fails is a row with its reason and the rest goes on.
+What is written is written whole, and what an earlier run in the same folder has finished is taken from there.
+A cell that fails is a row with its reason and the rest goes on.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import sys
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snug.recipe import learns_from_simulation
 
-from .cell import Outcome, run_cell
+from .agenda import Agenda
+from .cell import Outcome
+from .cells import LEFT_OUT, Cells
 from .methods import find_method
 from .plan import Cell, Plan, runs
 from .record import Record, now
+from .records import Work
 from .results import Row
+from .scenes import dressed_scene
+from .workers import Failure, Job, run_jobs
 
 if TYPE_CHECKING:
-    from .jobs import Trained
-    from .scene import BuiltScene
+    from .training import Trained
     from .wardrobe import Wardrobe
 
 
@@ -40,6 +47,8 @@ def execute(plan: Plan) -> int:
     failed = [row for row in record.rows if not accepted(row)]
     for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
         print(line, file=sys.stderr)
+    for line in stages.remarks():
+        print(line, file=sys.stderr)
     if made:
         print(record.folder.report_path.resolve(), flush=True)
     return 0 if made and not failed else 1
@@ -55,13 +64,16 @@ class Stages:
 
     def __init__(self, record: Record) -> None:
         self.record = record
-        self.plan, self.folder = record.plan, record.folder
+        self.plan, self.folder, self.records = record.plan, record.folder, record.records
+        self.agenda = Agenda(self.plan)
         self.trained: dict[tuple[str, int], Trained] = {}
         self.untrained: dict[tuple[str, int], str] = {}  # why a network could not be trained
+        self.unsettled: dict[str, str] = {}  # scene -> why its garment has no start
         self.data_seconds = 0.0
-        self.targets: list[str] = []  # training motions with a whole simulation
+        self.targets: dict[str, Path] = {}  # training motion -> its whole simulation
         self.wardrobe: Wardrobe | None = None
         self.naked = ""  # why there is no wardrobe
+        self.cells: Cells | None = None
 
     def run(self) -> None:
         """Everything but the report."""
@@ -77,7 +89,7 @@ class Stages:
                     self.train()
         if plan.cells:
             outcomes = self.cells_and_metrics()
-            failed = sum(outcome.status == "failed" for outcome in outcomes)
+            failed = sum(not outcome.recorded and outcome.status != "skipped" for outcome in outcomes)
             self.record.note("cells", {"run": sum(map(runs, plan.cells)), "failed": failed})
         if plan.checks:
             with self.record.stage("validation"):
@@ -116,151 +128,161 @@ class Stages:
         self.record.note("motion_sources", {name: motions_of[name].source for name in names})
 
     def ground_truth(self) -> None:
-        """Settle every dressed scene and simulate the training motions, two at a time."""
-        from . import jobs
-        from .workers import Failure, Job, run_jobs, worker_count
+        """Settle every dressed scene and simulate the training motions, some at a time."""
+        from . import ground_truth
 
         plan, preset = self.plan, self.plan.preset
         assert self.wardrobe is not None
-        simulated = [cell for cell in plan.cells if not find_method(cell.method).needs_body]
-        todo = []
-        for name in dict.fromkeys(cell.scene.name for cell in simulated if cell.scene.dressed):
-            todo.append(Job(name, jobs.settle, (name, preset, plan.folder), preset.settle_frames))
+        todo: dict[Work, Job] = {}
+        for scene in (scene for scene in plan.scenes if scene.dressed):
+            work, arguments = self.agenda.start(scene), (scene, preset, plan.folder)
+            todo[work] = Job(scene.name, ground_truth.settle, arguments, preset.settle_frames)
         for motion in plan.train if plan.needs_targets else ():
+            scene = dressed_scene(motion)
             units = preset.settle_frames + self.wardrobe.motions[motion].frames
-            todo.append(Job(motion, jobs.simulate_motion, (motion, preset, plan.folder), units))
-        results = run_jobs(todo, self.wardrobe, title="simulating", unit="frame")
-        unused = {}
-        for job, result in zip(todo, results):
-            if isinstance(result, jobs.Simulated):
-                self.data_seconds += result.seconds
-                if result.whole:
-                    self.targets.append(result.motion)
-                else:
-                    unused[result.motion] = f"{result.status}: {result.reason}"
+            work, arguments = self.agenda.data(motion), (scene, preset, plan.folder)
+            todo[work] = Job(motion, ground_truth.simulate_motion, arguments, units)
+        results = self.finished(todo, title="simulating", unit="frame")
+        unused, rough, frames = {}, {}, 0
+        for work, job in todo.items():
+            result = results[work]
+            if isinstance(result, Failure) and work.kind == "start":
+                self.unsettled[job.label] = result.reason
             elif isinstance(result, Failure):
                 unused[job.label] = result.reason
-        done = [result for result in results if isinstance(result, jobs.Simulated)]
-        rough = {r.motion: f"{r.status}: {r.reason}" for r in done if r.status != "converged"}
+            elif work.kind == "data":
+                simulated = ground_truth.Simulated(**result)
+                self.data_seconds += simulated.seconds
+                frames += simulated.frames
+                ending = f"{simulated.status}: {simulated.reason}"
+                if simulated.status != "converged":
+                    rough[job.label] = ending
+                if simulated.whole:
+                    self.targets[job.label] = self.folder.path / simulated.files[0]
+                else:
+                    unused[job.label] = ending
         self.record.note("data", {
-            "workers": worker_count(),
+            "workers": plan.workers,
             "seconds": self.data_seconds,
-            "frames": sum(result.frames for result in done),
+            "frames": frames,
             "not_converged": rough,
             "unused": unused,
         })  # fmt: skip
 
     def train(self) -> None:
-        """Train the networks, two at a time, one thread each."""
-        from . import jobs
-        from .workers import Failure, Job, run_jobs, worker_count
+        """Train the networks, some at a time, one thread each."""
+        from . import training
 
         plan = self.plan
         assert self.wardrobe is not None
-        todo = []
-        # The longest first: two workers then end at about the same time.
-        models = sorted(plan.models, key=lambda model: -plan.preset.steps_of(model[0]))
-        for kind, seed in models:
-            motions = self.targets if learns_from_simulation(kind) else list(plan.train)
-            steps = plan.preset.steps_of(kind)
-            arguments = (kind, seed, steps, motions, plan.folder, plan.device)
-            todo.append(Job(f"{kind} seed {seed}", jobs.train_network, arguments, steps))
-        results = run_jobs(todo, self.wardrobe, title="training", unit="step")
-        summary: dict[str, Any] = {"workers": worker_count()}
-        for (kind, seed), job, result in zip(models, todo, results):
+        todo: dict[Work, Job] = {}
+        networks: dict[Work, tuple[str, int]] = {}
+        # The longest first: the workers then end at about the same time.
+        for name, seed in sorted(plan.models, key=lambda model: -plan.preset.steps_of(model[0])):
+            simulated = learns_from_simulation(name)
+            motions: Mapping[str, Path | None] = self.targets if simulated else dict.fromkeys(plan.train)
+            steps = plan.preset.steps_of(name)
+            arguments = (name, seed, steps, motions, plan.folder, plan.device)
+            work = self.agenda.network(name, seed)
+            todo[work] = Job(f"{name} seed {seed}", training.train_network, arguments, steps)
+            networks[work] = name, seed
+        results = self.finished(todo, title="training", unit="step")
+        summary: dict[str, Any] = {"workers": plan.workers}
+        for work, job in todo.items():
+            result = results[work]
             if isinstance(result, Failure):
-                self.untrained[kind, seed] = result.reason
+                self.untrained[networks[work]] = result.reason
                 summary[job.label] = {"failed": result.reason}
             else:
-                self.trained[kind, seed] = result
+                trained = self.trained[networks[work]] = training.Trained(**result)
                 summary[job.label] = {
-                    "recipe": result.recipe,
-                    "seconds": result.seconds,
-                    "steps": result.steps,
-                    "last": result.final,
+                    "recipe": trained.recipe,
+                    "seconds": trained.seconds,
+                    "steps": trained.steps,
+                    "last": trained.final,
                 }
         self.record.note("training", summary)
 
+    def finished(self, todo: Mapping[Work, Job], *, title: str, unit: str) -> dict[Work, Any]:
+        """Of each piece of work its result, from its record or by a worker that writes one; or a Failure."""
+        found = {work: self.records.find(work) for work in todo}
+        wanted = [work for work in todo if found[work].wanted]
+        jobs = [dataclasses.replace(todo[work], work=work, records=self.records) for work in wanted]
+        ended = run_jobs(jobs, self.wardrobe, title=title, unit=unit, workers=self.plan.workers)
+        results: dict[Work, Any] = {
+            work: end if isinstance(end, Failure) else dataclasses.asdict(end)
+            for work, end in zip(wanted, ended)
+        }
+        for work, job in todo.items():
+            if work not in results:
+                result = found[work].result
+                results[work] = Failure(job.label, LEFT_OUT) if result is None else result
+                self.record.reused += [job.label] * (result is not None)
+        return results
+
     def cells_and_metrics(self) -> list[Outcome]:
-        """Cells one after another, nothing beside them; then metrics from their files, scene by scene."""
-        outcomes: list[Outcome] = []
-        built: dict[str, BuiltScene] = {}
+        """Cells one after another, alone; then metrics from their files, scenes side by side."""
+        self.cells = Cells(self.plan, self.agenda, self.records, self.wardrobe)
         with self.record.stage("cells"):
-            for cell in _bar(self.plan.cells, "cells", "cell"):
-                outcomes.append(self.one_cell(cell, built))
+            outcomes = [self.cells.first(c, self.obstacle(c)) for c in _bar(self.plan.cells, "cells", "cell")]
+        with self.record.stage("repeats"):
+            outcomes = self.cells.again(outcomes, bar=_bar)
+        self.record.reused += self.cells.reused
+        self.record.note("outdated", self.cells.outdated)
         with self.record.stage("metrics"):
-            for scene in _bar(self.plan.scenes, "metrics", "scene"):
-                of_scene = [outcome for outcome in outcomes if outcome.cell.scene == scene]
-                self.record.rows += self.measured(of_scene, built.get(scene.name))
+            self.record.rows += self.measured(outcomes)
             self.record.write_rows()
         return outcomes
 
-    def one_cell(self, cell: Cell, built: dict[str, BuiltScene]) -> Outcome:
+    def obstacle(self, cell: Cell) -> str | None:
+        """Why the cell cannot be run, or None."""
         entry = find_method(cell.method)
-        if reason := entry.skip(cell.scene):
-            return Outcome(cell, "skipped", reason)
         if cell.scene.dressed and self.naked:
-            return Outcome(cell, "failed", self.naked)
+            return self.naked
+        if cell.scene.name in self.unsettled:
+            return self.unsettled[cell.scene.name]
         if entry.trained and (reason := self.untrained.get((entry.trained, cell.seed))):
-            return Outcome(cell, "failed", f"its network could not be trained: {reason}")
-        try:
-            if cell.scene.name not in built:
-                built[cell.scene.name] = self.build(cell)
-        except Exception as error:
-            return Outcome(cell, "failed", one_line(error))
-        return run_cell(cell, built[cell.scene.name], self.folder, device=self.plan.device)
+            return f"its network could not be trained: {reason}"
+        return None
 
-    def build(self, cell: Cell) -> BuiltScene:
-        """The scene; a dressed one starts where the workers settled it, and its body is written as a mesh."""
-        scene = cell.scene.build(self.plan.preset, self.wardrobe)
-        if not cell.scene.dressed:
-            return scene
-        import numpy as np
-
-        from .jobs import start_path
-
-        path = start_path(self.folder, scene.name)
-        if path.is_file():
-            start = np.load(path)
-            scene = dataclasses.replace(scene, settle=lambda: start)
-        self.write_body(scene)
-        return scene
-
-    def write_body(self, scene: BuiltScene) -> None:
-        """trajectories/<scene>/body.vtkhdf, to look at the garments upon."""
-        import numpy as np
-
-        from reference_sim import Trajectory
-
-        assert scene.obstacle is not None
-        path = self.folder.trajectory_path(scene.name, "body")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        Trajectory(
-            positions=scene.obstacle.positions.astype(np.float32),  # for the eye: half the size
-            faces=scene.obstacle.faces,
-            times=np.arange(scene.frames) * scene.dt,
-            frame_seconds=np.full(scene.frames, np.nan),
-            provenance={"what": "the body of this scene"},
-        ).save(path)
-
-    def measured(self, outcomes: list[Outcome], scene: BuiltScene | None) -> list[Row]:
-        """The rows of all cells of one scene."""
-        from .evaluate import measure_scene, model_costs, rows_of
+    def measured(self, outcomes: list[Outcome]) -> list[Row]:
+        """The rows of all cells; metrics of those that have none yet are computed, scene by scene."""
+        from .measuring import jobs_of_scenes
+        from .rows import clock_costs, model_costs, rows_of
 
         recorded = [outcome for outcome in outcomes if outcome.recorded]
-        networks = [(find_method(o.cell.method).trained or "", o.cell.seed) for o in recorded]
-        costs = [model_costs(self.trained.get(network), self.data_seconds) for network in networks]
-        metrics: list[dict[str, float]] = []
-        try:
-            if scene is not None and recorded:
-                samples = self.plan.preset.gap_samples
-                metrics = measure_scene(recorded, scene, self.folder, costs, gap_samples=samples)
-        except Exception as error:
-            reason = f"metrics: {one_line(error)}"
-            failed = {o.cell: dataclasses.replace(o, status="failed", reason=reason) for o in recorded}
-            outcomes = [failed.get(outcome.cell, outcome) for outcome in outcomes]
-        by_cell = {outcome.cell: found for outcome, found in zip(recorded, metrics)}
-        return [row for outcome in outcomes for row in rows_of(outcome, by_cell.get(outcome.cell, {}), scene)]
+        works = {outcome.cell: self.agenda.metrics(outcome.cell) for outcome in recorded}
+        jobs = jobs_of_scenes(recorded, works, self.plan, self.records)
+        ended = run_jobs(
+            jobs, self.wardrobe, title="metrics", unit="cell", workers=self.plan.workers
+        )
+        reasons = {job.label: end.reason for job, end in zip(jobs, ended) if isinstance(end, Failure)}
+        rows = []
+        for outcome in outcomes:
+            found = self.records.find(works[outcome.cell]) if outcome.recorded else None
+            metrics: dict[str, float] = {}
+            if found is not None and found.state == "finished" and found.result is not None:
+                network = (find_method(outcome.cell.method).trained or "", outcome.cell.seed)
+                costs = model_costs(self.trained.get(network), self.data_seconds)
+                metrics = found.result | clock_costs(outcome) | costs
+            elif found is not None:
+                reason = f"metrics: {reasons.get(outcome.cell.scene.name, 'the worker ended')}"
+                outcome = dataclasses.replace(outcome, status="failed", reason=reason)
+            rows += rows_of(outcome, metrics)
+        return rows
+
+    def remarks(self) -> list[str]:
+        """What whoever reads the times should know, in a line each."""
+        lines = []
+        if self.record.reused:
+            lines.append(f"{len(self.record.reused)} results taken from earlier runs in this folder")
+        if self.cells is not None:
+            lines += [f"{label}: kept though {why} changed" for label, why in self.cells.outdated.items()]
+        wide = [r for r in self.record.rows if r.metric == "cost/spread" and r.reason]
+        labels = dict.fromkeys(f"{row.scene} x {row.method} ({row.value:.0f} %)" for row in wide)
+        if labels:
+            lines.append(f"repeats more than 20 % apart: {', '.join(labels)}")
+        return lines
 
     def make_report(self) -> bool:
         """tables/, figures/ and report.pdf from the files; a failure is said and leaves the results."""

@@ -1,20 +1,25 @@
 """Single-threaded worker processes for work that is not timed against other work: data and training.
 
 Each worker holds the wardrobe; a job is a module-level function of (wardrobe, tell, *arguments), where
-tell(n) reports n units of progress. A job that raises is a value here, not an end of the run.
+tell(n) reports n units of progress. A job that raises is a value here, not an end of the run. A job that is
+a piece of recorded work returns a dataclass with the names of its `files`; its worker writes the record, so
+that a run that is killed keeps every job that had ended.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import multiprocessing
 import queue
-import signal
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any
 
+from .guarded import lead_a_group
 from .provenance import usable_cores
+from .records import Records, Work
 from .wardrobe import Wardrobe
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
@@ -26,12 +31,17 @@ _progress: Any = None
 
 @dataclass(frozen=True)
 class Job:
-    """What to do: a label, the function, its arguments, and how many units of progress it is."""
+    """What to do: a label, the function, its arguments, and how many units of progress it is.
+
+    work and records: where the outcome is kept; None for what keeps its own.
+    """
 
     label: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     units: int
+    work: Work | None = None
+    records: Records | None = None
 
 
 @dataclass(frozen=True)
@@ -43,12 +53,16 @@ class Failure:
 
 
 def worker_count() -> int:
-    """Worker processes used on this machine."""
+    """Worker processes used on this machine unless the request names another number."""
     return min(WORKERS, usable_cores())
 
 
-def run_jobs(jobs: Sequence[Job], wardrobe: Wardrobe, *, title: str, unit: str) -> list[Any]:
+def run_jobs(
+    jobs: Sequence[Job], wardrobe: Wardrobe | None, *, title: str, unit: str, workers: int | None = None
+) -> list[Any]:
     """Results in the order of the jobs, a Failure where one raised. A bar shows the time left.
+
+    workers: processes side by side; None for worker_count().
 
     An interrupt ends the workers at once and is raised again; files are written whole or not at all by
     the jobs themselves.
@@ -62,10 +76,10 @@ def run_jobs(jobs: Sequence[Job], wardrobe: Wardrobe, *, title: str, unit: str) 
     with (
         tqdm(total=sum(job.units for job in jobs), desc=title, unit=unit, smoothing=0.05) as bar,
         ProcessPoolExecutor(
-            worker_count(), mp_context=context, initializer=_begin, initargs=(wardrobe, progress)
+            workers or worker_count(), mp_context=context, initializer=_begin, initargs=(wardrobe, progress)
         ) as pool,
     ):
-        futures = [pool.submit(_call, job.function, job.arguments) for job in jobs]
+        futures = [pool.submit(_call, job) for job in jobs]
         try:
             _watch(futures, progress, bar)
         except BaseException:
@@ -95,14 +109,20 @@ def _result(job: Job, future: Future[Any]) -> Any:
     return Failure(job.label, " ".join(f"{type(error).__name__}: {error}".split()))
 
 
-def _begin(wardrobe: Wardrobe, progress: Any) -> None:
-    """Set up a worker. The parent alone answers an interrupt, and ends its workers."""
+def _begin(wardrobe: Wardrobe | None, progress: Any) -> None:
+    """Set up a worker, which ends when its parent does."""
     global _wardrobe, _progress
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    lead_a_group()
     _wardrobe, _progress = wardrobe, progress
     # A report that nobody reads any more must not keep a worker alive.
     progress.cancel_join_thread()
 
 
-def _call(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    return function(_wardrobe, _progress.put, *arguments)
+def _call(job: Job) -> Any:
+    clock = time.perf_counter()
+    result = job.function(_wardrobe, _progress.put, *job.arguments)
+    if job.work is not None and job.records is not None:
+        files = [job.records.folder.path / name for name in result.files]
+        seconds = time.perf_counter() - clock
+        job.records.keep(job.work, dataclasses.asdict(result), seconds=seconds, files=files)
+    return result

@@ -24,9 +24,7 @@ def build(name: str, preset: Preset, wardrobe: Wardrobe) -> BuiltScene:
     motion = wardrobe.motions[name.split("/", 1)[1]]
     cloth = Cloth(garment.rest_positions, garment.faces, Material())
     energies = declared_energies(cloth)
-    obstacle = Obstacle(
-        body.vertices(motion.poses, motion.translations), body.faces, rest_positions=body.shaped()
-    )
+    obstacle = Obstacle(wardrobe.posed_body(motion.name), body.faces, rest_positions=body.shaped())
     return BuiltScene(
         name=name,
         cloth=cloth,

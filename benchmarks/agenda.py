@@ -1,0 +1,151 @@
+"""The pieces of work that a plan asks for, each known by its inputs and code before anything is run.
+
+Ground truth, networks, cells, repeats and metrics hang on one another by their keys: what is stale makes
+stale what was made from it. Loads nothing heavy: a dry run asks the same questions as a run.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from functools import cached_property, lru_cache
+from typing import Any
+
+from snug.recipe import DEFAULT, TRAININGS
+
+from . import provenance
+from .clips import SUFFIX
+from .fingerprint import ROOT, code_of, digest, digest_of_file, preset_values
+from .methods import find_method
+from .plan import Cell, Plan, runs
+from .records import Work
+from .scene import Scene
+from .scenes import dressed_scene
+
+REFERENCE = "simulation"
+DATA_FILES = "snug/data/*.npz"  # what the modules of snug read
+
+
+class Agenda:
+    """Works of a plan by kind; equal questions get equal answers."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+
+    @cached_property
+    def machine(self) -> dict[str, Any]:
+        """Where and with what: times of another machine or library are not reused."""
+        facts = provenance.hardware(self.plan.device)
+        names = ("processor", "cores", "python", "device", "accelerator")
+        return {name: facts[name] for name in names if name in facts} | provenance.versions()
+
+    def start(self, scene: Scene) -> Work:
+        """The garment settled in the first pose of a dressed scene, and the posed body."""
+        return self._on_body("start", scene)
+
+    def data(self, motion: str) -> Work:
+        """The simulation of a training motion."""
+        return self._on_body("data", dressed_scene(motion))
+
+    def network(self, kind: str, seed: int) -> Work:
+        """A trained network."""
+        training, plan = TRAININGS.get(kind), self.plan
+        code = code_of("benchmarks.training", "benchmarks.wardrobe")
+        inputs = self._inputs(code) | {
+            "kind": kind,
+            "seed": seed,
+            "steps": plan.preset.steps_of(kind),
+            "recipe": dataclasses.asdict(training.recipe if training else DEFAULT),
+            "motions": {name: self._motion(name) for name in plan.train},
+        }
+        if training and training.simulated:
+            inputs["targets"] = [self.data(name).key for name in plan.train]
+        return Work("network", f"{kind}-seed{seed}", inputs, code)
+
+    def cell(self, cell: Cell) -> Work:
+        """The trajectory of a method in a scene, timed once."""
+        entry = find_method(cell.method)
+        code = code_of("benchmarks.cell", cell.scene.module, entry.module)
+        inputs = self._scene(cell.scene, code) | {"method": _declared(entry)}
+        if entry.seeded:
+            inputs["seed"] = cell.seed
+        if entry.needs_body:
+            inputs["recipe"] = dataclasses.asdict(DEFAULT)
+        if cell.scene.dressed:
+            inputs["start"] = self.start(cell.scene).key
+        if entry.trained:
+            inputs["network"] = self.network(entry.trained, cell.seed).key
+        return Work("cell", name_of(cell), inputs, code)
+
+    def repeat(self, cell: Cell, number: int) -> Work:
+        """The same once more, for its time alone."""
+        first = self.cell(cell)
+        return Work("repeat", f"{name_of(cell)}-{number}", {"cell": first.key}, first.code)
+
+    def metrics(self, cell: Cell) -> Work:
+        """What is measured of a cell's trajectory, beside those of the reference."""
+        code = code_of("benchmarks.evaluate", cell.scene.module)
+        near = [c for c in self.plan.cells if c.scene == cell.scene and c.method.startswith(REFERENCE)]
+        inputs = {
+            "cell": self.cell(cell).key,
+            "references": [self.cell(other).key for other in near if runs(other)],
+            "suites": sorted(cell.suites),
+            "samples": self.plan.preset.gap_samples,
+        }
+        return Work("metrics", name_of(cell), inputs, code)
+
+    def all(self) -> Iterator[Work]:
+        """Every piece of work in the order of a run; skipped cells are none."""
+        for scene in self.plan.scenes:
+            if scene.dressed:
+                yield self.start(scene)
+        if self.plan.needs_targets:
+            yield from (self.data(motion) for motion in self.plan.train)
+        yield from (self.network(kind, seed) for kind, seed in self.plan.models)
+        cells = [cell for cell in self.plan.cells if runs(cell)]
+        yield from map(self.cell, cells)
+        yield from map(self.metrics, cells)
+
+    def _on_body(self, kind: str, scene: Scene) -> Work:
+        code = code_of("benchmarks.ground_truth", scene.module)
+        return Work(kind, flat(scene.name), self._scene(scene, code), code)
+
+    def _scene(self, scene: Scene, code: Mapping[str, str]) -> dict[str, Any]:
+        inputs = self._inputs(code) | {"scene": _declared(scene)}
+        if scene.dressed:
+            inputs["motion"] = self._motion(scene.name.split("/", 1)[1])
+        return inputs
+
+    def _inputs(self, code: Mapping[str, str]) -> dict[str, Any]:
+        inputs = {"preset": preset_values(self.plan.preset, code), "machine": self.machine}
+        if any(path.startswith("snug/") for path in code):
+            inputs["files"] = _data_files()
+        return inputs
+
+    def _motion(self, name: str) -> str:
+        """Of a file its content; an embedded one, or part of one, is made by code, looked at by itself."""
+        whole = name.partition(SUFFIX)[0]
+        return f"{name} {digest(self.plan.files[whole])}" if whole in self.plan.files else name
+
+
+def name_of(cell: Cell) -> str:
+    """The name of a cell's records: <scene>/<method>, and the seed where it is not 0."""
+    return f"{flat(cell.scene.name)}/{cell.method}" + (f"-seed{cell.seed}" if cell.seed else "")
+
+
+def flat(scene: str) -> str:
+    """The name of a scene as part of a path."""
+    return scene.replace("/", "-")
+
+
+def _declared(entry: Any) -> dict[str, Any]:
+    """What a scene or a method declares, but for the words about it."""
+    fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
+    fields.pop("description")
+    return {name: dict(value) if isinstance(value, Mapping) else value for name, value in fields.items()}
+
+
+@lru_cache(maxsize=1)
+def _data_files() -> dict[str, str]:
+    found = sorted(ROOT.glob(DATA_FILES))
+    return {path.relative_to(ROOT).as_posix(): digest_of_file(path) for path in found}

@@ -1,0 +1,100 @@
+"""The one clock: monotonic, stopped only when every position is there and nothing works on.
+
+What it counts is `run()` and the touching of every frame. Loading, compiling, warming up, metrics and writing
+are outside. A method that comes back before its work is done is found out: its positions still change, its
+process still computes, or it has used more processor than one thread can.
+"""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import sys
+import threading
+import time
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from reference_sim import Trajectory
+
+AFTER = 0.05  # [s] for which the process is watched once the clock has stopped
+BUSY = 0.3  # share of that time which the processor may be at work
+CROWDED = 1.3  # processor seconds per second on the clock, beyond which more than one thread has worked
+GRAIN = 0.05  # [s] below which processor time is too coarse to be compared
+SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
+
+
+@dataclass(frozen=True)
+class Reading:
+    """seconds: on the clock. complaint: why they cannot be believed, or empty."""
+
+    seconds: float
+    complaint: str = ""
+
+
+def clocked(run: Callable[[], Trajectory]) -> tuple[Trajectory, Reading]:
+    """What run() gives, and the time until all of it is there."""
+    gc.collect()  # what preparing has left is not charged to the run
+    before = set(threading.enumerate())
+    children = set(multiprocessing.active_children())
+    _synchronise()
+    used, clock = time.process_time(), time.perf_counter()
+    trajectory = run()
+    touch(trajectory.positions)
+    _synchronise()
+    seconds, used = time.perf_counter() - clock, time.process_time() - used
+    complaint = _still_at_work(trajectory.positions, before, children)
+    if not complaint and used > CROWDED * seconds + GRAIN:
+        complaint = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked"
+    return trajectory, Reading(seconds, complaint)
+
+
+def touch(positions: np.ndarray) -> float:
+    """Read every number of (T,V,3): what is made only when looked at is made now."""
+    import numpy as np
+
+    return float(np.add.reduce(np.asarray(positions), axis=None))
+
+
+def spread(seconds: Sequence[float]) -> float:
+    """How far repeats lie apart: largest less smallest, as a share of their median [1]."""
+    ordered = sorted(seconds)
+    return (ordered[-1] - ordered[0]) / median(ordered)
+
+
+def median(seconds: Sequence[float]) -> float:
+    """The middle one, or the mean of the two in the middle."""
+    ordered, half = sorted(seconds), len(seconds) // 2
+    return ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2
+
+
+def _still_at_work(
+    positions: np.ndarray, threads: set[threading.Thread], children: set[multiprocessing.process.BaseProcess]
+) -> str:
+    """Watch the process for a moment: what does it do after it said that it was done?"""
+    import numpy as np
+
+    seen = zlib.crc32(np.asarray(positions).tobytes())
+    used, clock = time.process_time(), time.perf_counter()
+    time.sleep(AFTER)
+    busy = (time.process_time() - used) / (time.perf_counter() - clock)
+    if zlib.crc32(np.asarray(positions).tobytes()) != seen:
+        return "positions still changed after run() had come back"
+    if busy > BUSY:
+        return f"the process was still at work ({100 * busy:.0f} %) after run() had come back"
+    # The progress bar keeps a thread that sleeps; it moves no vertex.
+    left = [t.name for t in set(threading.enumerate()) - threads if type(t).__name__ != "TMonitor"]
+    left += [child.name for child in set(multiprocessing.active_children()) - children]
+    return f"{left[0]} was still running after run() had come back" if left else ""
+
+
+def _synchronise() -> None:
+    """Wait for the accelerator, where this process has begun to use one."""
+    torch = sys.modules.get("torch")
+    if torch is not None and torch.cuda.is_initialized():
+        torch.cuda.synchronize()

@@ -1,0 +1,64 @@
+"""Metrics of the cells of one scene, in a worker: nothing is timed here, so two scenes go side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from .agenda import REFERENCE
+from .cell import Outcome, Task, built
+from .ground_truth import Tell
+from .methods import find_method
+from .plan import Cell, Plan
+from .presets import Preset
+from .records import Records, Work
+from .results import RunFolder
+from .wardrobe import Wardrobe
+from .workers import Job
+
+
+def jobs_of_scenes(
+    recorded: Sequence[Outcome], works: Mapping[Cell, Work], plan: Plan, records: Records
+) -> list[Job]:
+    """One job for each scene with cells that have no metrics yet; the largest first."""
+    jobs = []
+    for scene in plan.scenes:
+        outcomes, wanted = [], []
+        for outcome in (outcome for outcome in recorded if outcome.cell.scene == scene):
+            work = works[outcome.cell]
+            missing = records.find(work).state != "finished"
+            if missing or outcome.cell.method.startswith(REFERENCE):
+                outcomes.append(outcome)
+                wanted.append(work if missing else None)
+        count = sum(work is not None for work in wanted)
+        if count:
+            arguments = (tuple(outcomes), tuple(wanted), plan.preset, records)
+            jobs.append(Job(scene.name, measure, arguments, count))
+    return sorted(jobs, key=lambda job: -job.units)
+
+
+def measure(
+    wardrobe: Wardrobe | None,
+    tell: Tell,
+    outcomes: Sequence[Outcome],
+    wanted: Sequence[Work | None],
+    preset: Preset,
+    records: Records,
+) -> None:
+    """Measure recorded cells of one scene beside each other, and write the records of those that are wanted.
+
+    The others, None in `wanted`, are there because the wanted ones are compared with them.
+    """
+    from .evaluate import measure_scene
+
+    folder: Path = records.folder.path
+    cell = outcomes[0].cell
+    task = Task(
+        cell=cell, entry=find_method(cell.method), preset=preset, wardrobe=wardrobe, folder=folder,
+        device="cpu",
+    )  # fmt: skip
+    found = measure_scene(outcomes, built(task), RunFolder(folder), gap_samples=preset.gap_samples)
+    for work, metrics in zip(wanted, found):
+        if work is not None:
+            records.keep(work, metrics, seconds=0.0)
+            tell(1)

@@ -1,0 +1,82 @@
+"""Training of one network in a worker; see benchmarks.workers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from .ground_truth import Tell
+from .results import RunFolder
+from .wardrobe import Wardrobe
+
+LOG_EVERY = 20  # training steps between two reports of progress
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A trained network: wall seconds of training, size [MB] and the means of its last logged steps.
+
+    files: the model, in the run's folder.
+    """
+
+    kind: str
+    seed: int
+    recipe: str
+    seconds: float
+    megabytes: float
+    steps: int
+    final: dict[str, float]
+    files: tuple[str, ...]
+
+
+def train_network(
+    wardrobe: Wardrobe,
+    tell: Tell,
+    name: str,
+    seed: int,
+    steps: int,
+    motions: Mapping[str, Path | None],
+    folder: Path,
+    device: str,
+) -> Trained:
+    """Train the network of that name (or make an untrained one) and write it to models/.
+
+    motions: name -> file of its simulation, which is read where the network learns from one.
+    """
+    import torch
+
+    from reference_sim import Trajectory
+    from snug.dresser import DressedBody
+    from snug.recipe import TRAININGS
+    from snug.train import train, untrained_model
+
+    from .methods.networks import model_path
+
+    torch.set_num_threads(1)
+    dressed = DressedBody(wardrobe.body, wardrobe.garment)
+    clips = wardrobe.named(motions)
+    if name == "untrained":
+        model = untrained_model("snug", dressed, clips, seed=seed)
+    else:
+        training = TRAININGS[name]
+        targets = None
+        if training.simulated:
+            targets = {m: Trajectory.load(path).positions for m, path in motions.items() if path}
+        told = 0
+
+        def log(row: dict[str, float]) -> None:
+            nonlocal told
+            tell(int(row["step"]) - told)
+            told = int(row["step"])
+
+        model = train(
+            training.kind, dressed, clips, steps=steps, seed=seed, trajectories=targets,
+            recipe=training.recipe, log=log, progress=False, every=LOG_EVERY,
+        )  # fmt: skip
+    run = RunFolder(folder)
+    path = model_path(run.models, name, seed)
+    model.save(path)
+    final = dict(model.history[-1]) if model.history else {}
+    recipe, steps, files = model.recipe.name, model.steps, (run.relative(path),)
+    return Trained(name, seed, recipe, model.seconds, model.megabytes, steps, final, files)
