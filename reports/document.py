@@ -10,6 +10,7 @@ from typing import Any
 
 from benchmarks.results import Row
 from reports import findings as paper_findings
+from reports import study_tables
 from reports.canvas import Picture
 from reports.configuration import configuration
 from reports.layout import Block, figure_block, list_block, table_block
@@ -39,6 +40,7 @@ CAPTIONS = {
     "refusals": "Inputs that have to be refused before anything is solved, and what each was told.",
     "unfinished": "Cells that failed or were skipped, with the reason each gave.",
     **paper_findings.CAPTIONS,
+    **study_tables.CAPTIONS,
 }
 
 # Tables 1 to 3 of the paper, as it prints them, by column. A column that it does not report is a dash.
@@ -65,7 +67,7 @@ PAPER = {
     },
 }  # fmt: skip
 
-GROUPED = {"energies_by_scene": ("scene",), "speed": ("scene",)}
+GROUPED = {"energies_by_scene": ("scene",), "speed": ("scene",), **study_tables.GROUPED}
 NOTES = {
     "energies": "In grey the values printed by the paper, for its own garment, motions, contact and zero of "
     "gravity: for orientation only, they enter no mean of ours.",
@@ -97,13 +99,13 @@ def document(
         },
         {
             "title": "Validation: known answers",
-            "blocks": _figures(rest, "validation", "dots") + _tables(tables, "validation"),
+            "blocks": _figures(rest, "validation", "dots") + _tables(tables, "laws", "validation"),
         },
         {
             "title": "Extremes: where it breaks",
             "blocks": _figures(rest, "extremes", "maps")
             + _figures(rest, "extremes", "outcomes")
-            + _tables(tables, "extremes", "refusals"),
+            + _tables(tables, "hard_motions", "extremes", "refusals"),
         },
         {"title": "What did not run to its end", "blocks": _trouble(tables, problems)},
     ]
@@ -164,7 +166,7 @@ def _garments(tables: dict[str, Table], pictures: Sequence[Picture]) -> list[Blo
         *_figures(pictures, "garments", "frames"),
         *_figures(pictures, "garments", "series"),
         *_with_paper(tables, "curvature"),
-        *_tables(tables, "dynamics", "penetration", "shape"),
+        *_tables(tables, "dependence", "dynamics", "penetration", "shape"),
         *_with_paper(tables, "cost"),
         *_tables(tables, "findings", "recipes"),
         *_figures(pictures, "garments", "speed"),

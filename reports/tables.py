@@ -12,6 +12,7 @@ from benchmarks.results import Row
 from reports.findings import findings, recipes
 from reports.garment_tables import cost, curvature, dynamics, energies, energies_by_scene, geometry, shape
 from reports.stability import refusals
+from reports.study_tables import dependence, hard_motions, laws
 from reports.summary import Measurements, excess_energy, speed_measurements, suite_rows
 from reports.table import Cell, Column, Table
 
@@ -142,7 +143,10 @@ MAKERS = (
     recipes,
     speed,
     validation,
+    laws,
+    dependence,
     extremes,
+    hard_motions,
     refusals,
     unfinished,
     metrics,

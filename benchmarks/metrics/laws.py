@@ -55,6 +55,7 @@ class LawSeries:
     residual and residual_rms: of grad Psi, largest component and root mean square [mean vertex weights].
     """
 
+    weight: float  # [N] of the whole cloth
     force: Floats
     torque: Floats
     rise: Floats
@@ -62,7 +63,6 @@ class LawSeries:
     size: Floats
     residual: Floats
     residual_rms: Floats
-    weight: float  # [N] of the whole cloth
 
     def metrics(self) -> dict[str, float]:
         """Means over frames, and shares of frames [%] that break an inequality."""
@@ -119,7 +119,7 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
             if frame >= FIRST_FULL_FRAME:
                 found[k].append(_one_step(scene, own[k], step, trajectories[k][frame], pivots[frame]))
     weight = float(scene.cloth.masses.sum() * GRAVITY)
-    return [LawSeries(*np.array(steps).T, weight) for steps in found]
+    return [LawSeries(weight, *np.array(steps).T) for steps in found]
 
 
 def _step(scene: BuiltScene, x: Floats, frame: int) -> Step:

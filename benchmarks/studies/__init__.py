@@ -19,4 +19,16 @@ STUDIES = (
         suite="garments",
         module="benchmarks.studies.long_roll_outs",
     ),
+    Study(
+        name="dependence",
+        description="every headline number of the T-shirt on other meshes and at other time steps",
+        suite="validation",
+        module="benchmarks.studies.dependence",
+    ),
+    Study(
+        name="hard_motions",
+        description="networks and simulator: too fast, too far, too large, with glitches, for 10,000 frames",
+        suite="extremes",
+        module="benchmarks.studies.hard_motions",
+    ),
 )

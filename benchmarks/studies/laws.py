@@ -57,7 +57,9 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
 
 def has_laws(method: str) -> bool:
     """Methods worth asking: the reference, the free baseline and what was trained."""
-    return method in (REFERENCE, "skinning") or find_method(method).trained not in (None, "untrained")
+    entry = find_method(method)
+    network = entry.trained not in (None, "untrained") and not entry.cut_short
+    return method in (REFERENCE, "skinning") or network
 
 
 def _of_scene(scene: BuiltScene, cells: list[Cell], folder: RunFolder, references: list[Kept]) -> list[Row]:
