@@ -33,6 +33,12 @@ class Potential:
                 raise ValueError(f"energy {energy.name!r} was built on another cloth: use one for all")
         self._patterns: dict[tuple[bytes, int], HessianPattern] = {}
 
+    @property
+    def time_step(self) -> float | None:
+        """dt [s] of the inertia among the terms; None for a static potential."""
+        steps = (energy.parameters()["dt_s"] for energy in self.energies if energy.name == "inertia")
+        return next(steps, None)
+
     def prepare(self, step: Step) -> None:
         """Freeze in every term what it needs for one step."""
         for energy in self.energies:

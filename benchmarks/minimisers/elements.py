@@ -7,15 +7,21 @@ vertices between one element and the next. Tests hold them to the energies' grad
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
 
-from reference_sim import Potential
-from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
-from reference_sim.energies.energy import Energy
+if TYPE_CHECKING:
+    from reference_sim import Potential
+    from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Inertia, StretchStVK
 
 
+# By the names of the classes: a term that the potential does not have is not even imported.
+KINDS = {
+    "Inertia": "inertia", "Gravity": "gravity", "StretchStVK": "strain", "BendHinge": "bending",
+    "ContactPenalty": "contact",
+}  # fmt: skip
 FAR = 100.0  # [m] from the guess: nowhere
 
 
@@ -32,13 +38,9 @@ class Terms:
 
 def terms_of(potential: Potential, sweeper: str) -> Terms:
     """The terms that the sweeps know. Raises ValueError naming the term that `sweeper` has no sweep for."""
-    kinds = {
-        "inertia": Inertia, "gravity": Gravity, "strain": StretchStVK, "bending": BendHinge,
-        "contact": ContactPenalty,
-    }  # fmt: skip
-    found: dict[str, Energy | None] = dict.fromkeys(kinds)
+    found: dict[str, Energy | None] = dict.fromkeys(KINDS.values())
     for energy in potential.energies:
-        kind = next((kind for kind, cls in kinds.items() if type(energy) is cls), None)
+        kind = KINDS.get(type(energy).__name__)
         if kind is None or found[kind] is not None:
             raise ValueError(f"{sweeper} has no sweep for the term {energy.name!r}: use newton or lbfgs")
         found[kind] = energy

@@ -21,6 +21,7 @@ PARTS = {
     "minimisers": "Newton and L-BFGS over the same walk, beside two starts 0.1 mm apart",
     "guesses": "potential above the minimum of each initial guess of a step",
     "scaling": "cost of an iteration and peak memory from 1k to 64k vertices",
+    "left_out": "with and without a body, hinges, inertia, networks that a scene does not need",
     "linear": "sparse Cholesky packages on the same Hessian: analyse, factorise, solve",
     "peers": "newton's VBD and XPBD on the same sheet, step and masses (extra `peers`)",
 }
