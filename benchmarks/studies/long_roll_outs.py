@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from ..plan import Plan
     from ..wardrobe import Wardrobe
 
-SUITE, SCENE = "roll-outs", "there_and_back"  # a suite of rows alone: means over scenes of garments stay clean
+# A suite of rows alone: means over the scenes of garments stay clean.
+SUITE, SCENE = "roll-outs", "there_and_back"
 FRAMES, ENDS = 1000, 100
 FIRST_FULL = 2
 MM = 1e3
