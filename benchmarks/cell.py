@@ -18,6 +18,8 @@ from .method import MethodEntry
 from .results import RunFolder
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from reference_sim import Trajectory
 
     from .plan import Cell
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 WORDS = {"converged": "ok", "ok": "ok", "stalled": "stalled", "diverged": "diverged", "timeout": "timeout"}
 OURS = ("reference_sim", "snug", "benchmarks")
 HEAVY = ("torch", "igl", "numba", "scipy", "h5py")  # what a scene may do without
-BATCH = 16  # frames at once, where a method can
+BATCH = 16  # bodies at once, where a method can
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def perform_again(task: Task) -> Outcome:
             models=RunFolder(task.folder).models, seed=task.cell.seed, device=task.device
         )
         method.prepare(built(task))
-        _, reading = clocked(method.run)
+        _, reading = clocked(method.run, of=lambda made: made.positions)
     except Exception as error:
         return failed(task.cell, error)
     status = "failed" if reading.complaint else "ok"
@@ -111,12 +113,12 @@ def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder, 
     try:
         method = entry.make(models=run.models, seed=cell.seed, device=device)
         method.prepare(scene)
-        trajectory, reading = clocked(method.run)
+        trajectory, reading = clocked(method.run, of=lambda made: made.positions)
         status, reason = judge(trajectory, reading, scene, cut_short=entry.cut_short)
         if status == "failed":
             return Outcome(cell, status, reason)
-        batch = getattr(method, "run_batch", None)
-        at_once = clocked_batch(batch) if batch is not None else None
+        ready = getattr(method, "ready_batch", None)
+        at_once = throughput(ready(BATCH)) if ready is not None else None
         path.parent.mkdir(parents=True, exist_ok=True)
         provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
         dataclasses.replace(trajectory, provenance=trajectory.provenance | provenance).save(path)
@@ -131,16 +133,16 @@ def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder, 
     )
 
 
-def clocked_batch(run_batch: Callable[[int], Trajectory]) -> float:
-    """Seconds per frame of a method that computes many frames at once."""
-    trajectory, reading = clocked(lambda: run_batch(BATCH))
-    return reading.seconds / trajectory.frames
+def throughput(run: Callable[[], np.ndarray]) -> float:
+    """Seconds per frame of a method that computes many bodies at once, (T, copies, V, 3)."""
+    positions, reading = clocked(run, of=lambda made: made)
+    return reading.seconds / (positions.shape[0] * positions.shape[1])
 
 
 def judge(
     trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, cut_short: bool
 ) -> tuple[str, str]:
-    """Status and reason of a row: what the trajectory says of itself, what is in it, and what the clock says."""
+    """Status and reason of a row, from what the trajectory says of itself, what is in it, and the clock."""
     import numpy as np
 
     reason = " ".join(trajectory.reason.split())

@@ -15,12 +15,10 @@ import time
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     import numpy as np
-
-    from reference_sim import Trajectory
 
 AFTER = 0.05  # [s] for which the process is watched once the clock has stopped
 BUSY = 0.3  # share of that time which the processor may be at work
@@ -37,25 +35,30 @@ class Reading:
     complaint: str = ""
 
 
-def clocked(run: Callable[[], Trajectory]) -> tuple[Trajectory, Reading]:
-    """What run() gives, and the time until all of it is there."""
+Made = TypeVar("Made")
+
+
+def clocked(
+    run: Callable[[], Made], *, of: Callable[[Made], np.ndarray]
+) -> tuple[Made, Reading]:
+    """What run() gives, and the time until all positions `of` it are there."""
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())
     children = set(multiprocessing.active_children())
     _synchronise()
     used, clock = time.process_time(), time.perf_counter()
-    trajectory = run()
-    touch(trajectory.positions)
+    made = run()
+    touch(of(made))
     _synchronise()
     seconds, used = time.perf_counter() - clock, time.process_time() - used
-    complaint = _still_at_work(trajectory.positions, before, children)
+    complaint = _still_at_work(of(made), before, children)
     if not complaint and used > CROWDED * seconds + GRAIN:
         complaint = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked"
-    return trajectory, Reading(seconds, complaint)
+    return made, Reading(seconds, complaint)
 
 
 def touch(positions: np.ndarray) -> float:
-    """Read every number of (T,V,3): what is made only when looked at is made now."""
+    """Read every number: what is made only when looked at is made now."""
     import numpy as np
 
     return float(np.add.reduce(np.asarray(positions), axis=None))

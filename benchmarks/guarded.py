@@ -13,9 +13,9 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import wait
 from typing import Any
-
 
 PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
 
@@ -108,13 +108,10 @@ def how_it_ended(code: int) -> tuple[str, str]:
 
 
 def end_group(pid: int) -> None:
-    """Kill the process group led by `pid`, where the system has groups and this one still exists."""
+    """Kill the process group that `pid` led or leads, where the system has groups and this one exists."""
     if hasattr(os, "killpg"):
-        try:
-            if os.getpgid(pid) == pid:  # before it leads a group of its own it is in ours
-                os.killpg(pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass  # it has ended
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(pid, signal.SIGKILL)
 
 
 def lead_a_group() -> None:

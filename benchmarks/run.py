@@ -24,7 +24,6 @@ from .plan import (
     choose_studies,
     choose_suites,
     names_no_motion,
-    runs,
 )
 from .presets import PRESETS, find_preset
 from .records import DEFAULT_ONLY, STATES
@@ -39,6 +38,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
   python -m benchmarks.run --scenes 'dressed/*' --methods snug,skinning,simulation --seeds 0,1,2
   python -m benchmarks.run --motions clips/ --test-motions 01_01
+  python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
 
 motions: without --motions the embedded library, which has its own test set. With --motions the files
@@ -46,6 +46,10 @@ motions: without --motions the embedded library, which has its own test set. Wit
   others train. Without it the library's test set tests; of files alone the first by name tests and
   the others train; a single file tests and the library trains. Files are brought to 30 frames per
   second, placed on the floor, arms spread clear of the torso, and cut to the preset's length.
+
+a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
+  as it is, the rest is done. A run that was killed is so taken up again. --only failed does again what
+  failed, --fresh everything.
 
 exit status: 0 when every cell ended as ok or as an explained skip (in extremes an honest failure with
   its reason is an accepted outcome); 1 when a cell failed: its row says why and the rest went on;
@@ -91,7 +95,7 @@ def make_parser() -> argparse.ArgumentParser:
         help="processes side by side for ground truth, training and metrics (default 2, or the cores there "
         "are); cells always run alone")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
-    add("--dry-run", action="store_true", help="say what would be done; run nothing, write nothing")
+    add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
     return parser
 
 
@@ -114,6 +118,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     if options.dry_run:
+        from .outlook import describe
+
         print(describe(plan))
         return 0
     from .stages import execute
@@ -231,32 +237,6 @@ def choose_folder(out: str | None) -> Path:
     if not (parent.is_dir() and os.access(parent, os.W_OK | os.X_OK)):
         raise PlanError(f"--out {folder}: {parent} cannot be written to; name another folder")
     return folder
-
-
-def describe(plan: Plan) -> str:
-    """What a run of the plan would do, in a few lines and one line a cell."""
-    skipped = sum(not runs(cell) for cell in plan.cells)
-    lines = [
-        f"preset {plan.preset.name}: {plan.preset.description}",
-        f"folder {plan.folder}",
-        f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}",
-    ]
-    if plan.needs_wardrobe:
-        lines.append(f"T-shirt of about {plan.preset.garment_vertices} vertices")
-        lines.append(f"test motions {', '.join(plan.test)}")
-    if plan.needs_training_motions:
-        targets = "simulated for the supervised network" if plan.needs_targets else "not simulated"
-        lines.append(f"training motions {', '.join(plan.train)} ({targets})")
-        for kind, seed in plan.models:
-            lines.append(f"train {kind}, seed {seed}: {plan.preset.steps_of(kind)} steps")
-    lines.append(f"{len(plan.cells) - skipped} cells, {skipped} skipped, {len(plan.checks)} checks, "
-                 f"{len(plan.cases)} extreme cases, {len(plan.studies)} studies")  # fmt: skip
-    for cell in plan.cells:
-        lines.append(f"  {cell.label} [{', '.join(cell.suites)}]" + ("" if runs(cell) else ": skip"))
-    lines += [f"  {check.name} [validation]" for check in plan.checks]
-    lines += [f"  {case.name} [extremes]" for case in plan.cases]
-    lines += [f"  {study.name} [{study.suite}]" for study in plan.studies]
-    return "\n".join(lines)
 
 
 if __name__ == "__main__":

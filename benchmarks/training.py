@@ -46,7 +46,7 @@ def train_network(
     """
     import torch
 
-    from reference_sim import Trajectory
+    from reference_sim.trajectory import Trajectory
     from snug.dresser import DressedBody
     from snug.recipe import TRAININGS
     from snug.train import train, untrained_model

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -39,20 +39,77 @@ def roll_out(
     output after that pose was held still for a second: what the network thinks is static. It is not timed
     (NaN). Raises RollOutError.
     """
-    moving = replace(motion, translations=np.zeros_like(motion.translations)) if held_pose else motion
-    features = _features(model, dressed, moving, betas)
+    if not held_pose:
+        return ready_to_roll_out(model, dressed, motion, betas)()
+    still = replace(motion, translations=np.zeros_like(motion.translations))
+    features = _features(model, dressed, still, betas)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
-    transforms = dressed.transforms(motion.poses, betas)
-    run = _held if held_pose else _timed
-    posed, seconds = run(model, features, rest, weights, transforms)
-    positions = posed.astype(np.float64) + dressed.pelvis(motion, betas)[:, None]
+    posed = _held(model, features, rest, weights, dressed.transforms(motion.poses, betas))
+    origins = dressed.pelvis(motion, betas)
+    return _trajectory(model, dressed, motion, posed, origins, np.full(len(posed), np.nan))
+
+
+def ready_to_roll_out(
+    model: TrainedModel, dressed: DressedBody, motion: Any, betas: np.ndarray | None = None
+) -> Callable[[], Trajectory]:
+    """What gives the trajectory of `roll_out` when it is called, once: all that comes before is done here.
+
+    Raises RollOutError.
+    """
+    features = _features(model, dressed, motion, betas)
+    rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
+    transforms, origins = dressed.transforms(motion.poses, betas), dressed.pelvis(motion, betas)
+    frames = _one_by_one(model, features, rest, weights, transforms)
+
+    def run() -> Trajectory:
+        posed, seconds = np.empty((len(features), *rest.shape), np.float32), np.empty(len(features))
+        for frame in range(len(features)):
+            start = time.perf_counter()
+            vertices = next(frames)
+            seconds[frame] = time.perf_counter() - start
+            posed[frame] = vertices.numpy()
+        return _trajectory(model, dressed, motion, posed, origins, seconds)
+
+    return run
+
+
+def ready_for_many(
+    model: TrainedModel, dressed: DressedBody, motion: Any, *, copies: int
+) -> Callable[[], np.ndarray]:
+    """What computes, when called, `copies` bodies in that motion at once: (T, copies, V, 3) [m], float32.
+
+    About the pelvis. Frame follows frame, as the state is carried. Raises RollOutError.
+    """
+    features = _features(model, dressed, motion, None)[:, None, None].expand(-1, copies, -1, -1)
+    rest, weights = dressed.rest(), dressed.weights(model.recipe.smoothing)
+    transforms = dressed.transforms(motion.poses)[:, None].expand(-1, copies, -1, -1, -1)
+
+    @torch.inference_mode()
+    def run(frames: int = len(features)) -> np.ndarray:
+        posed, state = np.empty((frames, copies, *rest.shape), np.float32), None
+        for frame in range(frames):
+            offsets, state = model.network(features[frame], state)
+            posed[frame] = skin(rest + offsets[:, 0], weights, transforms[frame]).numpy()
+        return posed
+
+    run(min(WARM_UP, len(features)))
+    return run
+
+
+def _trajectory(
+    model: TrainedModel, dressed: DressedBody, motion: Any, posed: np.ndarray, origins: np.ndarray,
+    seconds: np.ndarray,
+) -> Trajectory:  # fmt: skip
+    """Vertices posed about the pelvis (T, V, 3), brought to where it is in each frame (T, 3)."""
+    positions = posed.astype(np.float64) + origins[:, None]
+    finite = bool(np.isfinite(positions).all())
     return Trajectory(
         positions=positions,
         faces=np.asarray(dressed.garment.faces),
         times=np.arange(len(positions)) / motion.fps,
         frame_seconds=seconds,
-        status="ok" if np.isfinite(positions).all() else "diverged",
-        reason="" if np.isfinite(positions).all() else "the network gave a position that is not finite",
+        status="ok" if finite else "diverged",
+        reason="" if finite else "the network gave a position that is not finite",
         provenance={
             "method": model.kind,
             "recipe": model.recipe.name,
@@ -124,28 +181,12 @@ def _one_by_one(
     return frames()
 
 
-def _timed(
-    model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
-) -> tuple[np.ndarray, np.ndarray]:
-    """All frames and the seconds of each."""
-    count = len(features)
-    posed, seconds = np.empty((count, *rest.shape), np.float32), np.empty(count)
-    frames = _one_by_one(model, features, rest, weights, transforms)
-    for frame in range(count):
-        start = time.perf_counter()
-        vertices = next(frames)
-        seconds[frame] = time.perf_counter() - start
-        posed[frame] = vertices.numpy()
-    return posed, seconds
-
-
 @torch.inference_mode()
 def _held(
     model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
-) -> tuple[np.ndarray, np.ndarray]:
+) -> np.ndarray:
     """All frames as a batch, each pose repeated."""
     state = None
     for _ in range(HELD_FRAMES if find_kind(model.kind).sequences else 1):
         offsets, state = model.network(features[:, None], state)
-    posed = skin(rest + offsets[:, 0], weights, transforms)
-    return posed.numpy(), np.full(len(features), np.nan)
+    return skin(rest + offsets[:, 0], weights, transforms).numpy()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from reference_sim import Trajectory
+import numpy as np
+
+from reference_sim.trajectory import Trajectory
 
 from ..scene import BuiltScene
 
@@ -24,17 +27,23 @@ class Network:
 
     def prepare(self, scene: BuiltScene) -> None:
         from snug.dresser import DressedBody
+        from snug.rollout import ready_to_roll_out
         from snug.trained_model import TrainedModel
 
         assert scene.dressed is not None
         self.model = TrainedModel.load(self.path)
         self.motion = scene.dressed.motion
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.frames = ready_to_roll_out(self.model, self.dressed, self.motion)
 
     def run(self) -> Trajectory:
-        from snug.rollout import roll_out
+        return self.frames()
 
-        return roll_out(self.model, self.dressed, self.motion)
+    def ready_batch(self, copies: int) -> Callable[[], np.ndarray]:
+        """What computes so many bodies in this motion at once when called: (T, copies, V, 3) [m]."""
+        from snug.rollout import ready_for_many
+
+        return ready_for_many(self.model, self.dressed, self.motion, copies=copies)
 
     def held(self) -> Trajectory:
         """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""

@@ -1,0 +1,90 @@
+"""What a run would do: every piece of work with what its folder holds of it, and the time where it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from .agenda import Agenda
+from .plan import Plan, runs
+from .records import Found, Records, Work
+from .results import RunFolder
+
+
+def describe(plan: Plan) -> str:
+    """The plan in a few lines, and one line for each piece of work. Starts nothing, writes nothing."""
+    outlook = Outlook(plan)
+    skipped = sum(not runs(cell) for cell in plan.cells)
+    lines = [
+        f"preset {plan.preset.name}: {plan.preset.description}",
+        f"folder {plan.folder}",
+        f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
+        f"{plan.workers} workers, cells alone",
+        *outlook.made_before_cells(),
+        f"{len(plan.cells) - skipped} cells, {skipped} skipped, {len(plan.checks)} checks, "
+        f"{len(plan.cases)} extreme cases, {len(plan.studies)} studies",
+        *outlook.of_cells(),
+    ]
+    lines += [f"  {check.name} [validation]" for check in plan.checks]
+    lines += [f"  {case.name} [extremes]" for case in plan.cases]
+    lines += [f"  {study.name} [{study.suite}]" for study in plan.studies]
+    return "\n".join([*lines, outlook.total()])
+
+
+class Outlook:
+    """Asks the records of the plan's folder, and adds up what is to be done."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan, self.agenda = plan, Agenda(plan)
+        only = ("finished", "failed", "stale", "missing") if plan.fresh else plan.only
+        self.records = Records(RunFolder(plan.folder), only=only)
+        self.wanted: list[Found] = []
+        self.cached = 0
+
+    def made_before_cells(self) -> Iterator[str]:
+        """Garment, ground truth and networks."""
+        plan, agenda = self.plan, self.agenda
+        if plan.needs_wardrobe:
+            yield f"T-shirt of about {plan.preset.garment_vertices} vertices"
+            yield f"test motions {', '.join(plan.test)}"
+            for scene in (scene for scene in plan.scenes if scene.dressed):
+                yield f"  settle {scene.name}: {self.verdict(agenda.start(scene))}"
+        if plan.needs_training_motions:
+            targets = "simulated for networks that learn from it" if plan.needs_targets else "not simulated"
+            yield f"training motions {', '.join(plan.train)} ({targets})"
+            for motion in plan.train if plan.needs_targets else ():
+                yield f"  simulate {motion}: {self.verdict(agenda.data(motion))}"
+            for name, seed in plan.models:
+                steps = plan.preset.steps_of(name)
+                verdict = self.verdict(agenda.network(name, seed))
+                yield f"  train {name}, seed {seed}: {steps} steps, {verdict}"
+
+    def of_cells(self) -> Iterator[str]:
+        """Each cell, with the state of its metrics where the trajectory is there."""
+        for cell in self.plan.cells:
+            line = f"  {cell.label} [{', '.join(cell.suites)}]: "
+            if not runs(cell):
+                yield line + "skip"
+                continue
+            verdict = self.verdict(self.agenda.cell(cell))
+            if verdict == "cached" and self.records.find(self.agenda.metrics(cell)).state != "finished":
+                verdict += ", metrics to be computed"
+            yield line + verdict
+
+    def verdict(self, work: Work) -> str:
+        """What happens to a piece of work, counted."""
+        found = self.records.find(work)
+        why = f" ({found.state}{': ' * bool(found.why)}{found.why})"
+        if found.wanted:
+            self.wanted.append(found)
+            took = f", {found.seconds:.1f} s last time" if found.seconds else ""
+            return f"run{why}{took}"
+        if found.result is None:
+            return f"left out{why}"
+        self.cached += 1
+        return "cached" + (why if found.state != "finished" else "")
+
+    def total(self) -> str:
+        """How much is to be done."""
+        known = [found.seconds for found in self.wanted if found.seconds]
+        times = f", about {sum(known):.0f} s for the {len(known)} whose time is known" if known else ""
+        return f"{len(self.wanted)} pieces of work to run{times}; {self.cached} cached"
