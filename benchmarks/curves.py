@@ -6,9 +6,13 @@ minima. So a rise is no failure, but whoever reads the curve has to know of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Iterable, Mapping
+
+from .results import Row
 
 METRIC = "gap/relative"
+REMARK = "the error does not fall here"
 # The families of suite speed from coarse to fine; the last of "simulation" is the reference's finest.
 CURVES = {
     "simulation": ("simulation-1e-2", "simulation-1e-4", "simulation", "simulation-1e-8"),
@@ -29,20 +33,39 @@ CURVES = {
 ROUND_OFF = 1e-6  # a gap below it counts as none: who is called lower there is chance
 
 
-def rises(found: Mapping[str, Mapping[str, float]]) -> dict[str, str]:
+def remarked(rows: Iterable[Row]) -> list[Row]:
+    """The rows, with a reason at each gap above that of a coarser method of its family."""
+    rows = list(rows)
+    gaps: dict[tuple[str, int], dict[str, float]] = {}
+    for row in rows:
+        if row.metric == METRIC and row.value is not None:
+            gaps.setdefault((row.scene, row.seed), {})[row.method] = row.value
+    remarks = {
+        (scene, seed, method): remark
+        for (scene, seed), found in gaps.items()
+        for method, remark in rises(found).items()
+    }
+    return [
+        dataclasses.replace(row, reason=row.reason or remarks[row.scene, row.seed, row.method])
+        if row.metric == METRIC and (row.scene, row.seed, row.method) in remarks
+        else row
+        for row in rows
+    ]
+
+
+def rises(gaps: Mapping[str, float]) -> dict[str, str]:
     """For each method whose gap is above that of a coarser one of its family: a remark that says so.
 
-    found: the metrics of each method of one scene (and seed), by name; those without a gap are left out.
+    gaps: of the methods of one scene and seed, by name.
     """
     remarks = {}
     for family in CURVES.values():
         lowest = ("", float("inf"))
         for method in family:
-            gap = found.get(method, {}).get(METRIC)
-            if gap is None:
+            if (gap := gaps.get(method)) is None:
                 continue
             if gap > max(lowest[1], ROUND_OFF):
-                remarks[method] = f"not monotone: a gap of {gap:.2g}, but {lowest[0]} has {lowest[1]:.2g}"
+                remarks[method] = f"{REMARK}: {lowest[0]}, the coarser one, has a gap of {lowest[1]:.2g}"
             if gap < lowest[1]:
                 lowest = method, gap
     return remarks

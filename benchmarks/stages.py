@@ -17,6 +17,7 @@ from snug.recipe import learns_from_simulation
 from .agenda import Agenda
 from .cell import Outcome
 from .cells import LEFT_OUT, Cells
+from .curves import REMARK, remarked
 from .methods import find_method
 from .plan import Cell, Plan, runs
 from .record import Record, now
@@ -269,7 +270,7 @@ class Stages:
                 reason = f"metrics: {reasons.get(outcome.cell.scene.name, 'the worker ended')}"
                 outcome = dataclasses.replace(outcome, status="failed", reason=reason)
             rows += rows_of(outcome, metrics)
-        return rows
+        return remarked(rows)
 
     def remarks(self) -> list[str]:
         """What whoever reads the times should know, in a line each."""
@@ -282,6 +283,9 @@ class Stages:
         labels = dict.fromkeys(f"{row.scene} x {row.method} ({row.value:.0f} %)" for row in wide)
         if labels:
             lines.append(f"repeats more than 20 % apart: {', '.join(labels)}")
+        rising = [f"{row.scene} x {row.method}" for row in self.record.rows if row.reason.startswith(REMARK)]
+        if rising:
+            lines.append(f"more iterations or a smaller tolerance, and a larger gap: {', '.join(rising)}")
         return lines
 
     def make_report(self) -> bool:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.checks.meshes import cylinder_patch, icosphere, right_grid, torus
+from benchmarks.curves import CURVES, remarked
+from benchmarks.methods import METHODS
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
     boundary_mask,
@@ -23,6 +25,7 @@ from benchmarks.metrics.optimality import FINDERS, first_guess, optimality
 from benchmarks.metrics.shape import area_change, dihedral_angle, edge_change
 from benchmarks.metrics.time_error import LADDER, time_errors
 from benchmarks.presets import find_preset
+from benchmarks.results import Row
 from benchmarks.scenes import hanging_sheet, sheet_on_sphere
 from reference_sim import Obstacle, Potential, minimise, simulate
 from reference_sim.energies import Inertia, Step
@@ -278,3 +281,25 @@ def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():
         {"time_error/total": 3.0, "time_error/strain": -2.0, "time_error/curvature": 1.0, "time_error/order": 1.0}
     )
     assert time_errors({name: found[name] for name in LADDER[:3]}) == {}
+
+
+def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
+    def row(method: str, gap: float, metric: str = "gap/relative", scene: str = "flag", seed: int = 0) -> Row:
+        return Row("speed", scene, method, seed, metric, "1", gap)
+
+    falling = [row("newton-1", 0.5), row("newton-4", 0.1), row("newton-8", 0.1), row("simulation", 0.0)]
+    assert remarked(falling) == falling
+    rising = [row("newton-8", 0.2), row("vbd-5", 0.2), row("snug+lbfgs-1", 0.3, seed=1), row("simulation-1e-8", 1e-9)]
+    elsewhere = [row("newton-1", 0.01, "curvature/error"), row("newton-4", 0.01, scene="sheet")]
+    found = remarked([*falling[:2], *rising, *elsewhere])
+    assert [r.method for r in found if r.reason] == ["newton-8"]
+    assert found[2].reason == "the error does not fall here: newton-4, the coarser one, has a gap of 0.1"
+    assert remarked([dataclasses.replace(rising[0], reason="kept"), *falling])[0].reason == "kept"
+
+
+def test_every_curve_is_of_methods_that_exist_and_holds_every_cut_of_its_family():
+    names = {entry.name for entry in METHODS}
+    members = [method for family in CURVES.values() for method in family]
+    assert set(members) <= names
+    cut = {entry.name for entry in METHODS if entry.cut_short}
+    assert cut <= set(members)
