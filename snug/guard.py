@@ -42,8 +42,10 @@ class Guard:
         self._good: dict[str, Tensor] = {}
 
     def judge(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> str:
-        """`update`, `clip` or `leave out`, for windows (N,) [J a frame]; name(row) tells a window in words.
+        """What to do after windows (N,) [J a frame]; name(row) tells a window in words.
 
+        `update`; `clip` the gradient; `distrust`: clip it, and learn nothing else from what was predicted;
+        `leave out`.
         Raises TrainingError after GIVE_UP updates left out in a row.
         """
         bad = ~np.isfinite(joules)
@@ -59,7 +61,8 @@ class Guard:
         self._skipped_in_a_row = 0
         judged = self.spike is not None and number >= SETTLING
         mean = float(joules.mean(dtype=np.float64))
-        if judged and self._usual is not None and mean > RUNAWAY * self._usual:
+        runaway = judged and self._usual is not None and mean > RUNAWAY * self._usual
+        if runaway:
             if self._count_bad(number, joules, name):
                 return "leave out"
         else:
@@ -70,7 +73,7 @@ class Guard:
         peaks = joules > self.spike if judged else np.zeros(len(joules), bool)
         if peaks.any():
             self._remark(number, peaks, joules, name, "gradient clipped")
-        return "clip" if peaks.any() else "update"
+        return "distrust" if runaway else "clip" if peaks.any() else "update"
 
     def _count_bad(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> bool:
         """One more bad batch; whether that brought good weights back."""
@@ -93,9 +96,9 @@ class Guard:
         for row in np.flatnonzero(which):
             self.summary["high_windows"] += not action.startswith("weights")
             if len(self.summary["named_windows"]) < NAMED_WINDOWS:
-                self.summary["named_windows"].append({
-                    "step": number, "window": name(int(row)), "joules": repr(float(joules[row])), "action": action,
-                })  # fmt: skip
+                window, value = name(int(row)), repr(float(joules[row]))
+                named = {"step": number, "window": window, "joules": value, "action": action}
+                self.summary["named_windows"].append(named)
 
     def _copied(self) -> dict[str, Tensor]:
         return {name: tensor.detach().clone() for name, tensor in live_tensors(self.network, self.optimiser)}

@@ -139,8 +139,8 @@ class Trainer:
                 planes = self.contact.planes(batch, posed)
         with self.clock.part("energies"):
             terms = self.loss(x, batch.ahead, planes)
-        means, updated = self._update(number, windows, terms)
-        if updated and self.contact and posed:
+        means, trusted = self._update(number, windows, terms)
+        if trusted and self.contact and posed:
             with self.clock.part("renewal"):
                 self.contact.renew(self.data.starts[windows][:, None] + np.arange(self.data.window), posed, x)
         return means
@@ -172,7 +172,10 @@ class Trainer:
     def _update(
         self, number: int, windows: np.ndarray, terms: dict[str, Tensor]
     ) -> tuple[dict[str, float], bool]:
-        """Descend by the mean joules a frame, unless the guard objects. Means by term; whether it did."""
+        """Descend by the mean joules a frame, unless the guard objects.
+
+        Means by term; whether the prediction is good enough to search contact anchors with.
+        """
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
         whole = self.group.gathered(stacked.detach())
         joules = whole.sum(1).mean(1).cpu().numpy()
@@ -186,10 +189,10 @@ class Trainer:
             self.optimiser.zero_grad(set_to_none=True)
             stacked.sum(1).mean().backward()
         with self.clock.part("optimiser"):
-            if verdict == "clip":
+            if verdict != "update":
                 torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.gradient_limit)
             self.optimiser.step()
-        return means, True
+        return means, verdict != "distrust"
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Everything that the next step depends on: tensors, and plain facts for a JSON header."""

@@ -18,7 +18,6 @@ from snug.skeleton import joint_positions
 from snug.train import train, untrained_model
 from snug.trained_model import ModelFileError, TrainedModel
 from snug.trainer import Trainer
-from snug.training_run import TrainingRun
 from snug.training_set import TrainingError, TrainingSet
 
 PLAIN = replace(DEFAULT, mixed=0.0)
@@ -156,37 +155,6 @@ def test_windows_stay_within_a_motion_and_all_come_by():
         tube_dress(), clips, replace(PLAIN, window_stride=3), features="motion", sequences=True
     )
     assert disjoint.starts.tolist() == [0, 3, 6, 9, 12]
-
-
-def test_guard_names_a_window_and_keeps_the_weights():
-    trainer = Trainer("snug", tube_dress(), [swaying(120)], steps=8, seed=0, recipe=PLAIN)
-    before = trainer.network.offsets.weight.clone()
-    trainer.data.features[20] = float("nan")  # in 3 of 118 windows: in at most 3 of the first 8 batches
-    for number in range(8):
-        trainer.step(number)
-    assert 1 <= trainer.guard.summary["skipped_updates"] <= 3
-    named = trainer.guard.summary["named_windows"][0]
-    assert named["action"] == "update left out" and "motion 'sway' frame" in named["window"]
-    after = trainer.network.offsets.weight
-    assert torch.isfinite(after).all() and not torch.equal(before, after)
-
-
-def test_guard_counts_high_windows_and_clips():
-    recipe = replace(PLAIN, spike=1e-6, gradient_limit=1e-3)
-    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=99, seed=0, recipe=recipe)
-    trainer.step(0)
-    assert trainer.guard.summary["high_windows"] == 0  # the first steps are not judged
-    trainer.step(60)
-    assert trainer.guard.summary["high_windows"] == 16
-    norms = [p.grad.norm() for p in trainer.network.parameters()]
-    assert torch.stack(norms).norm() == pytest.approx(1e-3, rel=1e-2)
-
-
-def test_training_gives_up_with_a_reason():
-    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=200, seed=0, recipe=PLAIN)
-    trainer.data.features[:] = float("nan")
-    with pytest.raises(TrainingError, match=r"diverged.*motion 'sway' frame"):
-        TrainingRun(trainer, every=10).go()
 
 
 def test_impossible_trainings_are_refused():

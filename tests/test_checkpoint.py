@@ -1,0 +1,161 @@
+"""A run that was stopped, or killed at any moment, and resumed ends with the bits of an unbroken one."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from dressing import swaying, tube_dress
+
+from snug import tensor_file
+from snug.recipe import DEFAULT, PAPER
+from snug.tensor_file import TensorFileError, read_tensors
+from snug.train import train
+from snug.training_run import Interrupted, Saving
+from snug.validation import Validation
+
+PLAIN = replace(DEFAULT, mixed=0.0)
+# 28 windows and 16 in a batch: every stop is within an epoch.
+CLIPS = [swaying(30)]
+
+
+def short(kind="snug", *, steps=24, seed=0, recipe=PLAIN, clips=CLIPS, **options):
+    options = {"progress": False, "every": 5, **options}
+    return train(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
+
+
+def same_model(a, b):
+    for one, other in zip(a.network.state_dict().values(), b.network.state_dict().values(), strict=True):
+        assert torch.equal(one, other)
+    for one, other in zip(a.history, b.history, strict=True):
+        names = [name for name in one if not name.startswith("seconds")]
+        assert [one[name] for name in names] == [other[name] for name in names]
+    assert a.summary == b.summary
+
+
+def asked_after(steps):
+    """A stop request that comes after so many steps."""
+    count = iter(range(10_000))
+    return lambda: next(count) + 1 >= steps
+
+
+@pytest.mark.parametrize(
+    ("kind", "recipe"),
+    [("snug", replace(DEFAULT, mixed=2.0)), ("snug", PAPER), ("pbns", PLAIN)],
+    ids=["mixed", "paper", "pbns"],
+)
+def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path):
+    whole = short(kind, recipe=recipe)
+    path = tmp_path / "run.safetensors"
+    for number, steps in enumerate((3, 13)):  # twice, the second time on a resumed run
+        saving = Saving(path=path, resume=number > 0)
+        with pytest.raises(Interrupted, match=f"after step {(3, 16)[number]} of 24"):
+            short(kind, recipe=recipe, saving=saving, stop=asked_after(steps))
+    resumed = short(kind, recipe=recipe, saving=Saving(path=path, resume=True))
+    same_model(whole, resumed)
+    assert resumed.history[-1]["step"] == 24 and not list(tmp_path.iterdir())
+
+
+def test_validation_resumes_bit_for_bit(tmp_path):
+    validation = Validation(motions=[swaying(20, name="other", degrees=30.0)], every=4, patience=5)
+    whole = short(validation=validation)
+    saving = Saving(path=tmp_path / "run.safetensors", resume=True)
+    with pytest.raises(Interrupted):
+        short(validation=validation, saving=saving, stop=asked_after(14))
+    same_model(whole, short(validation=validation, saving=saving))
+    assert whole.summary["validation"]["motions"] == ["other"]
+
+
+CHILD = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from test_checkpoint import CLIPS, short
+from snug.training_run import Saving
+from pathlib import Path
+short(steps=4000, saving=Saving(path=Path(sys.argv[2]), steps=3, minutes=0))
+"""
+
+
+def test_a_killed_run_resumes_bit_for_bit(tmp_path):
+    """kill -9 while the child writes checkpoints as fast as it can; a run resumed from what lies there."""
+    path = tmp_path / "run.safetensors"
+    arguments = [sys.executable, "-c", CHILD, str(Path(__file__).parent), str(path)]
+    child = subprocess.Popen(arguments, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    deadline = time.monotonic() + 120
+    while not path.is_file() and time.monotonic() < deadline:
+        assert child.poll() is None
+        time.sleep(0.01)
+    time.sleep(0.2)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    done = read_tensors(path)[1]["done"]
+    assert 3 <= done < 4000 and done % 3 == 0
+    runs = []
+    # Steps of the schedule must agree, so both go a little further and stop at the same step.
+    for resume in (True, False):
+        saving = Saving(path=path if resume else tmp_path / "whole.safetensors", resume=resume)
+        stop = asked_after(7 if resume else done + 7)
+        with pytest.raises(Interrupted, match=f"after step {done + 7} of"):
+            short(steps=4000, saving=saving, stop=stop)
+        runs.append(read_tensors(saving.path)[0])
+    assert runs[0].keys() == runs[1].keys()
+    assert all(torch.equal(runs[0][name], runs[1][name]) for name in runs[0])
+
+
+def test_a_kill_while_writing_leaves_the_older_checkpoint(tmp_path, monkeypatch):
+    path = tmp_path / "run.safetensors"
+    with pytest.raises(Interrupted):
+        short(saving=Saving(path=path), stop=asked_after(6))
+    before = path.read_bytes()
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tensor_file.os, "replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        short(saving=Saving(path=path, resume=True, steps=2))
+    assert path.read_bytes() == before
+    monkeypatch.undo()
+    same_model(short(), short(saving=Saving(path=path, resume=True)))
+
+
+def test_a_checkpoint_of_another_run_is_refused(tmp_path):
+    path = tmp_path / "run.safetensors"
+    with pytest.raises(Interrupted):
+        short(saving=Saving(path=path), stop=asked_after(2))
+    again = Saving(path=path, resume=True)
+    with pytest.raises(TensorFileError, match="seed 0 there, 1 here"):
+        short(saving=again, seed=1)
+    with pytest.raises(TensorFileError, match="another recipe"):
+        short(saving=again, recipe=replace(PLAIN, h0_sigma=0.1))
+    with pytest.raises(TensorFileError, match="another data"):
+        short(saving=again, clips=[swaying(31)])
+    path.write_bytes(path.read_bytes()[:300])
+    with pytest.raises(TensorFileError, match=r"run\.safetensors"):
+        short(saving=again)
+    path.unlink()
+    same_model(short(), short(saving=again))  # killed before its first checkpoint: from the beginning
+
+
+def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
+    from snug import train as module
+
+    out = tmp_path / "small.safetensors"
+    words = ["--vertices", "200", "--steps", "8", "-o", str(out), "--resume"]
+    library = [swaying(20), swaying(16, name="held")]
+    monkeypatch.setattr(module, "_motions", lambda options: (library[:1], library[1:]))
+    monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
+    assert module.main(words) == 130
+    assert "step 1 of 8" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["small.checkpoint.safetensors"]
+    monkeypatch.setattr(module._StopRequest, "__call__", lambda self: False)
+    assert module.main(words) == 0
+    shown = capsys.readouterr().out
+    assert "8 steps" in shown and "validation" in shown and "ms a step" in shown
+    assert [path.name for path in tmp_path.iterdir()] == ["small.safetensors"]
+    assert module.main(words) == 0 and "nothing to resume" in capsys.readouterr().out

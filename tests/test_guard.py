@@ -1,0 +1,95 @@
+"""Bad batches are named, their updates left out, and lost weights come back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from dressing import swaying, tube_dress
+
+from snug.guard import PATIENCE, SETTLING, SNAPSHOT_EVERY
+from snug.recipe import DEFAULT
+from snug.trainer import Trainer
+from snug.training_run import TrainingRun
+from snug.training_set import TrainingError
+
+PLAIN = replace(DEFAULT, mixed=0.0)
+
+
+def test_guard_names_a_window_and_keeps_the_weights():
+    trainer = Trainer("snug", tube_dress(), [swaying(120)], steps=8, seed=0, recipe=PLAIN)
+    before = trainer.network.offsets.weight.clone()
+    trainer.data.features[20] = float("nan")  # in 3 of 118 windows: in at most 3 of the first 8 batches
+    for number in range(8):
+        trainer.step(number)
+    assert 1 <= trainer.guard.summary["skipped_updates"] <= 3
+    named = trainer.guard.summary["named_windows"][0]
+    assert named["action"] == "update left out" and "motion 'sway' frame" in named["window"]
+    after = trainer.network.offsets.weight
+    assert torch.isfinite(after).all() and not torch.equal(before, after)
+
+
+def test_guard_counts_high_windows_and_clips():
+    recipe = replace(PLAIN, spike=1e-6, gradient_limit=1e-3)
+    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=99, seed=0, recipe=recipe)
+    trainer.step(0)
+    assert trainer.guard.summary["high_windows"] == 0  # the first steps are not judged
+    trainer.step(60)
+    assert trainer.guard.summary["high_windows"] == 16
+    norms = [p.grad.norm() for p in trainer.network.parameters()]
+    assert torch.stack(norms).norm() == pytest.approx(1e-3, rel=1e-2)
+
+
+def test_training_gives_up_with_a_reason():
+    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=200, seed=0, recipe=PLAIN)
+    trainer.data.features[:] = float("nan")
+    with pytest.raises(TrainingError, match=r"diverged.*motion 'sway' frame"):
+        TrainingRun(trainer, every=10).go()
+
+
+def made(recipe=PLAIN, frames=30):
+    return Trainer("snug", tube_dress(), [swaying(frames)], steps=400, seed=0, recipe=recipe)
+
+
+def weights_of(trainer):
+    return torch.cat([p.detach().flatten() for p in trainer.network.parameters()])
+
+
+def test_lost_weights_come_back():
+    """A gradient that is not finite ruins the weights, and with them every later batch."""
+    trainer = made()
+    for number in range(SNAPSHOT_EVERY + 3):
+        trainer.step(number)
+    before = weights_of(trainer)
+    with torch.no_grad():
+        trainer.network.offsets.bias[7] = float("nan")
+    losses = [trainer.step(SNAPSHOT_EVERY + 3 + k)["loss"] for k in range(PATIENCE + 2)]
+    assert not np.isfinite(losses[:PATIENCE]).any() and np.isfinite(losses[PATIENCE:]).all()
+    summary = trainer.guard.summary
+    assert summary["restored"] == 1 and summary["skipped_updates"] == PATIENCE
+    assert summary["named_windows"][-1]["action"] == f"weights of step {SNAPSHOT_EVERY} restored, rate halved"
+    assert "motion 'sway' frame" in summary["named_windows"][-1]["window"]
+    assert trainer.optimiser.param_groups[0]["lr"] == 0.5 * PLAIN.learning_rate
+    assert (weights_of(trainer) - before).abs().max() < 0.02  # a few steps of 1e-3, and as many back
+
+
+def test_runaway_energy_brings_good_weights_back():
+    trainer = made()
+    for number in range(SETTLING + 1):
+        usual = trainer.step(number)["loss"]
+    with torch.no_grad():  # finite, but centimetres of noise
+        trainer.network.offsets.weight.normal_(0, 0.3, generator=torch.Generator().manual_seed(0))
+    losses = [trainer.step(SETTLING + 1 + k)["loss"] for k in range(PATIENCE + 1)]
+    assert min(losses[:PATIENCE]) > 10 * usual and losses[PATIENCE] < 3 * usual  # step 0
+    assert trainer.guard.summary["restored"] == 1 and trainer.guard.summary["skipped_updates"] == 0
+
+
+def test_data_that_is_not_finite_does_not_wear_down_the_rate():
+    trainer = made()
+    trainer.step(0)
+    good = weights_of(trainer)
+    trainer.data.features[:] = float("nan")
+    for number in range(1, 20):
+        trainer.step(number)
+    assert trainer.guard.rate == 0.5 and trainer.guard.summary["skipped_updates"] == 19
+    assert torch.isfinite(weights_of(trainer)).all() and (weights_of(trainer) - good).abs().max() < 0.01
