@@ -27,7 +27,7 @@ ROUND_OFF = 1e-14  # of lengths: some fifty times that of float64
 
 @dataclass(frozen=True)
 class Closest:
-    """Per sample: its face (S,), -1 where none is allowed, the place on it (S, 3), the point (S, 3) [m]."""
+    """Per sample: its face (S,), the place on it (S, 3), and that point (S, 3) [m]."""
 
     faces: np.ndarray
     barycentric: np.ndarray
@@ -74,8 +74,8 @@ class FaceTree:
         """Closest points of the mesh to points (S, 3) [m].
 
         hints: (S,) faces to begin with, -1 for none. They change the cost and not the answer.
-        rest_points: (S, 3) [m] where samples are at rest. With them, only faces whose rest centroid lies no
-            farther away than `region` [m] are allowed.
+        rest_points: (S, 3) [m] where samples are at rest. With them, a sample meets only faces whose rest
+            centroid lies no farther away than `region` [m]; where there is none, all.
         """
         if rest_points is None:
             rest_points, region = points, np.inf
@@ -218,58 +218,73 @@ def _search(
     faces, barycentric, closest,
 ):  # fmt: skip
     """faces (S,) come in as hints and go out as answers."""
-    inner = len(starts) - 2
-    size = 0.0
-    for i in range(3):
-        size += np.float64(boxes[0, 1, i] - boxes[0, 0, i])
     stack, bounds = np.empty(64, np.int64), np.empty(64)
     for s in range(len(points)):
-        x, y, z = np.float64(points[s, 0]), np.float64(points[s, 1]), np.float64(points[s, 2])
-        hx, hy, hz = (
-            np.float64(rest_points[s, 0]),
-            np.float64(rest_points[s, 1]),
-            np.float64(rest_points[s, 2]),
-        )
-        best, reach, answer, best_v, best_w = np.inf, np.inf, -1, 0.0, 0.0
         hint = place[faces[s]] if faces[s] >= 0 else -1
-        if hint >= 0:
-            d0, d1, d2 = centroids[hint, 0] - hx, centroids[hint, 1] - hy, centroids[hint, 2] - hz
-            if d0 * d0 + d1 * d1 + d2 * d2 <= region * region:
-                best_v, best_w, best = closest_on_triangle(corners, hint, x, y, z)
-                reach, answer = _with_round_off(best, size), faces[s]
-        stack[0], bounds[0], depth = 0, _box_distance(boxes, 0, x, y, z), 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if bounds[depth] > reach or _box_distance(rest_boxes, node, hx, hy, hz) > region * region:
-                continue
-            if node < inner:
-                near, other = 2 * node + 1, 2 * node + 2
-                to_near, to_other = _box_distance(boxes, near, x, y, z), _box_distance(boxes, other, x, y, z)
-                if to_other < to_near:
-                    near, other, to_near, to_other = other, near, to_other, to_near
-                if to_other <= reach:
-                    stack[depth], bounds[depth] = other, to_other
-                    depth += 1
-                if to_near <= reach:
-                    stack[depth], bounds[depth] = near, to_near
-                    depth += 1
-                continue
-            for k in range(starts[node - inner], starts[node - inner + 1]):
-                d0, d1, d2 = centroids[k, 0] - hx, centroids[k, 1] - hy, centroids[k, 2] - hz
-                if k == hint or d0 * d0 + d1 * d1 + d2 * d2 > region * region:
-                    continue
-                v, w, distance = closest_on_triangle(corners, k, x, y, z)
-                if distance < best or (distance == best and order[k] < answer):
-                    best, best_v, best_w, answer = distance, v, w, order[k]
-                    reach = _with_round_off(best, size)
-        faces[s] = answer
-        k = place[answer] if answer >= 0 else 0
-        best_u = max(1.0 - best_v - best_w, 0.0)
-        barycentric[s, ascending[k, 0]] = best_u
-        barycentric[s, ascending[k, 1]], barycentric[s, ascending[k, 2]] = best_v, best_w
+        k, v, w = _best_place(
+            points[s], rest_points[s], region, hint, corners, centroids, boxes, rest_boxes, starts, order,
+            stack, bounds,
+        )  # fmt: skip
+        if k < 0 and region < np.inf:
+            k, v, w = _best_place(
+                points[s], rest_points[s], np.inf, hint, corners, centroids, boxes, rest_boxes, starts, order,
+                stack, bounds,
+            )  # fmt: skip
+        u = max(1.0 - v - w, 0.0)
+        faces[s] = order[k]
+        barycentric[s, ascending[k, 0]] = u
+        barycentric[s, ascending[k, 1]], barycentric[s, ascending[k, 2]] = v, w
         for i in range(3):
-            closest[s, i] = best_u * corners[k, 0, i] + best_v * corners[k, 1, i] + best_w * corners[k, 2, i]
+            closest[s, i] = u * corners[k, 0, i] + v * corners[k, 1, i] + w * corners[k, 2, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _best_place(
+    point, home, region, hint, corners, centroids, boxes, rest_boxes, starts, order, stack, bounds
+):  # fmt: skip
+    """Where in the order of the leaves the closest allowed face is, -1 for none, and its weights v, w."""
+    x, y, z = np.float64(point[0]), np.float64(point[1]), np.float64(point[2])
+    hx, hy, hz = np.float64(home[0]), np.float64(home[1]), np.float64(home[2])
+    limit, inner, size = region * region, len(starts) - 2, 0.0
+    for i in range(3):
+        size += np.float64(boxes[0, 1, i]) - boxes[0, 0, i]
+    best, reach, answer, best_v, best_w = np.inf, np.inf, -1, 0.0, 0.0
+    if hint >= 0 and _squared(centroids, hint, hx, hy, hz) <= limit:
+        best_v, best_w, best = closest_on_triangle(corners, hint, x, y, z)
+        reach, answer = _with_round_off(best, size), hint
+    stack[0], bounds[0], depth = 0, _box_distance(boxes, 0, x, y, z), 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if bounds[depth] > reach or _box_distance(rest_boxes, node, hx, hy, hz) > limit:
+            continue
+        if node < inner:
+            near, other = 2 * node + 1, 2 * node + 2
+            to_near, to_other = _box_distance(boxes, near, x, y, z), _box_distance(boxes, other, x, y, z)
+            if to_other < to_near:
+                near, other, to_near, to_other = other, near, to_other, to_near
+            if to_other <= reach:
+                stack[depth], bounds[depth] = other, to_other
+                depth += 1
+            if to_near <= reach:
+                stack[depth], bounds[depth] = near, to_near
+                depth += 1
+            continue
+        for k in range(starts[node - inner], starts[node - inner + 1]):
+            if k == hint or _squared(centroids, k, hx, hy, hz) > limit:
+                continue
+            v, w, distance = closest_on_triangle(corners, k, x, y, z)
+            if distance < best or (distance == best and order[k] < order[answer]):
+                best, best_v, best_w, answer = distance, v, w, k
+                reach = _with_round_off(best, size)
+    return answer, best_v, best_w
+
+
+@njit(cache=True)
+def _squared(points, k, x, y, z):
+    """Squared distance between points."""
+    dx, dy, dz = points[k, 0] - x, points[k, 1] - y, points[k, 2] - z
+    return dx * dx + dy * dy + dz * dz
 
 
 @njit(cache=True)

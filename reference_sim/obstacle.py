@@ -75,7 +75,8 @@ class Obstacle:
         self._forget()
 
     def _forget(self) -> None:
-        self._tree: tuple[int, FaceTree] | None = None  # and the frame that it is fitted to
+        self._tree: FaceTree | None = None
+        self._fitted = -1  # the frame that the tree is fitted to
         self._last: dict[tuple[int, bool], np.ndarray] = {}  # faces found for so many points, held or free
 
     @property
@@ -103,37 +104,27 @@ class Obstacle:
         return fingerprint(self.positions, self.faces, self.rest_centroids, np.array(self.region))
 
     def _nearest(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Closest:
-        """Closest points under the rule of regions; anywhere for a sample that it leaves no face.
+        """Closest points under the rule of regions.
 
-        The answers to the last call for as many points are where the search begins: the simulator asks for
+        Each search begins with the faces that the last one found for as many points: the simulator asks for
         the same samples in every frame.
         """
         frame = min(frame, self.frames - 1)
         if self._tree is None:
             centroids = self.rest_centroids
-            tree = FaceTree(
-                self.faces, self.at(0)[self.faces].mean(axis=1) if centroids is None else centroids
-            )
-        else:
-            tree = self._tree[1]
-        if self._tree is None or self._tree[0] != frame:
-            tree.refit(self.at(frame))
-            self._tree = frame, tree
+            if centroids is None:
+                centroids = self.at(0)[self.faces].mean(axis=1)
+            self._tree = FaceTree(self.faces, centroids)
+        if self._fitted != frame:
+            self._tree.refit(self.at(frame))
+            self._fitted = frame
         if self.rest_centroids is None:
             rest_points = None
         kind = len(points), rest_points is not None
-        found = tree.nearest(points, hints=self._last.get(kind), rest_points=rest_points, region=self.region)
+        found = self._tree.nearest(
+            points, hints=self._last.get(kind), rest_points=rest_points, region=self.region
+        )
         self._last[kind] = found.faces
-        lost = np.flatnonzero(found.faces < 0)
-        if lost.size:
-            anywhere = tree.nearest(points[lost])
-            faces, barycentric, closest = found.faces.copy(), found.barycentric, found.points
-            faces[lost], barycentric[lost], closest[lost] = (
-                anywhere.faces,
-                anywhere.barycentric,
-                anywhere.points,
-            )
-            found = Closest(faces, barycentric, closest)
         return found
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:

@@ -83,12 +83,12 @@ def test_distances_are_those_of_libigl(name, kind):
 def one_by_one(
     positions: np.ndarray, faces: np.ndarray, points: np.ndarray, allowed: np.ndarray | None = None
 ) -> np.ndarray:
-    """Of the faces that allowed (S, F) grants the lowest of those at the least distance (S,), -1 for none."""
+    """Of the faces that allowed (S, F) grants, or of all, the lowest of those at the least distance (S,)."""
     corners = positions[np.sort(faces, axis=1)]
     squared = np.array([[closest_on_triangle(corners, f, *p)[2] for f in range(len(faces))] for p in points])
     if allowed is not None:
-        squared[~allowed] = np.inf
-    return np.where(squared.min(axis=1) < np.inf, squared.argmin(axis=1), -1)
+        squared[~allowed & allowed.any(axis=1, keepdims=True)] = np.inf
+    return squared.argmin(axis=1)
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -128,8 +128,7 @@ def test_what_is_remembered_changes_nothing(name):
         for hints in (cold.faces, generator.integers(-1, len(faces), len(points))):
             warm = tree.nearest(points, hints=hints, **rest)
             assert (warm.faces == cold.faces).all()
-            assert (warm.barycentric == cold.barycentric).all() or name.startswith("soup")
-            assert np.array_equal(warm.points[cold.faces >= 0], cold.points[cold.faces >= 0])
+            assert (warm.barycentric == cold.barycentric).all() and (warm.points == cold.points).all()
 
 
 @pytest.mark.parametrize("region", [0.2, 0.7, 2.0])
@@ -146,8 +145,7 @@ def test_only_faces_near_the_place_at_rest_are_met(name, region):
     allowed = np.einsum("sfi,sfi->sf", offset, offset) <= region**2
     found = tree.nearest(points, rest_points=home, region=region).faces
     assert (found == one_by_one(moved, faces, points, allowed)).all()
-    free = tree.nearest(points).faces
-    assert (found != free).any() and (region < 0.3 or (found >= 0).any())
+    assert name == "soup 7" or (found != tree.nearest(points).faces).any()
 
 
 def test_a_refitted_tree_answers_as_one_built_for_the_pose():
