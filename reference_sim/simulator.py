@@ -66,8 +66,9 @@ def simulate(
             frames may be asked for); without such a file start at the beginning. The same bits come out as
             without the interruption.
         progress: label of a progress bar with time left; None for silence.
-        options: of the minimiser: method ("newton", the default, "lbfgs", or a function that makes one of a
-            potential and the other options), tolerance, max_iterations, ...
+        options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
+            that makes one of a potential and the other options), tolerance, max_iterations, ... The default
+            method is "lbfgs", or "newton" with a term whose pairs change with x, as a barrier's do.
 
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the first other status; a

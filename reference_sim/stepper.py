@@ -62,9 +62,11 @@ class Stepper:
         self.cloth, self.guess, self.substeps = cloth, guess, substeps
         self.frame_dt, self.dt = dt, dt / substeps  # between frames, and of one step
         self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refined(substeps)
-        self.quasi_static, self.options = quasi_static, options
         self.potential = Potential([*energies, Inertia(cloth, self.dt)])
-        self.minimiser = make_minimiser(self.potential, **options)
+        # The preconditioner of L-BFGS knows nothing of pairs that come and go.
+        method = "newton" if any(energy.dynamic for energy in energies) else "lbfgs"
+        self.quasi_static, self.options = quasi_static, {"method": method} | options
+        self.minimiser = make_minimiser(self.potential, **self.options)
         self._started = False
 
     def advance(self, frame: int, state: State, pins: np.ndarray | None) -> tuple[State | None, list[Result]]:

@@ -13,7 +13,7 @@ from ..scene import BuiltScene
 
 @dataclass
 class Simulation:
-    """Newton steps until the gradient is within tolerance, or stopped after `max_iterations` a step."""
+    """Steps minimised until the gradient is within tolerance, or stopped after `max_iterations` a step."""
 
     options: dict[str, Any]
     scene: BuiltScene | None = None

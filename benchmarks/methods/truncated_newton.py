@@ -9,4 +9,4 @@ from .simulation import Simulation
 
 def make(*, models: Path, seed: int, device: str, iterations: int) -> Simulation:
     """A simulation that stops every step after `iterations` Newton iterations, converged or not."""
-    return Simulation(options={"max_iterations": iterations})
+    return Simulation(options={"method": "newton", "max_iterations": iterations})

@@ -108,7 +108,7 @@ def measure(scene: BuiltScene, substeps: int) -> dict[str, dict[str, float]]:
     trajectories = {
         "simulation": _simulated(scene, substeps=substeps),
         "skinning": skinning.run(),
-        CUT: _simulated(scene, substeps=substeps, max_iterations=1),
+        CUT: _simulated(scene, substeps=substeps, method="newton", max_iterations=1),
     }
     reference = trajectories["simulation"]
     if reference.frames < scene.frames or reference.status == "diverged":

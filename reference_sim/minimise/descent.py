@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 
 from ..material import GRAVITY
 from ..potential import Potential
 from .result import Result
+from .secants import Secants
+
+SUFFICIENT_DECREASE = 1e-4
+HALVINGS = 24  # of a step before its direction is given up
 
 
 class Descent:
@@ -17,16 +22,19 @@ class Descent:
     Attributes:
         x: (V, 3), the point kept last; value [J] and g (3n,) [N] belong to it.
         iterations, factorisations: counts. seconds: time by part.
+        started: clock [s] at the beginning. All four go on from those of `after`, an earlier descent.
     """
 
-    def __init__(self, potential: Potential, x: np.ndarray) -> None:
+    def __init__(self, potential: Potential, x: np.ndarray, after: Descent | None = None) -> None:
         self.potential = potential
         self.x = np.array(x, dtype=np.float64, order="C")
         self.free = potential.cloth.free
         self.weight = mean_weight(potential)
-        self.iterations = self.factorisations = 0
-        self.seconds = dict.fromkeys(("assemble", "factorise", "solve", "evaluate"), 0.0)
-        self.started = time.perf_counter()
+        self.iterations: int = after.iterations if after else 0
+        self.factorisations: int = after.factorisations if after else 0
+        parts = dict.fromkeys(("assemble", "factorise", "solve", "evaluate"), 0.0)
+        self.seconds: dict[str, float] = dict(after.seconds) if after else parts
+        self.started: float = after.started if after else time.perf_counter()
         self.value, self.g = self.evaluate(self.x)
 
     @property
@@ -47,6 +55,37 @@ class Descent:
         step = np.zeros_like(self.x)
         step[self.free] = p.reshape(-1, 3)
         return step
+
+    def line_search(self, p: np.ndarray, slope: float, allowed: float | None = None) -> float:
+        """Halve the step along p (3n,) until the energy falls enough, and go there.
+
+        allowed: share of p that no term forbids, where it is known already. Returns the share of p that was
+        taken, 0 if none would do.
+        """
+        step = self.spread(p)
+        alpha = self.potential.largest_step(self.x, step) if allowed is None else allowed
+        for _ in range(HALVINGS):
+            trial = self.x + alpha * step
+            value, gradient = self.evaluate(trial)
+            if np.isfinite(value) and np.isfinite(gradient).all():
+                gain = alpha * slope
+                if fallen(self.value, value, gain) or level(self.value, value, gain, alpha * (gradient @ p)):
+                    self.x, self.value, self.g = trial, value, gradient
+                    return alpha
+            alpha *= 0.5
+        return 0.0
+
+    def secant_step(self, secants: Secants, solve: Callable[[np.ndarray], np.ndarray]) -> bool:
+        """One quasi-Newton step, remembered; a direction that fails is tried again without memories."""
+        while True:
+            p, g = secants.direction(self.g, solve), self.g
+            slope = float(g @ p)
+            if np.isfinite(slope) and slope < 0 and (alpha := self.line_search(p, slope)):
+                secants.add(alpha * p, self.g - g)
+                return True
+            if not secants:
+                return False
+            secants.clear()
 
     def gradient_norm(self) -> float:
         """Largest component of the gradient, in mean vertex weights."""
@@ -73,3 +112,18 @@ class Descent:
 def mean_weight(potential: Potential) -> float:
     """Mean weight of a vertex of the potential's cloth [N], the unit of gradients here."""
     return float(potential.cloth.masses.mean() * GRAVITY)
+
+
+def fallen(before: float, after: float, slope: float) -> bool:
+    """Whether the energy fell enough on a step whose linear prediction is `slope` (Armijo)."""
+    return after <= before + SUFFICIENT_DECREASE * slope
+
+
+def level(before: float, after: float, slope: float, end_slope: float) -> bool:
+    """Whether, within round-off of the energy, the slopes at both ends say that it fell.
+
+    Hager and Zhang 2005, approximate Wolfe conditions.
+    """
+    noise = 1e-13 * abs(before)
+    flat = after <= before + noise and -slope < 100 * noise
+    return flat and float(end_slope) <= (2 * SUFFICIENT_DECREASE - 1) * slope

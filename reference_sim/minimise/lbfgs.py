@@ -3,21 +3,24 @@
 The first guess of the inverse Hessian is the inverse of an n x n matrix that x, y and z share: mass over
 dt^2, (mu + lambda/2) times the cotangent Laplacian, and the curvature of the contacts (Liu, Bouaziz and
 Kavan 2017). It is factorised once per minimisation and costs three triangular solves an iteration, so the
-first hundredth of the gap comes several times sooner than with Newton; the last digits do not.
+first hundredth of the gap comes several times sooner than with Newton; the last digits do not. So Newton
+takes over where the gradient is SWITCH vertex weights, and its factorisations serve several steps each.
 """
 
 from __future__ import annotations
 
 import time
-from collections import deque
 
 import numpy as np
 
 from ..linear_solver import analyse
 from ..potential import Potential
 from .descent import Descent
-from .newton import FIRST_SHIFT, SUFFICIENT_DECREASE, Newton
+from .newton import FIRST_SHIFT, Newton
 from .result import Result
+from .secants import Secants
+
+SWITCH = 1.0  # [vertex weights]
 
 
 class LBFGS:
@@ -25,12 +28,13 @@ class LBFGS:
 
     Args:
         tolerance: as in Newton.
-        max_iterations: iterations of L-BFGS before Newton takes over, or before giving up.
+        max_iterations: iterations, of Newton's too, before giving up with status max_iterations.
         memory: number of remembered steps; 0 is preconditioned gradient descent.
         switch: gradient norm, in mean vertex weights, at which Newton takes over.
+        patience: iterations after which it takes over in any case.
         finish: whether Newton takes over at all. Without it the result can only be "max_iterations",
             "stalled" or "timeout": nothing but a factorised Hessian can say "converged".
-        timeout: seconds.
+        timeout: seconds, for both together.
 
     Raises:
         ValueError: no term of the potential has a scalar stiffness.
@@ -41,15 +45,16 @@ class LBFGS:
         potential: Potential,
         *,
         tolerance: float = 1e-6,
-        max_iterations: int = 100,
+        max_iterations: int = 500,
         memory: int = 10,
-        switch: float = 1e-2,
+        switch: float = SWITCH,
+        patience: int = 100,
         finish: bool = True,
         timeout: float = float("inf"),
     ) -> None:
         cloth = potential.cloth
         self.potential, self.memory, self.timeout = potential, memory, timeout
-        self.max_iterations = max_iterations
+        self.max_iterations = min(patience, max_iterations) if finish else max_iterations
         self.switch = max(switch, tolerance) if finish else tolerance
         if not any(energy.has_scalar_stiffness for energy in potential.energies):
             raise ValueError("LBFGS: no term of this potential has a scalar stiffness to precondition with")
@@ -57,7 +62,11 @@ class LBFGS:
         self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
         # Without inertia and pins rigid motions would leave the preconditioner singular.
         self._floor = FIRST_SHIFT * cloth.masses[cloth.free] * 30**2
-        self._newton = Newton(potential, tolerance=tolerance, timeout=timeout) if finish else None
+        self._newton: Newton | None = None
+        if finish:
+            self._newton = Newton(
+                potential, tolerance=tolerance, max_iterations=max_iterations, timeout=timeout, reuse=True
+            )
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]."""
@@ -65,18 +74,7 @@ class LBFGS:
         status, reason = run.to_the_end()
         if self._newton is None or status in ("diverged", "timeout"):
             return run.result(status, reason)
-        rest = self._newton.minimise(run.x)
-        return Result(
-            positions=rest.positions,
-            status=rest.status,
-            reason=rest.reason,
-            iterations=run.iterations + rest.iterations,
-            factorisations=run.factorisations + rest.factorisations,
-            gradient_norm=rest.gradient_norm,
-            energy=rest.energy,
-            terms=rest.terms,
-            seconds={part: run.seconds[part] + rest.seconds[part] for part in run.seconds},
-        )
+        return self._newton.minimise(run.x, after=run)
 
 
 class _Run(Descent):
@@ -85,7 +83,7 @@ class _Run(Descent):
     def __init__(self, owner: LBFGS, x: np.ndarray) -> None:
         super().__init__(owner.potential, x)
         self.o = owner
-        self.pairs: deque[tuple[np.ndarray, np.ndarray, float]] = deque(maxlen=owner.memory)
+        self.secants = Secants(owner.memory)
 
     def to_the_end(self) -> tuple[str, str]:
         if not self.finite:
@@ -97,7 +95,7 @@ class _Run(Descent):
                 return "max_iterations", f"gave up after {self.iterations} iterations"
             if self.late(self.o.timeout):
                 return "timeout", f"gave up after {self.o.timeout:g} s"
-            if not self.step():
+            if not self.secant_step(self.secants, self.solve):
                 return "stalled", "no step along the quasi-Newton direction lowers the energy"
             self.iterations += 1
         return "max_iterations", "gradient within tolerance; curvature not checked"
@@ -113,45 +111,8 @@ class _Run(Descent):
         self.seconds["factorise"] += time.perf_counter() - middle
         return done
 
-    def direction(self) -> np.ndarray:
-        """-H g by the two-loop recursion (Nocedal and Wright 2006, algorithm 7.4)."""
+    def solve(self, q: np.ndarray) -> np.ndarray:
         start = time.perf_counter()
-        q = -self.g
-        alphas = []
-        for s, y, rho in reversed(self.pairs):
-            alpha = rho * float(np.vdot(s, q))
-            alphas.append(alpha)
-            q = q - alpha * y
         p = self.o._solver.solve(q.reshape(-1, 3)).ravel()  # x, y and z share one matrix
-        for (s, y, rho), alpha in zip(self.pairs, reversed(alphas)):
-            p += (alpha - rho * float(np.vdot(y, p))) * s
         self.seconds["solve"] += time.perf_counter() - start
         return p
-
-    def step(self) -> bool:
-        """One accepted step; a direction that fails is tried again with an empty memory."""
-        while True:
-            p = self.direction()
-            slope = float(np.vdot(self.g, p))
-            if np.isfinite(slope) and slope < 0 and self.line_search(p, slope):
-                return True
-            if not self.pairs:
-                return False
-            self.pairs.clear()
-
-    def line_search(self, p: np.ndarray, slope: float) -> bool:
-        step = self.spread(p)
-        alpha = self.potential.largest_step(self.x, step)
-        for _ in range(24):
-            trial = self.x + alpha * step
-            value, gradient = self.evaluate(trial)
-            if np.isfinite(value) and value <= self.value + SUFFICIENT_DECREASE * alpha * slope:
-                s, y = alpha * p, gradient - self.g
-                curvature = float(np.vdot(s, y))
-                # Pairs of negative curvature would make the estimate indefinite.
-                if curvature > 1e-10 * float(np.linalg.norm(s) * np.linalg.norm(y)):
-                    self.pairs.append((s, y, 1.0 / curvature))
-                self.x, self.value, self.g = trial, value, gradient
-                return True
-            alpha *= 0.5
-        return False
