@@ -46,7 +46,7 @@ class StretchStVK(Energy):
         area = torch.as_tensor(self.areas).to(u)
         Ds = torch.stack([u[..., 1, :] - u[..., 0, :], u[..., 2, :] - u[..., 0, :]], dim=-1)
         F = Ds @ Dm_inverse
-        G = 0.5 * (F.transpose(-1, -2) @ F - torch.eye(2).to(u))
+        G = 0.5 * (F.transpose(-1, -2) @ F - torch.eye(2, dtype=u.dtype, device=u.device))
         trace = G[..., 0, 0] + G[..., 1, 1]
         return area * (0.5 * self.lam * trace**2 + self.mu * (G * G).sum((-1, -2)))
 

@@ -1,0 +1,168 @@
+"""The step that a GPU runs, on the CPU: torch definitions and torch contact give what the kernels give, and
+nothing is made anywhere but where it is told to."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from dressing import swaying, tube_dress
+from torch.overrides import TorchFunctionMode
+
+from reference_sim.energies import BendHinge, ContactPenalty, StretchStVK
+from snug.contact import Anchors, Patch
+from snug.device import DeviceError, find_device
+from snug.lanes import lane_kernel
+from snug.recipe import DEFAULT, PAPER
+from snug.skinning import skin
+from snug.tensor_anchors import TensorAnchors
+from snug.trainer import Trainer
+from snug.training_set import TrainingSet
+
+PLAIN = replace(DEFAULT, mixed=0.0)
+CPU = torch.device("cpu")
+
+
+def made(recipe, *, kernels, kind="snug"):
+    return Trainer(kind, tube_dress(), [swaying(30)], steps=20, seed=0, recipe=recipe, kernels=kernels)
+
+
+@pytest.mark.parametrize(
+    ("kind", "recipe"),
+    [
+        ("snug", PLAIN),
+        ("snug", PAPER),
+        ("pbns", replace(PLAIN, material="pbns", contact_samples="vertices")),
+        ("snug", replace(PLAIN, material="springs")),
+    ],
+    ids=["default", "paper", "pbns-springs", "springs"],
+)
+def test_definitions_train_as_the_kernels_do(kind, recipe):
+    """Several steps: terms, and the gradient that the last of them left behind."""
+    fast, slow = (made(replace(recipe, contact_refresh=0.0), kernels=k, kind=kind) for k in (True, False))
+    with torch.no_grad():  # off the template and into the skin, so that every term has something to say
+        for trainer in (fast, slow):
+            generator = torch.Generator().manual_seed(1)
+            noise = torch.randn(trainer.network.offsets.weight.shape, generator=generator)
+            trainer.network.offsets.weight += (1.5 if kind == "pbns" else 0.06) * noise
+    for number in range(3):
+        one, other = fast.step(number), slow.step(number)
+        assert one.keys() == other.keys()
+        for name, value in one.items():
+            assert other[name] == pytest.approx(value, rel=1e-5), name
+    if "collision" in one:
+        assert one["collision"] > 1e-4
+    for name, parameter in fast.network.named_parameters():
+        theirs = dict(slow.network.named_parameters())[name].grad
+        assert (parameter.grad - theirs).norm() < 1e-4 * parameter.grad.norm() + 1e-9, name
+
+
+def test_torch_search_is_no_worse_than_the_walk():
+    dressed, motion = tube_dress(), swaying()
+    contact = ContactPenalty(dressed.cloth)
+    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
+    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(motion.poses[[3, 8]])
+    positions = skin(torch.as_tensor(patch.rest), weights, transforms)
+    garment = skin(dressed.rest(), dressed.weights(5), transforms)[1].numpy()
+    samples = (contact.sample_matrix @ garment + [0.0, 0.05, 0.0]).astype(np.float32)
+    walk, brute = Anchors(patch, 2), TensorAnchors(patch, 2, CPU)
+    walk.renew(1, samples, positions[1].numpy())
+    brute.renew(1, torch.as_tensor(samples), positions[1])
+    found = []
+    for anchors in (walk, brute):
+        faces = patch.faces[np.asarray(anchors.faces[1])]
+        last = np.asarray(anchors.barycentric[1])
+        corner = positions[1].numpy()[faces]
+        point = corner[:, 0] + np.einsum("sc,sci->si", last, corner[:, 1:] - corner[:, :1])
+        found.append(np.linalg.norm(point - samples, axis=1))
+        assert last.min() > -1e-5 and last.sum(1).max() < 1 + 1e-5
+    assert (found[1] < found[0] + 1e-5).all() and np.mean(np.abs(found[1] - found[0]) < 1e-5) > 0.95
+    assert list(walk.age) == list(brute.age) and (brute.faces[0].numpy() == walk.faces[0]).all()
+
+
+def test_torch_planes_are_the_kernels_planes():
+    dressed, motion = tube_dress(), swaying()
+    contact = ContactPenalty(dressed.cloth)
+    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
+    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
+    positions = skin(torch.as_tensor(patch.rest), weights, dressed.transforms(motion.poses[:3]))
+    numbers, torches = Anchors(patch, 3), TensorAnchors(patch, 3, CPU)
+    frames = np.array([2, 0])
+    points, normals = numbers.planes(frames, frames, positions.numpy(), patch.normals(positions.numpy()))
+    theirs = torches.planes(frames, frames, positions, torches.normals(positions))
+    assert np.abs(points - theirs[0].numpy()).max() < 1e-6
+    # A normal on the border of two of its 127 steps may fall on either side.
+    off = np.abs(normals - theirs[1].numpy()).max(-1)
+    assert np.mean(off > 1e-6) < 0.01 and off.max() < 0.01
+
+
+MAKERS = (
+    torch.zeros, torch.ones, torch.full, torch.empty, torch.eye, torch.arange, torch.tensor, torch.as_tensor,
+    torch.from_numpy, torch.rand, torch.randn, torch.randperm,
+)  # fmt: skip
+
+
+class Unplaced(TorchFunctionMode):
+    """Lists tensors that are made without a word about the device they belong on."""
+
+    def __init__(self):
+        super().__init__()
+        self.found = []
+
+    def __torch_function__(self, function, types, args=(), kwargs=None):
+        kwargs = kwargs or {}
+        if function in MAKERS and kwargs.get("device") is None and not isinstance(args[0], torch.Tensor):
+            self.found.append(function.__name__)
+        return function(*args, **kwargs)
+
+
+@pytest.mark.parametrize("recipe", [PLAIN, PAPER], ids=["default", "paper"])
+def test_a_step_makes_nothing_but_where_it_is_told_to(recipe):
+    trainer = made(replace(recipe, contact_refresh=0.1), kernels=False)
+    with Unplaced() as unplaced:
+        row = trainer.step(0)
+    assert unplaced.found == [] and np.isfinite(row["loss"])
+
+
+def test_a_set_lies_where_it_is_told_to():
+    meta = torch.device("meta")
+    data = TrainingSet(tube_dress(), [swaying(12)], PAPER, features="motion", sequences=True, device=meta)
+    batch = data.batch(np.array([0, 1]), np.zeros((2, 10)))
+    for tensor in (batch.features, batch.rest, batch.transforms, batch.ahead, batch.betas):
+        assert tensor.device == meta
+    assert batch.transforms.shape == (2, 3, 24, 3, 4) and batch.rest.shape == (2, 1, 150, 3)
+
+
+@pytest.mark.parametrize("count", [1, 16, 21])
+@pytest.mark.parametrize("E", [StretchStVK, BendHinge])
+def test_lanes_agree_with_the_definition(E, count):
+    """Also where hinges are folded over and where a configuration is not finite."""
+    dressed = tube_dress()
+    energy, random = E(dressed.cloth), np.random.default_rng(count)
+    crumpled = np.where(np.arange(count) % 3, 0.004, 0.05)[:, None, None]
+    x = dressed.cloth.rest_positions + crumpled * random.normal(size=(count, dressed.vertices, 3))
+    x = x.astype(np.float32)
+    values, gradients = lane_kernel(energy)(x)
+    for n in range(count):
+        exact, slope = energy.value_and_gradient(x[n].astype(float))
+        assert values[n] == pytest.approx(exact, rel=2e-5)
+        assert np.linalg.norm(gradients[n] - slope) < 2e-4 * np.linalg.norm(slope)
+    assert lane_kernel(ContactPenalty(dressed.cloth)) is None
+    x[-1, 3] = np.nan
+    values, _ = lane_kernel(energy)(x)
+    assert np.isnan(values[-1]) and np.isfinite(values[:-1]).all()
+
+
+def test_absent_devices_are_one_line(capsys, tmp_path):
+    from snug.train import main
+
+    for name in ("tpu", "mps", "cuda:99"):
+        with pytest.raises(DeviceError, match=f"--device {name}"):
+            find_device(name)
+    if not torch.cuda.is_available():
+        out = tmp_path / "model.safetensors"
+        assert main(["--device", "cuda", "-o", str(out)]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and "--device cuda" in error and "--device cpu" in error
+        assert not out.exists()
