@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .command_options import DEFAULT_FRAMES, make_parser
+from .command_terms import objection, terms
 from .material import Material
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     import numpy as np
 
     from .cloth import Cloth
-    from .energies.energy import Energy
     from .obstacle import Obstacle
 
 FAR = 1.0  # [m] from which garment and obstacle hardly belong together
@@ -47,6 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: Namespace) -> int:
     _check_paths(options)
+    if contradiction := objection(options):
+        raise InputError(contradiction)
     cloth = _read_cloth(options)
     obstacle = _read_obstacle(cloth, options)
     frames = options.frames
@@ -60,9 +62,11 @@ def _run(options: Namespace) -> int:
         _say(f"note: {note}")
     if options.resume and not options.output.exists():
         _say(f"note: {options.output} does not exist yet: starting at the beginning")
+    given = {"method": options.method, "max_iterations": options.max_iterations}
+    chosen = {name: value for name, value in given.items() if value is not None}
     trajectory = simulate(
         cloth,
-        _terms(cloth, obstacle, options),
+        terms(cloth, options),
         dt=options.dt,
         frames=frames,
         obstacle=obstacle,
@@ -71,7 +75,7 @@ def _run(options: Namespace) -> int:
         resume=options.resume,
         progress=None if options.quiet else options.output.name,
         tolerance=options.tolerance,
-        max_iterations=options.max_iterations,
+        **chosen,
     )
     written = [options.output]
     if options.pc2:
@@ -173,8 +177,6 @@ def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
 
 def _read_obstacle(cloth: Cloth, options: Namespace) -> Obstacle | None:
     if options.obstacle is None:
-        if options.obstacle_rest or options.friction:
-            raise InputError("--obstacle-rest and --friction need an --obstacle")
         return None
     from .cloth import MeshError
     from .exchange import TRAJECTORY_SUFFIXES, read_mesh, read_sequence, to_metres_y_up
@@ -205,30 +207,6 @@ def _read_obstacle(cloth: Cloth, options: Namespace) -> Obstacle | None:
             f"vertex {distance.argmin()} {-1e3 * distance.min():.0f} mm deep"
         )
     return obstacle
-
-
-def _terms(cloth: Cloth, obstacle: Obstacle | None, options: Namespace) -> list[Energy]:
-    from .energies import BendHinge, Gravity, StretchStVK
-
-    angles = "rest" if options.rest_angles == "rest" else 0.0
-    terms: list[Energy] = [
-        StretchStVK(cloth),
-        BendHinge(cloth, scaling=options.bending_scaling, rest_angles=angles),
-        Gravity(cloth),
-    ]
-    if obstacle is not None:
-        from .energies import ContactFriction, ContactPenalty
-
-        contact = ContactPenalty(
-            cloth,
-            stiffness=options.contact_stiffness,
-            margin=options.contact_margin,
-            samples=options.contact_samples,
-        )
-        terms.append(contact)
-        if options.friction:
-            terms.append(ContactFriction(contact, coefficient=options.friction))
-    return terms
 
 
 def _say(text: str) -> None:

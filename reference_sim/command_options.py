@@ -25,6 +25,7 @@ EXAMPLES = """examples:
   python -m reference_sim.simulate shirt.ply --units cm --up z --obstacle 'walk/body_*.ply' \\
       --obstacle-rest tpose.ply --pc2 shirt_walk.pc2 -o shirt_walk.vtkhdf
   python -m reference_sim.simulate shirt.obj --obstacle walk/ -o out.vtkhdf --resume     # after a kill
+  python -m reference_sim.simulate skirt.obj --pins top --self-contact --friction 0.3 -o skirt.vtkhdf
 
 The output is in metres with y up, whatever the input was in. ParaView opens the .vtkhdf as it is; Blender
 takes the .obj beside the .pc2 and a Mesh Cache modifier.
@@ -102,19 +103,41 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _add_contact_and_time(parser: argparse.ArgumentParser) -> None:
-    contact = parser.add_argument_group("contact with the obstacle")
+    contact = parser.add_argument_group("contact")
     contact.add_argument(
-        "--contact-stiffness", type=_positive, default=3.4e6, metavar="J_M5", help="default 3.4e6"
+        "--contact-stiffness", type=_positive, metavar="J_M5", help="of the penalty [J/m^5] (default 3.4e6)"
     )
-    contact.add_argument("--contact-margin", type=_positive, default=4e-3, metavar="M", help="default 0.004")
+    contact.add_argument(
+        "--contact-margin", type=_positive, metavar="M", help="of the penalty [m] (default 0.004)"
+    )
     contact.add_argument(
         "--contact-samples",
         choices=("all", "vertices"),
-        default="all",
         help="all: vertices, edge midpoints and centroids (default)",
     )
     contact.add_argument(
         "--friction", type=_not_negative, default=0.0, metavar="MU", help="coefficient (default 0)"
+    )
+    contact.add_argument(
+        "--barrier",
+        action="store_true",
+        help="IPC's barrier in place of the penalty: nothing passes, twenty times the time (needs ipctk)",
+    )
+    contact.add_argument(
+        "--self-contact", action="store_true", help="the cloth meets itself too, by the barrier"
+    )
+    contact.add_argument(
+        "--barrier-distance", type=_positive, metavar="M", help="where it begins [m] (default 0.002)"
+    )
+    contact.add_argument(
+        "--barrier-stiffness", type=_positive, metavar="PA", help="its pressure [Pa] (default 100)"
+    )
+    contact.add_argument(
+        "--area-barrier",
+        type=_not_negative,
+        default=0.0,
+        metavar="J_M2",
+        help="keeps triangles from collapsing [J/m^2]; 100 is enough (default 0: none)",
     )
 
     steps = parser.add_argument_group("time and solver")
@@ -137,7 +160,12 @@ def _add_contact_and_time(parser: argparse.ArgumentParser) -> None:
         help="largest gradient component, in mean vertex weights (default 1e-6)",
     )
     steps.add_argument(
-        "--max-iterations", type=_count, default=300, metavar="N", help="per step (default 300)"
+        "--method",
+        choices=("newton", "lbfgs"),
+        help="lbfgs, finished by newton (default), or newton alone (default with a barrier)",
+    )
+    steps.add_argument(
+        "--max-iterations", type=_count, metavar="N", help="per step (default 300 of newton, 500 of lbfgs)"
     )
     steps.add_argument("--quiet", action="store_true", help="no progress bar, no summary")
 

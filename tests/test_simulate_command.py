@@ -143,6 +143,45 @@ def test_options_reach_the_simulation(folder):
     assert list(made["material"].values()) == [50e3, 0.3, 0.001, 300.0, 1e-5]
 
 
+def test_the_chosen_minimiser_and_barriers_are_the_ones_that_ran(folder):
+    words = ["sheet.obj", "--pins", "0,6", "--frames", "3", "--quiet", "-o"]
+    assert main([*words, "a.vtkhdf", "--method", "newton", "--area-barrier", "50"]) == 0
+    assert main([*words, "b.vtkhdf", "--method", "lbfgs", "--max-iterations", "400"]) == 0
+    newton, lbfgs = Trajectory.load("a.vtkhdf"), Trajectory.load("b.vtkhdf")
+    assert newton.provenance["options"] == {"method": "newton", "tolerance": 1e-6}
+    assert newton.provenance["terms"]["area_barrier"]["stiffness_J_per_m2"] == 50
+    assert lbfgs.provenance["options"] == {"method": "lbfgs", "tolerance": 1e-6, "max_iterations": 400}
+    assert "area_barrier" not in lbfgs.provenance["terms"]
+    np.testing.assert_allclose(newton.positions, lbfgs.positions, atol=1e-4)
+    assert lbfgs.frame_fields["factorisations"][2] < lbfgs.frame_fields["iterations"][2]
+
+
+def test_a_barrier_takes_the_place_of_the_penalty_and_nothing_passes(folder):
+    pytest.importorskip("ipctk")
+    words = ["sheet.obj", "--barrier", "--barrier-distance", "0.003", "--barrier-stiffness", "200"]
+    more = ["--self-contact", "--friction", "0.3", "--quiet", "-o", "a.vtkhdf"]
+    assert main([*words, "--obstacle", "ball", *more]) == 0
+    made = Trajectory.load("a.vtkhdf")
+    barrier = made.provenance["terms"]["barrier"]
+    assert (barrier["distance_m"], barrier["stiffness_Pa"], barrier["self_contact"]) == (3e-3, 200, True)
+    assert "collision" not in made.provenance["terms"]
+    assert made.provenance["options"]["method"] == "newton"
+    assert made.provenance["terms"]["friction"]["coefficient"] == 0.3
+    assert made.frame_fields["energy/barrier"][-1] > 0
+    # Without an obstacle there is still the cloth itself to meet.
+    assert (
+        main(["sheet.obj", "--pins", "0", "--self-contact", "--frames", "2", "--quiet", "-o", "b.vtkhdf"])
+        == 0
+    )
+    assert Trajectory.load("b.vtkhdf").provenance["terms"]["barrier"]["self_contact"]
+
+
+def test_a_missing_package_is_said_with_its_remedy(folder, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipctk", None)
+    assert main(["sheet.obj", "--self-contact", "-o", "a.vtkhdf"]) == 2
+    assert "needs the package ipctk: pip install ipctk" in capsys.readouterr().err
+
+
 def test_not_converged_is_status_1(folder, capsys):
     assert main(["sheet.obj", "--pins", "0", "--frames", "4", "--max-iterations", "1", "-o", "a.vtkhdf"]) == 1
     out = capsys.readouterr().out
@@ -193,6 +232,25 @@ BAD = {
         "sheet.obj: other faces than ball: export both from one mesh",
     ),
     "rest alone": (["sheet.obj", "--obstacle-rest", "sheet.obj"], "need an --obstacle"),
+    "friction alone": (
+        ["sheet.obj", "--friction", "0.3"],
+        "need an --obstacle, or --friction --self-contact",
+    ),
+    "barrier of nothing": (["sheet.obj", "--barrier"], "--barrier needs an --obstacle; without one give"),
+    "penalty of nothing": (["sheet.obj", "--contact-margin", "0.01"], "--contact-margin needs an --obstacle"),
+    "penalty and barrier": (
+        ["sheet.obj", "--obstacle", "ball", "--barrier", "--contact-stiffness", "1e6"],
+        "--contact-stiffness belongs to the penalty, which a barrier replaces: leave it out",
+    ),
+    "barrier's distance": (
+        ["sheet.obj", "--obstacle", "ball", "--barrier-distance", "0.01"],
+        "--barrier-distance needs --barrier or --self-contact",
+    ),
+    "barrier too wide": (
+        ["sheet.obj", "--self-contact", "--barrier-distance", "0.5"],
+        "0.5",
+    ),
+    "method": (["sheet.obj", "--method", "bfgs"], "argument --method: invalid choice: 'bfgs'"),
     "mesh": (["twice.obj"], "twice.obj: vertices 0 and 9 coincide: merge them"),
     "material": (
         ["sheet.obj", "--poisson-ratio", "0.6"],
