@@ -15,7 +15,7 @@ from meshes import grid
 from benchmarks.checks import refusals
 from benchmarks.checks.hard_steps import sheet
 from benchmarks.checks.starts import START, VELOCITIES
-from benchmarks.checks.verdict import attempt, examine, judge
+from benchmarks.checks.verdict import attempt, examine, judge, price_of_collapse
 from benchmarks.guarded import Broken, Guarded
 from benchmarks.results import Row
 from benchmarks.suites import extremes
@@ -111,8 +111,25 @@ def test_an_honest_failure_keeps_its_name_and_says_what_collapsed(solved):
     crushed = sheet(start="a thousandth")
     lost = judge(crushed, claiming(crushed.guess, "stalled")).reason
     assert re.search(r"; 1\d\d triangles have collapsed", lost) and "area barrier" in lost
+    assert "collapse pays" not in lost
     nameless = attempt(sheet(start="point", pins="none", speed=0.0))
     assert nameless.status == "diverged" and nameless.value is None and "not finite" in nameless.reason
+
+
+def test_where_collapse_pays_is_a_matter_of_two_numbers():
+    """Of every case that does not converge for want of a minimum; the ordinary sheet is far from it."""
+    for options in ({"stiffness": 1e-2}, {"terms": "bending"}, {"bending": 1e4}, {"bending": 100.0}):
+        cost, gain = price_of_collapse(sheet(**options).potential)
+        assert (gain > cost).any(), options
+    cost, gain = price_of_collapse(sheet().potential)
+    assert (gain < 0.1 * cost).all()
+    # A triangle in the middle of the sheet has three hinges, and a membrane of lambda + mu over 2 per area.
+    assert gain.max() == pytest.approx(3 * 0.5 * 3.96e-5 * np.pi**2)
+    assert cost.sum() == pytest.approx(0.5 * (20.864 + 11.077) * 0.16, rel=1e-3)
+    soft = sheet(stiffness=1e-3)
+    assert "collapse pays" in judge(soft, claiming(soft.guess, "stalled")).reason
+    barrier = sheet(stiffness=1e-3, terms="membrane+bending+area")
+    assert "collapse pays" not in judge(barrier, claiming(barrier.guess, "stalled")).reason
 
 
 def test_the_judge_uses_no_kernel(solved, monkeypatch):

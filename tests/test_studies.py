@@ -249,10 +249,12 @@ def test_how_a_roll_out_is_judged():
     fine, near = np.zeros((5, 3, 3)), {"motion/offset": 80.0}
     lost = fine.copy()
     lost[3, 1, 1] = np.nan
-    assert hard_motions.outcome(RollOut(fine), near) == ("ok", "")
-    assert hard_motions.outcome(RollOut(lost), near) == ("diverged", "not finite from frame 3 on")
-    assert hard_motions.outcome(RollOut(fine), {"motion/offset": 700.0})[0] == "diverged"
-    assert hard_motions.outcome(RollOut(fine, "stalled", "why"), near) == ("stalled", "why")
+    away = {"motion/offset": 700.0}
+    assert hard_motions.outcome("snug", RollOut(fine), near) == ("ok", "")
+    assert hard_motions.outcome("snug", RollOut(lost), near) == ("diverged", "not finite from frame 3 on")
+    assert hard_motions.outcome("snug", RollOut(fine), away)[0] == "diverged"
+    assert hard_motions.outcome("simulation", RollOut(fine), away) == ("ok", "")
+    assert hard_motions.outcome("simulation", RollOut(fine, "stalled", "why"), near) == ("stalled", "why")
     assert len(hard_motions.whole_frames(lost)) == 3
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 
 from reference_sim import Potential, Result, minimise
-from reference_sim.energies import Energy
+from reference_sim.energies import BendHinge, Energy
 
 from .hard_steps import HardStep, sheet
 
@@ -101,18 +101,49 @@ def first_rise(potential: Potential, points: Sequence[np.ndarray]) -> str:
 
 
 def collapse(potential: Potential, x: np.ndarray) -> str:
-    """How many triangles collapsed: what a stall of these energies mostly comes from."""
+    """How many triangles collapsed, and whether they may: what a stall of these energies comes from.
+
+    A triangle without area has no normal, so that its hinges turn to any angle at no way at all: the energy
+    jumps there and takes no minimum. What keeps a triangle from it is its membrane alone.
+    """
+    names = [energy.name for energy in potential.energies]
+    if "bending" not in names:
+        return ""
     cloth = potential.cloth
     corner = x[cloth.faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     lost = int((0.5 * np.linalg.norm(normal, axis=1) < COLLAPSED * cloth.areas).sum())
-    if not lost or not any(energy.name == "bending" for energy in potential.energies):
-        return ""
-    plural = "s have" if lost > 1 else " has"
-    return (
-        f"; {lost} triangle{plural} collapsed, where a hinge's energy jumps: no minimum need exist, "
-        "and the area barrier prevents it"
-    )
+    words = ""
+    if lost:
+        plural = "s have" if lost > 1 else " has"
+        words = (
+            f"; {lost} triangle{plural} collapsed, where a hinge's energy jumps: no minimum need exist, "
+            "and the area barrier prevents it"
+        )
+    cost, gain = price_of_collapse(potential)
+    if "area_barrier" not in names and (gain > cost).any():
+        face = int(np.argmax(gain - cost))
+        words += (
+            f"; collapse pays: it costs a triangle at most (lambda + mu)/2 A = {cost[face]:.2g} J and frees "
+            f"its hinges of up to sum k pi^2/2 = {gain[face]:.2g} J"
+        )
+    return words
+
+
+def price_of_collapse(potential: Potential) -> tuple[np.ndarray, np.ndarray]:
+    """Of each face (F,) [J]: at most what its membrane pays for collapsing and its hinges hold."""
+    cloth = potential.cloth
+    terms = {energy.name: energy for energy in potential.energies}
+    m = cloth.material
+    cost = 0.5 * (m.lame_lambda + m.lame_mu) * cloth.areas * ("strain" in terms)
+    faces = {tuple(sorted(face)): place for place, face in enumerate(cloth.faces.tolist())}
+    gain = np.zeros(len(cloth.faces))
+    bending = terms.get("bending")
+    if isinstance(bending, BendHinge):
+        for (a, b, c, d), stiffness in zip(bending.stencils.tolist(), bending.stiffness):
+            for corners in ((a, b, c), (a, b, d)):
+                gain[faces[tuple(sorted(corners))]] += 0.5 * stiffness * np.pi**2
+    return cost, gain
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,12 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-INTERNAL = ("strain", "bending", "spring", "area")  # their forces on a cloth sum to nothing, and turn nothing
+INTERNAL = (
+    "strain",
+    "bending",
+    "spring",
+    "area_barrier",
+)  # their forces on a cloth sum to nothing, and turn nothing
 RISE = 1e-9  # of the larger side: beyond it, a frame breaks an inequality
 
 

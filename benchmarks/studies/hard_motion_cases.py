@@ -76,14 +76,14 @@ def posed(**degrees: tuple[float, float, float]) -> Callable[[Motion], Motion]:
 
 
 def from_t_pose(walk: Motion) -> Motion:
-    """From T-pose into the walk, half a second of it."""
+    """From T-pose into the walk's first pose and ten frames on."""
     from snug.motion import transition
 
     t_pose = np.zeros_like(walk.poses[0])
     t_pose[0] = walk.poses[0, 0]
-    poses = np.concatenate([transition(t_pose, walk.poses[0], APPROACH), walk.poses[1:16]])
+    poses = np.concatenate([transition(t_pose, walk.poses[0], APPROACH), walk.poses[1:10]])
     start = np.repeat(walk.translations[:1], APPROACH, axis=0)
-    return replace(walk, poses=poses, translations=np.concatenate([start, walk.translations[1:16]]))
+    return replace(walk, poses=poses, translations=np.concatenate([start, walk.translations[1:10]]))
 
 
 def root_jumps(walk: Motion) -> Motion:
