@@ -9,8 +9,10 @@ from __future__ import annotations
 import ast
 import dataclasses
 import hashlib
+import importlib.util
 import json
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -55,9 +57,7 @@ def code_of(*modules: str) -> dict[str, str]:
     """File -> digest of its code, of these modules and all of ours that they import, directly or not."""
     found: set[str] = set()
     for module in modules:
-        path = _file_of(module)
-        if path is None:
-            raise ValueError(f"no module {module} in this project")
+        path = _file_of(module) or _elsewhere(module)
         found |= _closure(path)
     return {path: _source(path)[0] for path in sorted(found)}
 
@@ -66,6 +66,16 @@ def preset_values(preset: Preset, code: Iterable[str]) -> dict[str, Any]:
     """The values of the preset that those files read; all of them where one hands the preset on unread."""
     names = set().union(*(_source(path)[2] for path in code))
     return {f.name: getattr(preset, f.name) for f in dataclasses.fields(preset) if f.name in names}
+
+
+def _elsewhere(module: str) -> str:
+    """The file of a module that is not ours: a method or a scene of a user. Raises ValueError."""
+    found = None
+    with suppress(ModuleNotFoundError):  # of its package
+        found = importlib.util.find_spec(module)
+    if found is None or found.origin is None:
+        raise ValueError(f"no module {module}")
+    return found.origin
 
 
 def _closure(root: str) -> set[str]:

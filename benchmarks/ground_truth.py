@@ -6,17 +6,17 @@ Functions for workers, each of (wardrobe, tell, ...); see benchmarks.workers.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .presets import Preset
 from .results import RunFolder, replacing
 from .scene import BuiltScene, Scene
 from .wardrobe import Wardrobe
 
-Tell = Callable[[int], None]
-
+if TYPE_CHECKING:
+    from .workers import Tell
 
 @dataclass(frozen=True)
 class Settled:

@@ -7,14 +7,13 @@ from pathlib import Path
 
 from .agenda import REFERENCE
 from .cell import Outcome, Task, built
-from .ground_truth import Tell
 from .methods import find_method
 from .plan import Cell, Plan
 from .presets import Preset
 from .records import Records, Work
 from .results import RunFolder
 from .wardrobe import Wardrobe
-from .workers import Job
+from .workers import Job, Tell
 
 
 def jobs_of_scenes(

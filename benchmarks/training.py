@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .ground_truth import Tell
 from .results import RunFolder
 from .wardrobe import Wardrobe
+
+if TYPE_CHECKING:
+    from .workers import Tell
 
 LOG_EVERY = 20  # training steps between two reports of progress
 

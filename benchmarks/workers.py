@@ -23,6 +23,7 @@ from .records import Records, Work
 from .wardrobe import Wardrobe
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
+Tell = Callable[[int], None]
 POLL = 0.2  # [s] between looks at the progress
 
 _wardrobe: Wardrobe | None = None

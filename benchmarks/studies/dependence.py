@@ -23,7 +23,7 @@ from ..study import Tell
 if TYPE_CHECKING:
     from reference_sim import Trajectory
 
-    from ..ground_truth import Tell
+    from ..workers import Tell
     from ..presets import Preset
     from ..scene import BuiltScene
     from ..wardrobe import Wardrobe

@@ -25,7 +25,7 @@ from .hard_motion_cases import AFTER, GLITCH, HARD_MOTIONS, MOTION, ORDINARY_CAS
 from .hard_motion_stage import FREE, REFERENCE, Contestant, HardStage, RollOut, Trained, strains
 
 if TYPE_CHECKING:
-    from ..ground_truth import Tell
+    from ..workers import Tell
     from ..presets import Preset
     from ..scene import BuiltScene
     from ..wardrobe import Wardrobe

@@ -1,0 +1,66 @@
+"""Methods that do wrong, each in its own way: what the harness must survive and say."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+
+from reference_sim.trajectory import Trajectory
+
+
+class Misbehaving:
+    """Skips all physics; `how` says what it does instead of its work."""
+
+    def __init__(self, how: str) -> None:
+        self.how = how
+
+    def prepare(self, scene) -> None:
+        self.scene = scene
+        if self.how == "raise":
+            raise RuntimeError("broken on\npurpose")
+
+    def run(self) -> Trajectory:
+        scene = self.scene
+        still = np.repeat(np.asarray(scene.start)[None], scene.frames, axis=0)
+        getattr(self, f"_{self.how}", lambda _: None)(still)
+        return Trajectory(
+            positions=still, faces=np.asarray(scene.cloth.faces), times=np.arange(scene.frames) * scene.dt,
+            frame_seconds=np.full(scene.frames, 1e-6), status="ok",
+        )  # fmt: skip
+
+    def _hang(self, _) -> None:
+        subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+        while True:
+            time.sleep(0.05)
+
+    def _segfault(self, _) -> None:
+        signal.signal(signal.SIGSEGV, signal.SIG_DFL)
+        ctypes.string_at(0)
+
+    def _killed(self, _) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def _hungry(self, _) -> None:
+        raise MemoryError("no room")
+
+    def _early(self, positions) -> None:
+        """Comes back at once and goes on working in a thread."""
+
+        def work() -> None:
+            end = time.perf_counter() + 0.4
+            while time.perf_counter() < end:
+                positions[-1] += 1e-6
+
+        threading.Thread(target=work, daemon=True).start()
+
+
+def make(*, models: Path, seed: int, device: str, how: str) -> Misbehaving:
+    return Misbehaving(how)

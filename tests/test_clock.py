@@ -1,0 +1,120 @@
+"""The clock counts the work and nothing else, and finds out who comes back before the work is done."""
+
+from __future__ import annotations
+
+import multiprocessing
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from benchmarks.clock import SPREAD, clocked, median, spread
+
+
+def positions_of(made):
+    return made
+
+
+def work(seconds: float) -> None:
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
+def test_the_time_of_honest_work_is_believed():
+    def run():
+        work(0.1)
+        return np.zeros((2, 3, 3))
+
+    made, reading = clocked(run, of=positions_of)
+    assert made.shape == (2, 3, 3) and reading.complaint == ""
+    assert reading.seconds >= 0.1
+
+
+def test_what_is_made_only_when_it_is_looked_at_is_made_on_the_clock():
+    class Lazy:
+        def __array__(self, dtype=None, copy=None):
+            work(0.1)
+            return np.zeros((2, 3, 3))
+
+    _, reading = clocked(Lazy, of=positions_of)
+    assert reading.seconds >= 0.1
+
+
+def test_a_thread_that_goes_on_is_found():
+    positions, stop = np.zeros((2, 3, 3)), threading.Event()
+
+    def run():
+        def fill():
+            while not stop.is_set():
+                positions[1] += 1.0
+
+        threading.Thread(target=fill, daemon=True).start()
+        return positions
+
+    _, reading = clocked(run, of=positions_of)
+    stop.set()
+    assert "still changed" in reading.complaint
+
+
+@pytest.mark.parametrize("busy", [True, False])
+def test_a_thread_that_only_computes_or_only_waits_is_found_too(busy):
+    stop = threading.Event()
+
+    def run():
+        def go_on():
+            while not stop.is_set():
+                if not busy:
+                    stop.wait(0.01)
+
+        threading.Thread(target=go_on, name="behind", daemon=True).start()
+        return np.zeros((2, 3, 3))
+
+    _, reading = clocked(run, of=positions_of)
+    stop.set()
+    assert "at work" in reading.complaint or "behind was still running" in reading.complaint
+
+
+def test_a_process_that_goes_on_is_found():
+    process = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(30,), name="outside")
+
+    def run():
+        process.start()
+        return np.zeros((2, 3, 3))
+
+    _, reading = clocked(run, of=positions_of)
+    process.kill()
+    process.join()
+    assert "outside was still running" in reading.complaint
+
+
+CROWD = """
+import threading, zlib, numpy as np
+from benchmarks.clock import clocked
+data = bytes(40_000_000)
+def run():
+    threads = [threading.Thread(target=lambda: [zlib.crc32(data) for _ in range(30)]) for _ in range(2)]
+    [t.start() for t in threads]; [t.join() for t in threads]
+    return np.zeros((2, 3, 3))
+print(clocked(run, of=lambda made: made)[1].complaint)
+"""
+
+
+def test_more_than_one_thread_at_work_is_found_where_there_are_cores_for_it():
+    answers = []
+    for _ in range(3):  # on a machine that is busy with other things two threads get no more than one core
+        ended = subprocess.run([sys.executable, "-c", CROWD], capture_output=True, text=True, check=True)
+        answers.append(ended.stdout.strip())
+        if answers[-1]:
+            assert "more than one thread" in answers[-1]
+            return
+    pytest.skip("this machine gave two threads no more than one core")
+
+
+def test_spread_is_relative_to_the_median():
+    assert median([3.0, 1.0, 2.0]) == 2.0 and median([1.0, 3.0]) == 2.0
+    assert spread([1.0, 1.1, 0.9]) == pytest.approx(0.2) and spread([2.0]) == 0.0
+    assert 0.0 < SPREAD < 1.0

@@ -1,0 +1,117 @@
+"""What a piece of work depends on is found from the source: no more, so that it is kept; no less."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks import fingerprint
+from benchmarks.fingerprint import code_of, digest, preset_values
+from benchmarks.presets import find_preset
+
+FILES = {
+    "reference_sim/__init__.py": "from .cloth import Cloth\n",
+    "reference_sim/cloth.py": "class Cloth:\n    pass\n",
+    "reference_sim/stretch.py": "K = 1.0\n",
+    "reference_sim/bend.py": "K = 2.0\n",
+    "reference_sim/terms/__init__.py": "HOME = {'Stretch': 'stretch', 'Bend': 'bend'}\n",
+    "reference_sim/terms/stretch.py": "class Stretch:\n    pass\n",
+    "reference_sim/terms/bend.py": "class Bend:\n    pass\n",
+    "snug/network.py": "import torch\n",
+    "benchmarks/methods/__init__.py": "from . import one, other\n",
+    "benchmarks/methods/one.py": (
+        '"""Words."""\nfrom typing import TYPE_CHECKING\nfrom reference_sim import Cloth\n'
+        "from ..scene import build\nif TYPE_CHECKING:\n    from snug.network import Network\n"
+        "def make(preset):\n    from reference_sim.terms import Stretch\n    return preset.frames\n"
+    ),
+    "benchmarks/methods/other.py": "import snug.network\nfrom . import one\n",
+    "benchmarks/scene.py": "def build(sizes: Preset):\n    return sizes.sheet_cells\n",
+}
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A small project; gives a function that writes a file of it anew."""
+
+    def write(path: str, text: str) -> None:
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+        for name in ("_source", "_names_of", "_file_of"):
+            getattr(fingerprint, name).cache_clear()
+
+    monkeypatch.setattr(fingerprint, "ROOT", tmp_path)
+    for path, text in FILES.items():
+        write(path, text)
+    yield write
+    for name in ("_source", "_names_of", "_file_of"):
+        getattr(fingerprint, name).cache_clear()
+
+
+def test_the_code_is_what_is_imported_also_inside_functions_and_by_first_use(project):
+    assert set(code_of("benchmarks.methods.one")) == {
+        "benchmarks/methods/one.py", "benchmarks/scene.py", "reference_sim/__init__.py",
+        "reference_sim/cloth.py", "reference_sim/terms/__init__.py", "reference_sim/terms/stretch.py",
+    }  # fmt: skip
+    assert "snug/network.py" in code_of("benchmarks.methods.other")
+
+
+@pytest.mark.parametrize("path", ["reference_sim/terms/bend.py", "benchmarks/methods/other.py", "snug/network.py"])
+def test_what_is_not_used_may_change(project, path):
+    before = code_of("benchmarks.methods.one")
+    project(path, "CHANGED = True\n")
+    assert code_of("benchmarks.methods.one") == before
+
+
+@pytest.mark.parametrize("path", ["reference_sim/terms/stretch.py", "benchmarks/scene.py", "reference_sim/cloth.py"])
+def test_what_is_used_may_not(project, path):
+    before = code_of("benchmarks.methods.one")
+    project(path, FILES[path] + "CHANGED = True\n")
+    after = code_of("benchmarks.methods.one")
+    assert [name for name in after if after[name] != before[name]] == [path]
+
+
+def test_words_and_blanks_do_not_count(project):
+    before = code_of("benchmarks.methods.one")
+    text = FILES["benchmarks/methods/one.py"].replace("Words.", "Other words.")
+    project("benchmarks/methods/one.py", f"{text}\n\n# a remark\n")
+    assert code_of("benchmarks.methods.one") == before
+
+
+def test_the_presets_values_are_those_that_are_read(project):
+    smoke = find_preset("smoke")
+    found = preset_values(smoke, code_of("benchmarks.methods.one"))
+    assert found == {"frames": smoke.frames, "sheet_cells": smoke.sheet_cells}
+
+
+def test_an_unknown_module_is_named():
+    with pytest.raises(ValueError, match=r"benchmarks\.nothing"):
+        code_of("benchmarks.nothing")
+
+
+def test_digests_tell_values_apart():
+    @dataclasses.dataclass
+    class Pair:
+        a: np.ndarray
+        b: str
+
+    one = Pair(np.arange(3.0), "x")
+    assert digest(one) == digest(Pair(np.arange(3.0), "x"))
+    others = [Pair(np.arange(3.0) + 1e-16, "y"), Pair(np.arange(3), "x"), Pair(np.arange(3.0)[:, None], "x")]
+    assert len({digest(value) for value in (one, *others)}) == 4
+    with pytest.raises(TypeError, match="object"):
+        digest({"a": object()})
+
+
+def test_a_scene_without_obstacle_or_body_depends_on_neither():
+    code = code_of("benchmarks.cell", "benchmarks.scenes.hanging_sheet", "benchmarks.methods.simulation")
+    assert "reference_sim/energies/bend_hinge.py" in code and "reference_sim/minimise/newton.py" in code
+    unused = ("snug/", "reports/", "reference_sim/energies/contact", "benchmarks/methods/__init__")
+    assert [path for path in code if path.startswith(unused)] == []
+
+
+def test_training_does_not_hang_on_the_solver():
+    code = code_of("benchmarks.training")
+    assert "snug/loss.py" in code and "reference_sim/energies/bend_hinge.py" in code
+    assert [path for path in code if path.startswith("reference_sim/minimise")] == []
