@@ -162,7 +162,7 @@ ABLATIONS = (
     replace(DEFAULT, name="window12", window=12, batch=4),
     replace(DEFAULT, name="springs", material="springs"),
 )
-RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER, *ABLATIONS)}
+RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER, PBNS_SPRINGS, *ABLATIONS)}
 
 
 @dataclass(frozen=True)

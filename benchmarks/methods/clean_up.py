@@ -28,6 +28,7 @@ class CleanedNetwork:
     def prepare(self, scene: BuiltScene) -> None:
         from snug.clean_up import CleanUp
         from snug.dresser import DressedBody
+        from snug.rollout import predictions
         from snug.trained_model import TrainedModel
 
         assert scene.dressed is not None and scene.obstacle is not None
@@ -35,6 +36,7 @@ class CleanedNetwork:
         self.motion = scene.dressed.motion
         body, garment = scene.dressed.body, scene.dressed.garment
         self.dressed = DressedBody(body, garment)
+        self.frames = predictions(self.model, self.dressed, self.motion)
         positions = np.asarray(scene.obstacle.positions)
         self.clean = CleanUp(garment.rest_positions, body.shaped(), body.faces, positions)
         for frame in range(min(WARM_UP, self.motion.frames)):
@@ -42,14 +44,12 @@ class CleanedNetwork:
 
     def run(self) -> Trajectory:
         from snug.clean_up import MARGIN
-        from snug.rollout import predictions
 
-        frames = predictions(self.model, self.dressed, self.motion)
         positions = np.empty((self.motion.frames, self.dressed.vertices, 3))
         seconds = np.empty(self.motion.frames)
         for frame in range(self.motion.frames):
             start = time.perf_counter()
-            positions[frame] = self.clean(next(frames), frame)
+            positions[frame] = self.clean(next(self.frames), frame)
             seconds[frame] = time.perf_counter() - start
         finite = bool(np.isfinite(positions).all())
         return Trajectory(
