@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .cell import Outcome
+from .hem_dynamics import hem_motion
 from .methods.solvers import MOVED
 from .metrics.curvature import CurvatureSeries, curvature_series
 from .metrics.energy import energy_series, mean_energy
@@ -47,6 +48,7 @@ def measure_scene(
     curvatures = [curvature_series(x, scene.cloth.faces) for x in positions]
     inside = penetration(positions, scene.obstacle) if scene.obstacle is not None else []
     reference = find_reference(outcomes, positions, curvatures)
+    hem = hem_motion(scene, reference.positions, run) if reference is not None else None
     skinned = skinned_frames(scene) if any("speed" in o.cell.suites for o in outcomes) else None
     found: list[dict[str, float]] = []
     for k, (outcome, trajectory) in enumerate(zip(outcomes, trajectories)):
@@ -64,8 +66,11 @@ def measure_scene(
             exact = scene.exact[: trajectory.frames]
             metrics["exact/distance"] = float(np.linalg.norm(positions[k] - exact, axis=2).max())
         held = run.trajectory_path(scene.name, f"{outcome.cell.method}-held", outcome.cell.seed)
-        if held.is_file():
-            metrics["dynamics/held_difference"] = rms(positions[k], Trajectory.load(held).positions)
+        still = Trajectory.load(held).positions if held.is_file() else None
+        if still is not None:
+            metrics["dynamics/held_difference"] = rms(positions[k], still)
+        if hem is not None:
+            metrics |= hem.measure(positions[k], still)
         found.append(metrics)
     methods = [outcome.cell.method for outcome in outcomes]
     if REFERENCE in methods:

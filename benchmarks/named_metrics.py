@@ -21,7 +21,9 @@ DEEP = 5e-3  # [m] below the skin: what an eye sees
 UNITS = {
     "energy": "J", "curvature": "1/m", "distance": "mm", "penetration/vertices": "%",
     "penetration/deep": "%", "penetration": "mm", "intersections": "%", "deformation": "%",
-    "dihedral": "deg", "drift": "mm", "dynamics": "mm", "gap": "1", "gradient": "1", "exact": "m",
+    "dihedral": "deg", "drift": "mm", "dynamics": "mm", "dynamics/amplitude": "1",
+    "dynamics/correlation": "1", "dynamics/gain": "1", "dynamics/spectrum": "1", "dynamics/lag": "frames",
+    "gap": "1", "gradient": "1", "exact": "m",
     "time_error/curvature": "1/m", "time_error/order": "1", "time_error": "J",
     "cost/frame": "ms", "cost/batch": "ms", "cost/spread": "%", "cost/peak": "MB",
     "cost/data": "s", "cost/train": "s", "cost/memory": "MB",

@@ -92,6 +92,7 @@ def test_amplitude_and_correlation_of_phase_shifted_parts():
     assert correlation(other, one) == pytest.approx(np.cos(0.6))
     assert correlation(-one, one) == pytest.approx(-1.0)
     assert np.isnan(correlation(0 * one, one))
+    assert np.isnan(amplitude(one, 0 * one))
 
 
 def test_a_constant_difference_is_no_dynamics():
@@ -180,6 +181,7 @@ def test_a_dresser_without_memory_has_none():
     found = measured(shifted, static=shifted)
     assert found["dynamics/amplitude"] == 0.0
     assert "dynamics/correlation" not in found
+    assert measured(shifted[:5]) == {}  # too short to say anything
     assert (found["dynamics/gain"], found["dynamics/lag"]) == pytest.approx((1.0, 0.0), abs=1e-9)
     assert found["dynamics/ringing"] == pytest.approx(0.0, abs=1e-9)
     assert found["dynamics/spectrum"] > 0.1

@@ -61,6 +61,10 @@ class Skinning:
             frame_fields={},
         )
 
+    def held(self) -> Trajectory:
+        """Its answer to poses held still: the same."""
+        return self.run()
+
 
 def make(*, models: Path, seed: int, device: str) -> Skinning:
     """Skinning alone; it has no seed and no model."""

@@ -31,6 +31,7 @@ HELD = 24  # frames a body must hold still at the end to count as stopped
 TURNING = np.deg2rad(5.0)  # rms static yaw from which on gain and lag are those of the yaw
 SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to be a gain of
 MAX_LAG = 12.0  # frames
+SHORTEST = 8  # frames of which a motion can be said
 LEAST = 1e-6  # [m] rms of a dynamic part that is none
 
 
@@ -51,7 +52,9 @@ def root_mean_square(part: Array) -> float:
 
 
 def amplitude(part: Array, reference: Array) -> float:
-    """rms of D (T,H,3) over that of the reference's."""
+    """rms of D (T,H,3) over that of the reference's; nan where the reference has none."""
+    if root_mean_square(reference) < LEAST:
+        return float("nan")
     return root_mean_square(part) / root_mean_square(reference)
 
 
@@ -133,7 +136,7 @@ def acceleration_spectrum(hem: Array, dt: float) -> Array:
 def spectrum_distance(hem: Array, reference: Array, dt: float) -> float:
     """sum |S - S_ref| / sum S_ref of two hems (T,H,3) over the same frames."""
     ours, theirs = acceleration_spectrum(hem, dt), acceleration_spectrum(reference, dt)
-    return float(np.abs(ours - theirs).sum() / theirs.sum())
+    return float(np.abs(ours - theirs).sum() / theirs.sum()) if theirs.any() else float("nan")
 
 
 @dataclass(frozen=True)
@@ -163,6 +166,8 @@ class HemMotion:
         static: (T,V,3), the method's own answer to poses held still; None takes the simulator's.
         """
         frames = min(len(positions), len(self.simulated), len(self.quasi_static))
+        if frames < SHORTEST:
+            return {}
         moving, simulated = self.of(positions[:frames]), self.of(self.simulated[:frames])
         quiet = self.of(self.quasi_static[:frames])
         own = quiet if static is None else self.of(static[:frames])
