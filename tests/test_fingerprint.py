@@ -57,14 +57,18 @@ def test_the_code_is_what_is_imported_also_inside_functions_and_by_first_use(pro
     assert "snug/network.py" in code_of("benchmarks.methods.other")
 
 
-@pytest.mark.parametrize("path", ["reference_sim/terms/bend.py", "benchmarks/methods/other.py", "snug/network.py"])
+@pytest.mark.parametrize(
+    "path", ["reference_sim/terms/bend.py", "benchmarks/methods/other.py", "snug/network.py"]
+)
 def test_what_is_not_used_may_change(project, path):
     before = code_of("benchmarks.methods.one")
     project(path, "CHANGED = True\n")
     assert code_of("benchmarks.methods.one") == before
 
 
-@pytest.mark.parametrize("path", ["reference_sim/terms/stretch.py", "benchmarks/scene.py", "reference_sim/cloth.py"])
+@pytest.mark.parametrize(
+    "path", ["reference_sim/terms/stretch.py", "benchmarks/scene.py", "reference_sim/cloth.py"]
+)
 def test_what_is_used_may_not(project, path):
     before = code_of("benchmarks.methods.one")
     project(path, FILES[path] + "CHANGED = True\n")

@@ -1,0 +1,237 @@
+"""Cells: each in its own process, ended at a deadline, kept when finished, and taken up after a kill."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks import methods, run, stages
+from benchmarks.agenda import Agenda
+from benchmarks.cell import Outcome
+from benchmarks.cells import Cells
+from benchmarks.outlook import describe
+from benchmarks.plan import Cell, Plan
+from benchmarks.presets import find_preset
+from benchmarks.records import Records
+from benchmarks.results import RunFolder
+from benchmarks.rows import clock_costs, rows_of
+from benchmarks.scenes import SMALL_SCENES
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENES = {scene.name: scene for scene in SMALL_SCENES}
+TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=60.0)
+
+
+def plan_of(folder: Path, *names: str, scene: str = "free_fall", **changes) -> Plan:
+    cells = tuple(Cell(SCENES[scene], name, 0, ("speed",)) for name in names)
+    values = {
+        "preset": TINY, "suites": ("speed",), "cells": cells, "checks": (), "cases": (), "train": (),
+        "test": (), "seeds": (0,), "device": "cpu", "folder": folder, "command": "",
+    }  # fmt: skip
+    return Plan(**(values | changes))
+
+
+def harness(plan: Plan) -> Cells:
+    return Cells(plan, Agenda(plan), Records(RunFolder(plan.folder), only=plan.only), None)
+
+
+@pytest.fixture
+def misbehaving(monkeypatch):
+    """Makes methods, newton-1 unless others are named, do what `how` says."""
+
+    def entries(how: str, *names: str) -> None:
+        wrong, names = {"module": "misbehaving", "options": {"how": how}}, names or ("newton-1",)
+        found = [dataclasses.replace(m, **wrong) if m.name in names else m for m in methods.METHODS]
+        monkeypatch.setattr(methods, "METHODS", tuple(found))
+
+    return entries
+
+
+def no_bar(items, *_):
+    return items
+
+
+# --- processes -------------------------------------------------------------------------------------------
+
+
+def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_path):
+    plan = plan_of(tmp_path, "simulation", scene="hanging_sheet")
+    outcome = harness(plan).first(plan.cells[0], None)
+    assert (outcome.status, outcome.recorded, outcome.frames) == ("ok", True, 3)
+    assert 0.0 < outcome.seconds[0] < 10.0 and 50.0 < outcome.peak < 1000.0
+    assert outcome.terms == "strain+bending+gravity+inertia"
+    assert "reference_sim.energies.stretch_stvk" in outcome.modules and "numba" in outcome.modules
+    snug = {name for name in outcome.modules if name.startswith("snug")}
+    assert snug <= {"snug", "snug.recipe"}  # names of trainings, which the list of methods holds
+    for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
+        assert name not in outcome.modules, f"{name} was loaded"
+    metrics = {row.metric: row for row in rows_of(outcome, clock_costs(outcome))}
+    assert set(metrics) == {"cost/frame", "cost/peak"} and metrics["cost/peak"].unit == "MB"
+    assert metrics["cost/frame"].value == pytest.approx(1e3 * outcome.seconds[0] / 3)
+
+
+@pytest.mark.parametrize(
+    ("how", "status", "word"),
+    [
+        ("raise", "failed", "RuntimeError: broken on purpose"),
+        ("segfault", "failed", "SIGSEGV"),
+        ("killed", "out-of-memory", "SIGKILL"),
+        ("hungry", "out-of-memory", "no room"),
+        ("early", "failed", "its time cannot be believed"),
+    ],
+)
+def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path, misbehaving):
+    misbehaving(how)
+    plan = plan_of(tmp_path, "newton-1")
+    outcome = harness(plan).first(plan.cells[0], None)
+    assert outcome.status == status and word in outcome.reason and not outcome.recorded
+    (row,) = rows_of(outcome, {})
+    assert (row.status, row.value) == (status, None) and not list(tmp_path.rglob("*.vtkhdf"))
+    found = Records(RunFolder(tmp_path)).find(Agenda(plan).cell(plan.cells[0]))
+    assert (found.state, found.wanted) == ("failed", False) and word in found.why
+
+
+def test_a_cell_that_hangs_is_ended_with_all_that_it_has_started(tmp_path, misbehaving):
+    misbehaving("hang")
+    plan = plan_of(tmp_path, "newton-1", preset=dataclasses.replace(TINY, cell_seconds=4.0))
+    outcome = harness(plan).first(plan.cells[0], None)
+    assert outcome.status == "timeout" and "4 s" in outcome.reason
+    assert of_session(os.getsid(0), "time.sleep(60)") == []
+
+
+def of_session(session: int, word: str = "") -> list[int]:
+    """Processes of a session that have this word in their command line and are no zombies."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            state, _, _, its_session = (path / "stat").read_text().rpartition(")")[2].split()[:4]
+            line = (path / "cmdline").read_text()
+        except OSError:
+            continue  # it has just ended
+        if int(its_session) == session and state != "Z" and word in line:
+            found.append(int(path.name))
+    return found
+
+
+# --- reuse -----------------------------------------------------------------------------------------------
+
+
+def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path):
+    plan = plan_of(tmp_path, "simulation")
+    first = harness(plan).first(plan.cells[0], None)
+    again = harness(plan)
+    assert again.first(plan.cells[0], None) == first and again.reused == [plan.cells[0].label]
+
+    finer = dataclasses.replace(plan, preset=dataclasses.replace(TINY, sheet_cells=4))
+    found = Records(RunFolder(tmp_path)).find(Agenda(finer).cell(finer.cells[0]))
+    assert (found.state, found.why, found.wanted) == ("stale", "preset", True)
+    kept = harness(dataclasses.replace(finer, only=frozenset({"missing"})))
+    assert kept.first(plan.cells[0], None) == first and kept.outdated == {plan.cells[0].label: "preset"}
+
+    elsewhere = dataclasses.replace(
+        plan, preset=dataclasses.replace(TINY, garment_vertices=99, gap_samples=9)
+    )
+    assert harness(elsewhere).first(plan.cells[0], None) == first
+
+    RunFolder(tmp_path).trajectory_path("free_fall", "simulation").unlink()
+    assert Records(RunFolder(tmp_path)).find(Agenda(plan).cell(plan.cells[0])).state == "missing"
+
+
+def test_only_what_is_asked_for_is_done(tmp_path, misbehaving):
+    misbehaving("raise")
+    plan = plan_of(tmp_path, "newton-1", "newton-4")
+    assert harness(plan).first(plan.cells[0], None).status == "failed"
+    misbehaving("still")
+    retry = dataclasses.replace(plan, only=frozenset({"failed"}))
+    left_out = harness(retry).first(plan.cells[1], None)
+    assert left_out.status == "skipped" and "--only" in left_out.reason
+
+
+def test_repeats_take_turns_and_are_kept(tmp_path, misbehaving):
+    names = ("simulation", "newton-1", "newton-4")
+    misbehaving("still", *names)
+    preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=60.0)
+    plan = plan_of(tmp_path, *names, preset=preset)
+    cells, order = harness(plan), []
+
+    def bar(items, *_):
+        order.extend((cell.method, number) for cell, number in items)
+        return items
+
+    outcomes = [cells.first(cell, None) for cell in plan.cells]
+    repeated = cells.again(outcomes, bar=bar)
+    assert [name for name, number in order if number == 1] == ["newton-1", "newton-4", "simulation"]
+    assert [name for name, number in order if number == 2] == ["newton-4", "simulation", "newton-1"]
+    assert all(len(outcome.seconds) == 3 for outcome in repeated)
+    costs = clock_costs(repeated[0])
+    assert costs["cost/frame"] == pytest.approx(1e3 * sorted(repeated[0].seconds)[1] / 4)
+    assert costs["cost/spread"] > 0.0
+    kept = harness(plan)
+    assert kept.again([kept.first(cell, None) for cell in plan.cells], bar=no_bar) == repeated
+
+
+def test_repeats_that_lie_apart_carry_a_remark(tmp_path):
+    cell = plan_of(tmp_path, "simulation").cells[0]
+    wide, near = (Outcome(cell, "ok", seconds=s, frames=1, recorded=True) for s in ((1.0, 1.5), (1.0, 1.1)))
+    reasons = [{r.metric: r.reason for r in rows_of(o, clock_costs(o))} for o in (wide, near)]
+    assert "20 %" in reasons[0]["cost/spread"] and reasons[0]["cost/frame"] == ""
+    assert reasons[1]["cost/spread"] == ""
+
+
+def test_a_dry_run_tells_what_is_there(tmp_path):
+    plan = plan_of(tmp_path / "run", "simulation", "newton-1", "skinning")
+    assert "2 pieces of work to run; 0 cached" in describe(plan) and not plan.folder.exists()
+    harness(plan).first(plan.cells[0], None)
+    words = describe(plan)
+    assert "free_fall x simulation [speed]: cached, metrics to be computed" in words
+    assert "free_fall x newton-1 [speed]: run (missing)" in words and "skinning [speed]: skip" in words
+    assert "1 pieces of work to run; 1 cached" in words
+    stale = describe(dataclasses.replace(plan, preset=dataclasses.replace(TINY, sheet_frames=5)))
+    assert "simulation [speed]: run (stale: preset), 0.0 s last time" in stale
+    assert "2 pieces of work to run" in describe(dataclasses.replace(plan, fresh=True))
+
+
+# --- a kill ----------------------------------------------------------------------------------------------
+
+
+def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
+    out = tmp_path / "run"
+    words = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall", "-o", str(out)]
+    words += ["--methods", "simulation,newton-1,newton-4"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "benchmarks.run", *words],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    record = out / "records" / "cell" / "free_fall" / "simulation.json"
+    deadline = time.monotonic() + 60
+    while not record.is_file():
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    while of_session(process.pid):  # its cells end by themselves
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    before = record.read_bytes()
+
+    monkeypatch.setattr(stages.Stages, "make_report", lambda self: True)
+    assert run.main(words) == 0
+    assert record.read_bytes() == before
+    first = RunFolder(out).read_rows()
+    assert {row.method for row in first} == {"simulation", "newton-1", "newton-4"}
+    assert run.main(words) == 0
+    assert RunFolder(out).read_rows() == first
+    config = RunFolder(out).read_config()
+    assert len(config["earlier"]) == 2 and config["clock"]["threads"] == 1
+    assert not [path for path in out.rglob("*") if "part" in path.name]
