@@ -69,6 +69,8 @@ class Agenda:
         inputs = self._scene(cell.scene, code) | {"method": _declared(entry)}
         if entry.seeded:
             inputs["seed"] = cell.seed
+        if entry.package:
+            inputs["package"] = provenance.package_version(entry.package)
         if entry.needs_body:
             inputs["recipe"] = dataclasses.asdict(DEFAULT)
         if cell.scene.dressed:

@@ -1,0 +1,121 @@
+"""From a trajectory to rows: what is judged, what is not finite, what may fail, and the closing table."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.cell import Outcome, frames_computed, judge
+from benchmarks.clock import Reading
+from benchmarks.closing import summary
+from benchmarks.methods import METHODS
+from benchmarks.named_metrics import UNITS, unit_of
+from benchmarks.plan import Cell
+from benchmarks.results import Row
+from benchmarks.rows import rows_of
+from benchmarks.scenes import SMALL_SCENES, dressed_scene
+from benchmarks.stages import accepted
+from benchmarks.suites import validation
+from reference_sim import Trajectory
+
+SHEET = SMALL_SCENES[0]
+
+
+def trajectory(frames=4, **changes) -> Trajectory:
+    values = {
+        "positions": np.zeros((frames, 3, 3)), "faces": np.array([[0, 1, 2]]),
+        "times": np.arange(frames) / 30,
+        "frame_seconds": np.r_[0.0, np.full(frames - 1, 0.002)], "status": "converged",
+    }  # fmt: skip
+    return Trajectory(**(values | changes))
+
+
+@dataclasses.dataclass
+class FourFrames:
+    frames: int = 4
+
+
+def test_a_trajectory_is_judged_by_what_is_in_it():
+    def judged(cut_short=False, **changes):
+        return judge(trajectory(**changes), Reading(1.0), FourFrames(), cut_short=cut_short)
+
+    assert judged() == ("ok", "")
+    assert judged(status="max_iterations", cut_short=True) == ("ok", "")
+    assert judged(status="max_iterations", reason="frame 2: gave up")[0] == "stalled"
+    assert judged(frames=2)[0] == "diverged"
+    assert judged(positions=np.full((4, 3, 3), np.nan))[0] == "diverged"
+    assert judged(status="fine")[0] == "failed"
+    stalled = judged(
+        status="stalled", reason="frame 2: x", frame_fields={"converged": np.array([1, 1, 0, 0.0])}
+    )
+    assert stalled == ("stalled", "2 of 4 frames did not converge; first frame 2: x")
+
+
+def test_a_time_that_cannot_be_believed_fails_the_cell():
+    status, reason = judge(trajectory(), Reading(1.0, "it went on"), FourFrames(), cut_short=False)
+    assert status == "failed" and "it went on" in reason
+
+
+def test_a_first_frame_that_was_given_does_not_count():
+    assert frames_computed(trajectory()) == 3
+    assert frames_computed(trajectory(frame_seconds=np.r_[np.nan, np.ones(3)])) == 3
+    assert frames_computed(trajectory(frame_seconds=np.full(4, 0.1))) == 4
+
+
+def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
+    cell = Cell(SHEET, "newton-1", 0, ("garments", "speed"))
+    rows = rows_of(Outcome(cell, "ok", recorded=True), {"energy/strain": 1.0, "distance/rms": np.nan})
+    assert [row.suite for row in rows] == ["garments", "garments", "speed", "speed"]
+    assert {row.dtype for row in rows} == {"float64"}
+    skinned = rows_of(Outcome(Cell(SHEET, "skinning", 0, ("speed",)), "ok"), {"energy/strain": 1.0})
+    assert skinned[0].dtype == "float32"
+    assert rows[0].value == 1.0 and rows[0].unit == "J" and rows[0].status == "ok"
+    assert rows[1].value is None and rows[1].status == "failed" and "finite" in rows[1].reason
+    skipped = rows_of(Outcome(cell, "skipped", "why"), {})
+    assert [(row.status, row.reason, row.value) for row in skipped] == [("skipped", "why", None)] * 2
+
+
+def test_every_unit_is_known():
+    assert unit_of("energy/strain") == "J" and unit_of("penetration/depth_p99") == "mm"
+    assert set(UNITS.values()) == {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1", "deg", "frames"}
+    with pytest.raises(KeyError):
+        unit_of("nonsense/x")
+
+
+def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
+    def row(suite, status, reason="why"):
+        return Row(suite, "s", "m", 0, "x", "1", None, status, reason)
+
+    assert accepted(row("extremes", "stalled")) and accepted(row("garments", "skipped"))
+    assert not accepted(row("extremes", "failed")) and not accepted(row("garments", "stalled"))
+    assert not accepted(row("extremes", "stalled", ""))
+
+
+def test_networks_skip_scenes_without_a_body_and_solvers_skip_nothing():
+    for entry in (entry for entry in METHODS if entry.package is None):
+        reason = entry.skip(SHEET)
+        assert bool(reason) == entry.needs_body and entry.skip(dressed_scene("walk")) is None
+
+
+def test_the_closing_table_shows_a_dash_for_what_is_not_there():
+    rows = [
+        Row("garments", "dressed/a", "snug", 0, "energy/total", "J", 1.0),
+        Row("garments", "dressed/b", "snug", 0, "energy/total", "J", 3.0),
+        Row("garments", "dressed/a", "pbns", 0, "cost/frame", "ms", None, "failed", "why"),
+        Row("validation", "c", "simulation", 0, "check", "1", 0.0),
+    ]
+    text = summary(rows, [{"name": "cells", "seconds": 3.2}])
+    lines = text.splitlines()
+    assert "mean of 2 scenes" in lines[0] and lines[1].split() == ["snug", "2", "ok"]
+    assert lines[2].split() == ["pbns", "-", "failed"]
+    assert "validation: 1 ok" in text and "cells 3 s" in text
+
+
+def test_a_check_that_is_off_or_raises_is_a_failed_row(monkeypatch):
+    check = validation.CHECKS[0]
+    off = validation.run_check(dataclasses.replace(check, expected=1.0))
+    assert off.status == "failed" and off.value is not None and check.reason in off.reason
+    broken = validation.run_check(dataclasses.replace(check, function="nothing"))
+    assert broken.status == "failed" and broken.value is None and "nothing" in broken.reason
