@@ -12,6 +12,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from snug.fast_network import FastLinear, run_gru
+
 HIDDEN, LAYERS = 256, 4
 
 
@@ -19,7 +21,8 @@ class Regressor(nn.Module):
     """features (N, T, D) -> offsets (N, T, V, 3) [m] in the unposed space, and the state to go on with.
 
     The features are normalised inside, by the mean and spread of the training frames, which are saved with
-    the weights: a caller passes plain features and cannot forget it.
+    the weights: a caller passes plain features and cannot forget it. closed_form: train by
+    snug.fast_network, on a CPU; the state that comes out then has no gradient.
     """
 
     def __init__(
@@ -33,7 +36,7 @@ class Regressor(nn.Module):
         layers: int = LAYERS,
     ) -> None:
         super().__init__()
-        self.vertices, self.output_scale = vertices, output_scale
+        self.vertices, self.output_scale, self.closed_form = vertices, output_scale, False
         self.input_mean: Tensor
         self.input_std: Tensor
         self.register_buffer("input_mean", torch.zeros(inputs))
@@ -51,8 +54,12 @@ class Regressor(nn.Module):
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
         normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
-        hidden, state = self.gru(normalised, state)  # (N, T, 256), (4, N, 256)
-        flat = self.offsets(hidden) * self.output_scale  # (N, T, 3V)
+        if self.closed_form and torch.is_grad_enabled():
+            hidden, state = run_gru(self.gru, normalised, state)
+            flat = FastLinear.apply(hidden, self.offsets.weight, self.offsets.bias) * self.output_scale
+        else:
+            hidden, state = self.gru(normalised, state)  # (N, T, 256), (4, N, 256)
+            flat = self.offsets(hidden) * self.output_scale  # (N, T, 3V)
         return flat.unflatten(-1, (self.vertices, 3)), state
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:

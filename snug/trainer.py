@@ -19,6 +19,7 @@ from snug.loss import PhysicsLoss
 from snug.mixing import mixed_motions
 from snug.parallel import ALONE, Group, GroupError
 from snug.recipe import Recipe
+from snug.regressor import Regressor
 from snug.skinning import skin
 from snug.stopwatch import Stopwatch
 from snug.trained_model import find_kind, make_network
@@ -63,6 +64,8 @@ class Trainer:
         network = make_network(kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed)
         network.normalise_by(*self.data.input_statistics())
         self.network = network.to(device)
+        if isinstance(network, Regressor):
+            network.closed_form = self.kernels
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=recipe.learning_rate, fused=True)
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)

@@ -2,6 +2,7 @@
 nothing is made anywhere but where it is told to."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ import torch
 from dressing import swaying, tube_dress
 from torch.overrides import TorchFunctionMode
 
-from reference_sim.energies import BendHinge, ContactPenalty, StretchStVK
+from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from snug.contact import Anchors, Patch
 from snug.device import DeviceError, find_device
 from snug.lanes import lane_kernel
+from snug.loss import held_on
 from snug.recipe import DEFAULT, PAPER
 from snug.skinning import skin
 from snug.tensor_anchors import TensorAnchors
@@ -135,7 +137,7 @@ def test_a_set_lies_where_it_is_told_to():
 
 
 @pytest.mark.parametrize("count", [1, 16, 21])
-@pytest.mark.parametrize("E", [StretchStVK, BendHinge])
+@pytest.mark.parametrize("E", [StretchStVK, BendHinge, partial(BendHinge, rest_angles=2.5), Gravity])
 def test_lanes_agree_with_the_definition(E, count):
     """Also where hinges are folded over and where a configuration is not finite."""
     dressed = tube_dress()
@@ -152,6 +154,15 @@ def test_lanes_agree_with_the_definition(E, count):
     x[-1, 3] = np.nan
     values, _ = lane_kernel(energy)(x)
     assert np.isnan(values[-1]) and np.isfinite(values[:-1]).all()
+
+
+def test_held_energies_have_all_their_arrays_on_the_device():
+    meta = torch.device("meta")
+    twin = held_on(StretchStVK(tube_dress().cloth), meta)
+    tensors = [value for value in vars(twin).values() if isinstance(value, torch.Tensor)]
+    assert len(tensors) == 3 and {tensor.device for tensor in tensors} == {meta}
+    assert {tensor.dtype for tensor in tensors} == {torch.float32, torch.int64}
+    assert not [value for value in vars(twin).values() if isinstance(value, np.ndarray)]
 
 
 def test_absent_devices_are_one_line(capsys, tmp_path):

@@ -5,6 +5,7 @@ import pytest
 import torch
 from dressing import leaning, swaying, tube_dress
 
+from snug import fast_network
 from snug.baselines.pbns import PoseSpaceDeformation
 from snug.garments import smooth_weights
 from snug.motion import Motion
@@ -158,3 +159,32 @@ def test_recipe_refuses_unknown_names():
         find_recipe("papers")
     with pytest.raises(RecipeError, match="'momentum'"):
         Recipe.from_dict({"momentum": 0.9})
+
+
+@pytest.mark.parametrize(("frames", "state"), [(3, True), (1, True), (5, False)])
+def test_closed_forms_train_as_the_modules_do(frames, state):
+    torch.manual_seed(0)
+    network = Regressor(12, 40, hidden=32, layers=3)
+    features, factor = torch.randn(4, frames, 12), torch.randn(4, frames, 40, 3)
+    start = 0.3 * torch.randn(3, 4, 32) if state else None
+    results = []
+    for closed_form in (True, False):
+        network.closed_form = closed_form
+        network.zero_grad()
+        offsets, last = network(features, start)
+        (offsets * factor).sum().backward()
+        gradients = {name: p.grad.clone() for name, p in network.named_parameters()}
+        results.append((offsets.detach(), last.detach(), gradients))
+    (a, a_last, a_gradients), (b, b_last, b_gradients) = results
+    assert torch.allclose(a, b, atol=1e-6) and torch.allclose(a_last, b_last, atol=1e-6)
+    for name, gradient in b_gradients.items():
+        assert gradient.norm() > 1e-3, name
+        assert (a_gradients[name] - gradient).norm() < 1e-5 * gradient.norm(), name
+
+
+def test_product_without_onednn_is_the_same(monkeypatch):
+    a, b, bias = torch.randn(5, 8), torch.randn(6, 8), torch.randn(6)
+    fast = fast_network.product(a, b, bias)
+    monkeypatch.setattr(fast_network, "_LINEAR", None)
+    assert torch.allclose(fast, fast_network.product(a, b, bias), atol=1e-6)
+    assert torch.allclose(fast, a @ b.T + bias, atol=1e-6)
