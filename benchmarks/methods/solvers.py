@@ -65,7 +65,7 @@ SOLVERS = (
         module="benchmarks.methods.restart",
     ),
     *_cut(
-        "newton", "iteration", "the reference's Newton method, cut after {} a step",
+        "newton", "iteration", "Newton's method on the true Hessian, cut after {} a step",
         "benchmarks.methods.truncated_newton", (1, 2, 4, 8),
     ),
     *_cut("lbfgs", "iteration", "L-BFGS with a factored preconditioner, cut after {}", _LBFGS, (5, 10, 20, 40)),

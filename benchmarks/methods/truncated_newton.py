@@ -1,4 +1,4 @@
-"""The reference's own Newton method, cut short: the baseline that a fast approximation has to beat."""
+"""Newton's method alone, cut short: every iteration is a factorisation of the true Hessian, or several."""
 
 from __future__ import annotations
 
