@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks.solver_speed import linear, peers
+from benchmarks.solver_speed import barrier, linear, peers
 from benchmarks.solver_speed.__main__ import PARTS, main
 from benchmarks.solver_speed.cholesky_packages import PACKAGES
 from benchmarks.solver_speed.peer_energies import StableNeoHookean, UnequalSprings, spring_stiffness
@@ -48,6 +48,31 @@ def test_the_command_runs_a_case_in_its_own_process_and_writes_its_rows(tmp_path
     assert float(rows["peak memory of the process"]["value"]) > 1
     assert "CHOLMOD, METIS: factorise" in capsys.readouterr().out
     assert sorted(p.name for p in tmp_path.iterdir()) == ["solver_speed.csv", "solver_speed.json"]
+
+
+def test_frames_with_an_intersection_are_counted():
+    """A sheet beside the ball, through the ball, and folded through itself."""
+    pytest.importorskip("ipctk")
+    scene = barrier.sheet_on_ball("sheet, 6 x 6")
+    sheet, faces = scene.start, scene.cloth.faces
+    through = sheet - [0.0, sheet[:, 1].mean(), 0.0]
+    folded = sheet + np.array([0.0, 1.0, 0.0])
+    right = folded[:, 0] > 0.05  # turned back over the left half, from below it to above it
+    folded[right] = folded[right] * [-1, 1, 1] + np.outer(folded[right, 0] - 0.12, [0, 0.5, 0])
+    positions = np.stack([sheet, through, folded])
+    counts = [barrier.crossings(positions, faces, scene.obstacle, itself=itself) for itself in (False, True)]
+    assert counts == [1, 1]
+    assert barrier.crossings(positions[:1], faces, scene.obstacle, itself=False) == 0
+
+
+def test_a_barrier_stands_in_the_place_of_the_penalty():
+    pytest.importorskip("ipctk")
+    scene = barrier.sheet_on_ball("sheet, 6 x 6")
+    for contact, self_contact in (("barrier", False), ("barrier, self-contact", True)):
+        *others, last = barrier.with_contact(scene, contact)
+        assert [e.name for e in others] == ["strain", "bending", "gravity"]
+        assert last.parameters()["self_contact"] is self_contact
+    assert [e.name for e in barrier.with_contact(scene, "penalty")][-1] == "collision"
 
 
 def test_one_hessian_is_positive_definite_and_the_other_is_not(hessians):
