@@ -40,7 +40,12 @@ _KNOWN = {
     "pbns": Style("PBNS", "#009E73", "^"),
     "supervised": Style("Supervised", "#E69F00", "s"),
     "snug": Style("SNUG", "#0072B2", "o"),
+    "pbns-springs": Style("PBNS, springs", "#117733", "^", ":"),
+    "santesteban2019": Style("Santesteban 2019", "#AA4499", "d"),
+    "tailornet": Style("TailorNet", "#661100", "H"),
+    "free-bound": Style("Free lower bound", "#000000", "_", "--"),
 }
+_VARIANT = "snug-"  # of SNUG: a recipe of its own, drawn in a spare colour with SNUG's marker
 _FAMILIES = {
     "newton": Style("Newton", "#D55E00", "P"),
     "lbfgs": Style("L-BFGS", "#CC79A7", "X"),
@@ -97,6 +102,9 @@ def style(method: str) -> Style:
     if method.endswith(CLEANED):
         base = style(method.removesuffix(CLEANED))
         return Style(f"{base.label}, cleaned up", base.colour, base.marker, ":")
+    if method.startswith(_VARIANT):
+        base = family_style(method)
+        return Style(f"SNUG, {method.removeprefix(_VARIANT).replace('-', ' ')}", base.colour, "o", ":")
     cut = cut_of(method)
     if cut is None:
         return family_style(method)
