@@ -43,7 +43,7 @@ _KNOWN = {
     "pbns-springs": Style("PBNS, springs", "#117733", "^", ":"),
     "santesteban2019": Style("Santesteban 2019", "#AA4499", "d"),
     "tailornet": Style("TailorNet", "#661100", "H"),
-    "free-bound": Style("Free lower bound", "#000000", "_", "--"),
+    "free-bound": Style("Free lower bound", "#5D3A9B", "_", "--"),
 }
 _VARIANT = "snug-"  # of SNUG: a recipe of its own, drawn in a spare colour with SNUG's marker
 _FAMILIES = {
