@@ -176,7 +176,7 @@ def _face_frames(corners: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first), normal], axis=-1)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _cross_of_face(x, i, j, k):
     """Twice the area of a triangle times its normal."""
     a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
@@ -198,9 +198,9 @@ def vertex_normals(positions, faces):
     return normals
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _normalise(v):
-    length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 1e-30
     v[0], v[1], v[2] = v[0] / length, v[1] / length, v[2] / length
     return length
 

@@ -35,7 +35,7 @@ class TensorAnchors:
             for array in (patch.rest, patch.centroids, patch.sample_rest)
         )
         self.around = torch.as_tensor(
-            _padded(patch.incident), device=device
+            _incident(patch.faces), device=device
         )  # (P, K) faces, -1 beyond the last
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
@@ -111,11 +111,11 @@ def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor
     return torch.where(inside, v, edge_v), torch.where(inside, w, edge_w)
 
 
-def _padded(lists: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """(start, flat) lists as rows (P, K) int64 of equal length, filled up with -1."""
-    start, flat = lists
-    counts = np.diff(start)
+def _incident(faces: np.ndarray) -> np.ndarray:
+    """Faces around each vertex, ascending: (Q, 3) -> (P, K) int64, rows filled up with -1."""
+    counts = np.bincount(faces.ravel())
     table = np.full((len(counts), counts.max()), -1, np.int64)
-    rows = np.repeat(np.arange(len(counts)), counts)
-    table[rows, np.arange(len(flat)) - start[rows]] = flat
+    order = np.argsort(faces.ravel(), kind="stable")
+    column = np.arange(len(order)) - np.repeat(np.cumsum(counts) - counts, counts)
+    table[faces.ravel()[order], column] = order // 3
     return table

@@ -79,7 +79,8 @@ def test_torch_search_is_no_worse_than_the_walk():
         point = corner[:, 0] + np.einsum("sc,sci->si", last, corner[:, 1:] - corner[:, :1])
         found.append(np.linalg.norm(point - samples, axis=1))
         assert last.min() > -1e-5 and last.sum(1).max() < 1 + 1e-5
-    assert (found[1] < found[0] + 1e-5).all() and np.mean(np.abs(found[1] - found[0]) < 1e-5) > 0.95
+    # Away from the skin the walk keeps an old anchor unless there is one half as far.
+    assert (found[1] < found[0] + 1e-5).all() and (found[0] < 2 * found[1] + 1e-5).all()
     assert list(walk.age) == list(brute.age) and (brute.faces[0].numpy() == walk.faces[0]).all()
 
 
@@ -177,3 +178,18 @@ def test_absent_devices_are_one_line(capsys, tmp_path):
         error = capsys.readouterr().err
         assert error.count("\n") == 1 and "--device cuda" in error and "--device cpu" in error
         assert not out.exists()
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")
+def test_the_harness_hands_the_device_on(tmp_path):
+    """An absent device is refused where the plan is made, and would be refused where training starts."""
+    from benchmarks.run import check_device
+    from benchmarks.training import train_network
+    from benchmarks.wardrobe import Wardrobe
+
+    dressed, motion = tube_dress(), swaying(12)
+    wardrobe = Wardrobe(dressed.body, dressed.garment, {"sway": motion})
+    with pytest.raises(DeviceError, match="--device cuda"):
+        check_device("cuda")
+    with pytest.raises(DeviceError, match="--device cuda"):
+        train_network(wardrobe, print, "snug", 0, 2, {"sway": None}, tmp_path, "cuda")
