@@ -85,7 +85,7 @@ def make_parser() -> argparse.ArgumentParser:
         help="motion file or folder (.amc with its .asf, .npz), or the word library; repeatable")  # fmt: skip
     add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
-    add("--device", default="cpu", metavar="cpu|cuda", help="where networks run (default cpu)")
+    add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     add("--only", action="append", default=[], metavar="STATE,...",
         help="of what the folder holds already, do again what is failed, stale or missing (default "
@@ -206,13 +206,13 @@ def choose_states(words: Sequence[str], *, fresh: bool) -> frozenset[str]:
 
 
 def check_device(device: str) -> None:
-    """Raises PlanError where the device is unknown, absent or of no use."""
+    """Raises PlanError for an unknown device, and DeviceError for one that this machine does not have."""
     if device not in ("cpu", "cuda"):
         raise PlanError(f"--device '{device}': choose cpu or cuda")
     if device == "cuda":
-        raise PlanError(
-            "--device cuda: networks train and run on the CPU alone in this version; use --device cpu"
-        )
+        from snug.device import find_device
+
+        find_device(device)
 
 
 def choose_folder(out: str | None) -> Path:

@@ -199,6 +199,7 @@ class Stages:
                 summary[job.label] = {
                     "recipe": trained.recipe,
                     "seconds": trained.seconds,
+                    "setup_seconds": trained.setup_seconds,
                     "steps": trained.steps,
                     "last": trained.final,
                 }

@@ -18,7 +18,8 @@ LOG_EVERY = 20  # training steps between two reports of progress
 
 @dataclass(frozen=True)
 class Trained:
-    """A trained network: wall seconds of training, size [MB] and the means of its last logged steps.
+    """A trained network: wall seconds of its steps, and of making ready what they need (setup_seconds), size
+    [MB] and the means of its last logged steps.
 
     files: the model, in the run's folder.
     """
@@ -27,6 +28,7 @@ class Trained:
     seed: int
     recipe: str
     seconds: float
+    setup_seconds: float
     megabytes: float
     steps: int
     final: dict[str, float]
@@ -45,7 +47,8 @@ def train_network(
 ) -> Trained:
     """Train the network of that name (or make an untrained one) and write it to models/.
 
-    motions: name -> file of its simulation, which is read where the network learns from one.
+    motions: name -> file of its simulation, which is read where the network learns from one. device: cpu or
+    cuda, for every part of a step.
     """
     import torch
 
@@ -75,11 +78,19 @@ def train_network(
 
         model = train(
             training.kind, dressed, clips, steps=steps, seed=seed, trajectories=targets,
-            recipe=training.recipe, log=log, progress=False, every=LOG_EVERY,
+            recipe=training.recipe, log=log, progress=False, every=LOG_EVERY, device=device,
         )  # fmt: skip
     run = RunFolder(folder)
     path = model_path(run.models, name, seed)
     model.save(path)
-    final = dict(model.history[-1]) if model.history else {}
-    recipe, steps, files = model.recipe.name, model.steps, (run.relative(path),)
-    return Trained(name, seed, recipe, model.seconds, model.megabytes, steps, final, files)
+    return Trained(
+        kind=name,
+        seed=seed,
+        recipe=model.recipe.name,
+        seconds=model.seconds,
+        setup_seconds=model.setup_seconds,
+        megabytes=model.megabytes,
+        steps=model.steps,
+        final=dict(model.history[-1]) if model.history else {},
+        files=(run.relative(path),),
+    )
