@@ -15,10 +15,11 @@ from torch import Tensor
 
 from reference_sim.cloth import Cloth
 from reference_sim.material import Material
+from snug.motion_inputs import motion_rates
 from snug.recipe import Recipe
 from snug.skinning import axis_angle_to_matrix, joint_transforms, matrix_to_6d, skin
 
-FEATURE_SETS = ("motion", "pose", "pose_shape")
+FEATURE_SETS = ("motion", "pose", "pose_shape", "rates")
 
 
 class DressedBody:
@@ -87,18 +88,29 @@ class DressedBody:
         return joint_transforms(rotations, joints, self.parents, home).float()
 
     def features(
-        self, motion: Any, recipe: Recipe, betas: np.ndarray | None = None, *, kind: str = "motion"
+        self,
+        motion: Any,
+        recipe: Recipe,
+        betas: np.ndarray | None = None,
+        *,
+        kind: str = "motion",
+        still: bool = False,
     ) -> Tensor:
         """Inputs of a network, (T, D) float32: the pose; for `motion` the root velocity and the shape too,
-        for `pose_shape` the shape.
+        for `pose_shape` the shape, for `rates` how root and joints move (snug.motion_inputs).
+
+        still: as if each pose were held, whatever came before it.
         """
         if kind not in FEATURE_SETS:
             raise ValueError(f"unknown features {kind!r}: use one of {FEATURE_SETS}")
         rotations = axis_angle_to_matrix(torch.as_tensor(motion.poses, dtype=torch.float64))
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
         if kind == "motion":
-            parts.append(_root_velocity(motion, rotations[:, 0], recipe.velocity_frame))
-        if kind != "pose":
+            velocity = _root_velocity(motion, rotations[:, 0], recipe.velocity_frame)
+            parts.append(velocity * (not still))
+        if kind == "rates":
+            parts.append(torch.as_tensor(motion_rates(motion)) * (not still))
+        if kind in ("motion", "pose_shape"):
             shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
             parts.append(torch.as_tensor(shape).expand(len(motion.poses), -1))
         return torch.cat(parts, dim=-1).float()

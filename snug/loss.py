@@ -5,7 +5,8 @@ For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
     [ sum_t  strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)  +  sum_{t >= 3} inertia(x_t) ] / T
 
 in joules a frame: a frame without two frames before it in the window has no inertia term, so a window of
-three holds three static terms and one inertia. Its gradient reaches all three frames.
+three holds three static terms and one inertia. Its gradient reaches all three frames, or, where the recipe is
+`detached`, the last alone.
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
 kernels (snug.lanes, or those beside the definition) give the same values and gradients in a small part of
@@ -118,7 +119,7 @@ class PhysicsLoss:
     def __init__(
         self, cloth: Cloth, recipe: Recipe, *, dt: float, device: torch.device = CPU, kernels: bool = True
     ) -> None:
-        self.terms, self.kernels = recipe.terms, kernels
+        self.terms, self.kernels, self.detached = recipe.terms, kernels, recipe.detached
         self.contact = make_contact(cloth, recipe)
         self.inertia = Inertia(cloth, dt)
         self.static = static_terms(cloth, recipe)
@@ -136,7 +137,8 @@ class PhysicsLoss:
         """
         terms = {name: summed(energy, x, kernels=self.kernels) for name, energy in self.static.items()}
         if "inertia" in self.terms and x.shape[1] >= 3:
-            x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
+            past = x.detach() if self.detached else x
+            x_hat = 2 * past[:, 1:-1] - past[:, :-2] + ahead[:, 2:, None]
             inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
             terms["inertia"] = torch.nn.functional.pad(inertia, (2, 0))
         if "collision" in self.terms and planes is not None:

@@ -44,6 +44,9 @@ class Recipe:
     material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
         (edges, hinges, uniform mass and squared contact of PBNS, see snug.baselines.springs; it has its own
         stiffness and margin of contact).
+    detached: previous frames are given to inertia, not moved by it: without it a network makes its past agree
+        with a still present instead of learning to move.
+    swing, swing_components: see snug.swing; 0 where no simulation teaches.
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
     """
@@ -71,6 +74,9 @@ class Recipe:
     mixed_turn: float = 0.1
     terms: tuple[str, ...] = TERMS
     material: str = "stvk"
+    detached: bool = False
+    swing: float = 0.0
+    swing_components: int = 128
     spike: float = 2.0
     gradient_limit: float = 1.0
 
@@ -92,7 +98,12 @@ class Recipe:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
-        for option in ("mixed", "mixed_turn", "smoothing", "h0_sigma", "shape_range", "contact_refresh"):
+        if not 1 <= self.swing_components <= 256:
+            raise RecipeError(
+                f"recipe option swing_components={self.swing_components}: a hidden unit for each, 1 to 256"
+            )
+        sizes = ("swing", "mixed", "mixed_turn", "smoothing", "h0_sigma", "shape_range", "contact_refresh")
+        for option in sizes:
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         for option in ("learning_rate", "output_scale", "drop_factor", "gradient_limit", "spike"):
@@ -149,6 +160,13 @@ TAILORNET = replace(
 )
 PBNS_SPRINGS = replace(DEFAULT, name="pbns-springs", material="pbns", contact_samples="vertices")
 
+# Long windows, for a swing lasts half a second; motions are simulated, so none are mixed. The swing begins
+# at joules, so the guard is told to expect them.
+DYNAMIC = replace(
+    DEFAULT, name="dynamic", window=36, batch=2, h0_sigma=0.1, mixed=0.0, detached=True, swing=30.0,
+    spike=20.0,
+)  # fmt: skip
+
 
 def _without(term: str) -> Recipe:
     return replace(DEFAULT, name=f"no-{term}", terms=tuple(name for name in TERMS if name != term))
@@ -181,6 +199,7 @@ TRAININGS = {
     "supervised": Training("supervised", SUPERVISED, simulated=True),
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, simulated=True),
     "tailornet": Training("tailornet", TAILORNET, simulated=True),
+    "snug-dynamic": Training("dynamic", DYNAMIC, simulated=True),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
 }
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,8 +40,7 @@ def roll_out(
     """
     if not held_pose:
         return ready_to_roll_out(model, dressed, motion, betas)()
-    still = replace(motion, translations=np.zeros_like(motion.translations))
-    features = _features(model, dressed, still, betas)
+    features = _features(model, dressed, motion, betas, still=True)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
     posed = _held(model, features, rest, weights, dressed.transforms(motion.poses, betas))
     origins = dressed.pelvis(motion, betas)
@@ -147,11 +145,19 @@ def skinned_frames(
     return (skin(rest, weights, t).numpy().astype(np.float64) + at for t, at in zip(transforms, pelvis))
 
 
-def _features(model: TrainedModel, dressed: DressedBody, motion: Any, betas: np.ndarray | None) -> Tensor:
+def _features(
+    model: TrainedModel,
+    dressed: DressedBody,
+    motion: Any,
+    betas: np.ndarray | None,
+    *,
+    still: bool = False,
+) -> Tensor:
     """The network's inputs (T, D). Raises RollOutError where the model does not fit."""
     if model.vertices != dressed.vertices:
         raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
-    features = dressed.features(motion, model.recipe, betas, kind=find_kind(model.kind).features)
+    kind = find_kind(model.kind)
+    features = dressed.features(motion, model.recipe, betas, kind=kind.features, still=still)
     inputs = model.network.input_mean.shape[0]
     if features.shape[1] != inputs:
         raise RollOutError(

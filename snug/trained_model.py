@@ -17,6 +17,7 @@ from snug.baselines.supervised import VertexTargets
 from snug.baselines.tailornet import BandTargets, FrequencyMixture
 from snug.recipe import Recipe, RecipeError
 from snug.regressor import Regressor, parameter_megabytes
+from snug.swing import SwingTeacher
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 
 FORMAT = "snug-model-1"
@@ -26,13 +27,15 @@ FORMAT = "snug-model-1"
 class Kind:
     """A sort of model: its network, the inputs it reads, whether it sees sequences, and what teaches it.
 
-    targets: what simulated vertices become for it; None where the energies teach it.
+    targets: what simulated vertices become for it; None where the energies teach it. teacher: what a
+    simulation teaches beside the energies.
     """
 
     network: type[nn.Module]
     features: str
     sequences: bool
     targets: type[VertexTargets] | None = None
+    teacher: type[SwingTeacher] | None = None
 
     @property
     def physics(self) -> bool:
@@ -41,6 +44,7 @@ class Kind:
 
 KINDS = {
     "snug": Kind(Regressor, "motion", sequences=True),
+    "dynamic": Kind(Regressor, "rates", sequences=True, teacher=SwingTeacher),
     "supervised": Kind(Regressor, "motion", sequences=True, targets=VertexTargets),
     "pbns": Kind(PoseSpaceDeformation, "pose", sequences=False),
     "santesteban2019": Kind(FitAndWrinkles, "pose_shape", sequences=True, targets=VertexTargets),

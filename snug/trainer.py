@@ -22,6 +22,7 @@ from snug.recipe import Recipe
 from snug.regressor import Regressor
 from snug.skinning import skin
 from snug.stopwatch import Stopwatch
+from snug.swing import SwingTeacher
 from snug.trained_model import find_kind, make_network
 from snug.training_contact import TrainingContact
 from snug.training_set import CPU, Batch, TrainingError, TrainingSet
@@ -86,6 +87,10 @@ class Trainer:
                 raise GroupError(f"{kind} is trained by one process: only the energies are shared by several")
             on_cpu = (dressed.weights(recipe.smoothing), self.data.transforms.cpu())
             self.targets = how.targets(dressed, motions, trajectories, *on_cpu).to(device)
+        self.teacher: SwingTeacher | None = None
+        if how.teacher:
+            self.teacher = how.teacher(self.data, motions, trajectories, self.weights, recipe)
+            self.teacher.start(self.network)
         self.guard = Guard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
 
@@ -134,7 +139,7 @@ class Trainer:
 
     def _physics_step(self, number: int, windows: np.ndarray, batch: Batch, state: Any) -> dict[str, float]:
         assert self.loss is not None
-        x = self.predict(batch, state)
+        x, offsets = self.predict(batch, state)
         planes = posed = None
         if self.contact:
             with self.clock.part("contact"):
@@ -142,6 +147,8 @@ class Trainer:
                 planes = self.contact.planes(batch, posed)
         with self.clock.part("energies"):
             terms = self.loss(x, batch.ahead, planes)
+            if self.teacher:
+                terms["swing"] = self.teacher.swing(offsets, batch)
         means, trusted = self._update(number, windows, terms)
         if trusted and self.contact and posed:
             with self.clock.part("renewal"):
@@ -156,12 +163,12 @@ class Trainer:
         state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
         return None if state is None else state[:, mine]
 
-    def predict(self, batch: Batch, state: Any) -> Tensor:
-        """Vertices relative to the pelvis, (N, T, V, 3) [m]."""
+    def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Tensor]:
+        """Vertices relative to the pelvis, and offsets of the unposed garment, both (N, T, V, 3) [m]."""
         with self.clock.part("forward"):
             offsets, _ = self._callable(batch.features, state)
         with self.clock.part("skinning"):
-            return skin(batch.rest + offsets, self.weights, batch.transforms)
+            return skin(batch.rest + offsets, self.weights, batch.transforms), offsets
 
     def _set_rate(self, number: int) -> None:
         recipe = self.recipe

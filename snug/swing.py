@@ -1,0 +1,95 @@
+"""What a simulation teaches beside the energies: how the garment swings, and nothing finer.
+
+The energies alone teach a network to dress, not to swing: a dresser without memory is consistent with its own
+past, and inertia weighs little in the sum. A simulation knows the swing, but its wrinkles depend on the past
+too closely to be learned; a network that is fitted to them averages them, and an averaged wrinkle is
+stretched cloth. So the simulated offsets (unposed, see DressedBody) are split by their principal components:
+
+    offsets(t) = mean + sum_i c_i(t) b_i,     b_i orthonormal, the widest first
+
+The few widest are the swing. The last layer starts with them, one hidden unit for each, and the loss holds
+their coordinates to the simulation's as inertia would hold a whole garment,
+
+    swing(t) = s m / (2 dt^2) sum_{i <= K} (<offsets(t) - mean, b_i> - c_i(t))^2      [J]
+
+with m the mean mass of a vertex and s the recipe's `swing`. What is finer is left to the energies, whose
+inertia then takes the network's own previous frames as given (the recipe's `detached`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from snug.baselines.supervised import TargetError, matched_targets
+from snug.recipe import Recipe
+from snug.regressor import Regressor
+from snug.training_set import Batch, TrainingSet
+
+REACH = 3.0  # standard deviations of a component at which its hidden unit is at its end
+BLIND = 12  # frames after a start within a motion in which the state cannot know the swing
+
+
+class SwingTeacher:
+    """Coordinates of the simulated swing in every training frame.
+
+    Raises TargetError for a motion without a fitting trajectory, and for fewer frames than components.
+    """
+
+    def __init__(
+        self,
+        data: TrainingSet,
+        motions: Sequence[Any],
+        trajectories: Mapping[str, np.ndarray] | None,
+        weights: Tensor,
+        recipe: Recipe,
+    ) -> None:
+        dressed = data.dressed
+        vertices = matched_targets(motions, trajectories, dressed.vertices)
+        pelvis = [dressed.pelvis(motion) for motion in motions]
+        posed = torch.cat([torch.as_tensor(x - p[:, None]).float() for x, p in zip(vertices, pelvis)])
+        offsets = unposed(posed.to(data.device), weights, data.transforms) - data.rest
+        flat = offsets.flatten(1)
+        if len(flat) <= recipe.swing_components:
+            raise TargetError(
+                f"{len(flat)} simulated frames cannot give {recipe.swing_components} components of a swing: "
+                "simulate longer motions, or ask for fewer"
+            )
+        self.mean = flat.mean(0)
+        _, widths, directions = torch.linalg.svd(flat - self.mean, full_matrices=False)
+        self.directions = directions[: recipe.swing_components]  # (K, 3V)
+        self.spread = widths[: recipe.swing_components] / len(flat) ** 0.5  # (K,) [m]
+        self.coordinates = (flat - self.mean) @ self.directions.T  # (F, K) [m]
+        self.first = torch.as_tensor(data.first[:-1], device=data.device)
+        self.stiffness = recipe.swing * float(dressed.cloth.masses.mean()) / data.dt**2
+
+    def start(self, network: Regressor) -> None:
+        """Give the last layer the mean and the components, and nothing else."""
+        count = len(self.directions)
+        with torch.no_grad():
+            network.offsets.weight.zero_()
+            network.offsets.weight[:, :count] = (
+                (self.directions.T * self.spread) * REACH / network.output_scale
+            )
+            network.offsets.bias.copy_(self.mean / network.output_scale)
+
+    def swing(self, offsets: Tensor, batch: Batch) -> Tensor:
+        """Joules (N, T) of offsets (N, T, V, 3): see above. Zero in the BLIND frames of a window."""
+        rows = torch.as_tensor(batch.frames, device=offsets.device)
+        apart = (offsets.flatten(2) - self.mean) @ self.directions.T - self.coordinates[rows]
+        place = torch.arange(rows.shape[1], device=rows.device)
+        knows = (place >= BLIND) | torch.isin(rows[:, :1], self.first)
+        return 0.5 * self.stiffness * apart.square().sum(-1) * knows
+
+
+def unposed(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
+    """The inverse of skinning: posed (F, V, 3) about the pelvis -> unposed (F, V, 3) [m]."""
+    frames = []
+    for x, joints in zip(posed, transforms):
+        blend = torch.einsum("vj,jab->vab", weights, joints)  # (V, 3, 4)
+        frames.append(torch.linalg.solve(blend[..., :3], (x - blend[..., 3])[..., None])[..., 0])
+    return torch.stack(frames)

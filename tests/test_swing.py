@@ -1,0 +1,170 @@
+"""What a simulation teaches beside the energies, the rates that a network sees, previous frames as given."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from snug.baselines.supervised import TargetError
+from snug.loss import PhysicsLoss
+from snug.motion import Motion
+from snug.motion_inputs import RATED, motion_rates
+from snug.recipe import DEFAULT, DYNAMIC, TRAININGS
+from snug.rollout import roll_out
+from snug.skeleton import axis_angles, rotation_matrices
+from snug.swing import BLIND, REACH, SwingTeacher, unposed
+from snug.train import train
+from snug.trained_model import TrainedModel, make_network
+from snug.training_set import TrainingSet
+from tests.dressing import swaying, tube_dress
+
+SMALL = replace(DYNAMIC, window=BLIND + 8, batch=2, swing_components=6)
+
+
+def swung(motion, seed=0):
+    """World vertices (T, V, 3) of a tube whose every vertex swings in three ways of its own."""
+    dressed, random = tube_dress(), np.random.default_rng(seed)
+    ways = 0.03 * random.normal(size=(3, dressed.vertices, 3))
+    time = np.arange(motion.frames) / motion.fps
+    sizes = np.stack([np.sin(2 * np.pi * f * time + f) for f in (0.7, 1.1, 1.9)], axis=1)
+    offsets = torch.as_tensor(np.einsum("tk,kvi->tvi", sizes, ways), dtype=torch.float32)
+    return dressed.skinned(motion, smoothing=SMALL.smoothing, offsets=offsets), offsets
+
+
+@pytest.fixture(scope="module")
+def lesson():
+    """Two motions, what was simulated of them, and the teacher."""
+    motions = [swaying(30), swaying(26, name="other", degrees=15.0)]
+    made = [swung(motion) for motion in motions]
+    dressed = tube_dress()
+    data = TrainingSet(dressed, motions, SMALL, features="rates", sequences=True)
+    trajectories = {motion.name: x for motion, (x, _) in zip(motions, made)}
+    teacher = SwingTeacher(data, motions, trajectories, dressed.weights(SMALL.smoothing), SMALL)
+    return data, teacher, torch.cat([offsets for _, offsets in made])
+
+
+def test_unposing_is_the_inverse_of_skinning():
+    motion = swaying(5)
+    x, offsets = swung(motion)
+    dressed = tube_dress()
+    posed = torch.as_tensor(x - dressed.pelvis(motion)[:, None]).float()
+    found = unposed(posed, dressed.weights(SMALL.smoothing), dressed.transforms(motion.poses))
+    torch.testing.assert_close(found - dressed.rest(), offsets, atol=2e-6, rtol=0)
+
+
+def test_the_components_span_the_swing(lesson):
+    _, teacher, offsets = lesson
+    assert float(teacher.spread[2]) > 100 * float(teacher.spread[3])  # it swings in three ways
+    torch.testing.assert_close(teacher.directions @ teacher.directions.T, torch.eye(6), atol=1e-4, rtol=0)
+    back = teacher.mean + teacher.coordinates[:, :3] @ teacher.directions[:3]
+    torch.testing.assert_close(back, offsets.flatten(1), atol=1e-5, rtol=0)
+
+
+def test_the_simulated_offsets_cost_nothing_and_others_as_inertia_would(lesson):
+    data, teacher, offsets = lesson
+    batch = data.batch(np.array([0]), None)
+    exact = offsets[torch.as_tensor(batch.frames)]
+    assert float(teacher.swing(exact, batch).max()) < 1e-8
+    along = 0.004 * teacher.directions[1].view(1, 1, -1, 3)
+    mass = float(tube_dress().cloth.masses.mean())
+    expected = 0.5 * SMALL.swing * mass * 30.0**2 * 0.004**2
+    torch.testing.assert_close(
+        teacher.swing(exact + along, batch), torch.full((1, SMALL.window), expected), rtol=1e-3, atol=0
+    )
+
+
+def test_a_window_in_the_midst_of_a_motion_is_not_asked_what_it_cannot_know(lesson):
+    data, teacher, offsets = lesson
+    middle = data.batch(np.array([3]), None)
+    wrong = offsets[torch.as_tensor(middle.frames)] + 0.01
+    cost = teacher.swing(wrong, middle)[0]
+    assert (cost[:BLIND] == 0).all() and (cost[BLIND:] > 0).all()
+
+
+def test_the_network_starts_at_the_mean_and_one_unit_moves_one_component(lesson):
+    data, teacher, _ = lesson
+    network = make_network("dynamic", data.features.shape[1], tube_dress().vertices, SMALL, seed=0)
+    teacher.start(network)
+    with torch.no_grad():
+        hidden = torch.zeros(network.gru.hidden_size)
+        rest = network.offsets(hidden) * network.output_scale
+        torch.testing.assert_close(rest, teacher.mean)
+        hidden[1] = 1.0
+        moved = network.offsets(hidden) * network.output_scale - teacher.mean
+    torch.testing.assert_close(moved, REACH * teacher.spread[1] * teacher.directions[1], atol=1e-6, rtol=1e-4)
+
+
+def test_too_few_frames_for_the_components_are_refused():
+    motion = swaying(24)
+    data = TrainingSet(tube_dress(), [motion], SMALL, features="rates", sequences=True)
+    with pytest.raises(TargetError, match="24 simulated frames"):
+        SwingTeacher(
+            data, [motion], {motion.name: swung(motion)[0]}, tube_dress().weights(SMALL.smoothing),
+            replace(SMALL, swing_components=24),
+        )  # fmt: skip
+    with pytest.raises(TargetError, match="no simulated trajectory"):
+        SwingTeacher(data, [motion], {"else": swung(motion)[0]}, tube_dress().weights(0), SMALL)
+
+
+def turning(rate=1.5, frames=20, heading=0.0):
+    """A body that turns to the left and speeds up sideways."""
+    time = np.arange(frames) / 30.0
+    poses = np.zeros((frames, 24, 3))
+    poses[:, 0, 1] = rate * time + heading
+    around = rotation_matrices(np.array([0.0, heading, 0.0]))
+    path = np.stack([2.0 * time**2, 0 * time, 0 * time], axis=1) @ around.T
+    return Motion("turning", poses, path)
+
+
+def test_rates_tell_of_turning_and_of_a_stop():
+    rates = motion_rates(turning())
+    assert rates.shape == (20, 6 + 3 * len(RATED) + 12)
+    np.testing.assert_allclose(rates[1:, 7], 1.5, rtol=1e-9)  # the pelvis' turn about y [rad/s]
+    speeds = np.linalg.norm(rates[:, :3], axis=1)
+    np.testing.assert_allclose(np.diff(speeds)[2:], 4.0 / 30.0, rtol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(rates[2:, 3:6], axis=1), 4.0, rtol=1e-6)
+    stopped = turning().poses[np.minimum(np.arange(20), 12)]
+    after = motion_rates(Motion("stop", stopped, np.zeros((20, 3))))
+    assert after[13, 7] == 0 and after[13, 6 + 30 + 1] == pytest.approx(-45.0)  # [rad/s^2]
+    assert np.all(after[15:] == 0)
+
+
+def test_rates_do_not_know_north():
+    np.testing.assert_allclose(motion_rates(turning(heading=1.1)), motion_rates(turning()), atol=1e-9)
+    bent = turning().poses.copy()
+    bent[:, 0] = axis_angles(rotation_matrices(bent[:, 0]))
+    assert np.isfinite(motion_rates(Motion("bent", bent, np.zeros((20, 3))))).all()
+
+
+def test_detached_inertia_moves_the_last_frame_alone():
+    dressed = tube_dress()
+    x = torch.randn(1, 3, dressed.vertices, 3, requires_grad=True)
+    for detached, moved in ((False, True), (True, False)):
+        loss = PhysicsLoss(dressed.cloth, replace(DEFAULT, terms=("inertia",), detached=detached), dt=1 / 30)
+        gradient = torch.autograd.grad(loss(x, torch.zeros(1, 3, 3), None)["inertia"].sum(), x)[0]
+        assert bool(gradient[:, :2].any()) is moved
+        assert gradient[:, 2].any()
+
+
+def test_training_learns_the_swing_and_the_file_brings_it_back(tmp_path):
+    motions = [swaying(30), swaying(26, name="other", degrees=15.0)]
+    trajectories = {motion.name: swung(motion)[0] for motion in motions}
+    rows = []
+    assert TRAININGS["snug-dynamic"].simulated
+    model = train(
+        "dynamic", tube_dress(), motions, steps=40, seed=1, recipe=SMALL, trajectories=trajectories,
+        log=rows.append, progress=False, every=10,
+    )  # fmt: skip
+    assert rows[-1]["swing"] < 0.5 * rows[0]["swing"]
+    again = TrainedModel.load(model.save(tmp_path / "dynamic.safetensors"))
+    one, two = (roll_out(m, tube_dress(), motions[0]).positions for m in (model, again))
+    np.testing.assert_array_equal(one, two)
+    # Held still, a pose is answered as if nothing had moved before it.
+    held = roll_out(again, tube_dress(), motions[0], held_pose=True).positions
+    resting = motions[0].cut(0, 1)
+    alone = roll_out(again, tube_dress(), resting, held_pose=True).positions
+    np.testing.assert_allclose(held[0], alone[0], atol=1e-5)
+    assert np.abs(held - one).max() > 1e-3
