@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 WORDS = {"converged": "ok", "ok": "ok", "stalled": "stalled", "diverged": "diverged", "timeout": "timeout"}
 OURS = ("reference_sim", "snug", "benchmarks")
 HEAVY = ("torch", "igl", "numba", "scipy", "h5py")  # what a scene may do without
+_SCENES: dict[str, BuiltScene] = {}  # of this process, which has one
 BATCH = 16  # bodies at once, where a method can
 
 
@@ -70,7 +71,7 @@ class Task:
 def perform(task: Task) -> Outcome:
     """Build the scene and run the cell in this process, whose memory and modules are looked at afterwards."""
     try:
-        scene = built(task)
+        scene = _SCENES[task.cell.scene.name] = built(task)
         outcome = run_cell(task.cell, task.entry, scene, RunFolder(task.folder), device=task.device)
     except Exception as error:
         outcome = failed(task.cell, error)
@@ -78,12 +79,13 @@ def perform(task: Task) -> Outcome:
 
 
 def perform_again(task: Task) -> Outcome:
-    """Build the scene and take the time of one more run."""
+    """Take the time of one more run, in the scene that this process has built."""
     try:
+        scene = _SCENES.get(task.cell.scene.name) or built(task)
         method = task.entry.make(
             models=RunFolder(task.folder).models, seed=task.cell.seed, device=task.device
         )
-        method.prepare(built(task))
+        method.prepare(scene)
         _, reading = clocked(method.run, of=lambda made: made.positions)
     except Exception as error:
         return failed(task.cell, error)
@@ -139,9 +141,7 @@ def throughput(run: Callable[[], np.ndarray]) -> float:
     return reading.seconds / (positions.shape[0] * positions.shape[1])
 
 
-def judge(
-    trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, cut_short: bool
-) -> tuple[str, str]:
+def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, cut_short: bool) -> tuple[str, str]:
     """Status and reason of a row, from what the trajectory says of itself, what is in it, and the clock."""
     import numpy as np
 

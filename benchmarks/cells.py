@@ -1,13 +1,14 @@
 """All cells of a plan, one after another and nothing beside them, each in a process of its own.
 
-First every cell once; then the short ones of suite speed again, so many rounds, the order of the methods
-turned on from round to round, so that a machine that grows slower does not favour whoever came first.
+Short cells of suite speed are run again, so many rounds, the order of the methods turned on from round to
+round, so that a machine that grows slower does not favour whoever came first. Until then their processes
+wait, idle, some cells of one scene at a time.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +21,19 @@ from .records import Records, Work
 from .results import RunFolder
 from .wardrobe import Wardrobe
 
+AT_ONCE = 8  # idle processes at most: each holds some hundred megabytes
 KEPT = tuple(field.name for field in dataclasses.fields(Outcome) if field.name != "cell")
 LEFT_OUT = "not asked for: --only names other states"
 
 
 class Cells:
-    """Runs or reuses cells. obstacles: cell -> why it cannot be run, or None."""
+    """Runs or reuses cells, and remembers which it reused and which of those are out of date."""
 
     def __init__(self, plan: Plan, agenda: Agenda, records: Records, wardrobe: Wardrobe | None) -> None:
         self.plan, self.agenda, self.records, self.wardrobe = plan, agenda, records, wardrobe
         self.reused: list[str] = []
         self.outdated: dict[str, str] = {}  # label -> what has changed since
+        self._idle: dict[Cell, Guarded] = {}
 
     def first(self, cell: Cell, obstacle: str | None) -> Outcome:
         """The outcome of a cell, run or from its record; `obstacle` says why it cannot be run."""
@@ -51,27 +54,48 @@ class Cells:
             self.outdated[cell.label] = found.why
         return _outcome(cell, found.result)
 
-    def again(self, outcomes: Iterable[Outcome], *, bar: Callable[..., Any]) -> list[Outcome]:
-        """The outcomes with the seconds of repeats, where the plan wants any."""
-        by_cell = {outcome.cell: outcome for outcome in outcomes}
-        short = [o.cell for o in by_cell.values() if self._is_repeated(o)]
-        todo = []
-        for number in range(1, self.plan.preset.repeats):
-            for cells in _by_scene(short):
-                turn = number * len(cells) // self.plan.preset.repeats
-                todo += [(cell, number) for cell in (*cells[turn:], *cells[:turn])]
-        for cell, number in bar(todo, "repeats", "run"):
-            work = self.agenda.repeat(cell, number)
-            found = self.records.find(work)
-            result = found.result
-            if found.state != "finished":
-                once_more = self._guarded(perform_again, cell)
-                self._keep(work, once_more)
-                result = {"seconds": once_more.seconds, "status": once_more.status}
-            before = by_cell[cell]
-            if result and result["status"] == "ok":
-                by_cell[cell] = dataclasses.replace(before, seconds=(*before.seconds, *result["seconds"]))
-        return list(by_cell.values())
+    def all(self, *, obstacle: Callable[[Cell], str | None], bar: Callable[..., Any]) -> list[Outcome]:
+        """Every cell of the plan; `obstacle` says why one cannot be run, or None."""
+        outcomes: dict[Cell, Outcome] = {}
+        waiting: list[Cell] = []  # of one scene, their processes idle
+        try:
+            for cell in bar(self.plan.cells, "cells", "cell"):
+                if waiting and (waiting[0].scene != cell.scene or len(waiting) == AT_ONCE):
+                    self._repeat(waiting, outcomes)
+                    waiting = []
+                outcomes[cell] = self.first(cell, obstacle(cell))
+                if self._is_repeated(outcomes[cell]):
+                    waiting.append(cell)
+                elif cell in self._idle:
+                    self._idle.pop(cell).close()
+            self._repeat(waiting, outcomes)
+        finally:
+            for process in self._idle.values():
+                process.close()
+        return list(outcomes.values())
+
+    def _repeat(self, cells: list[Cell], outcomes: dict[Cell, Outcome]) -> None:
+        """The rounds of these cells; adds the seconds to their outcomes and ends their processes."""
+        rounds = self.plan.preset.repeats
+        for number in range(1, rounds):
+            turn = number * len(cells) // rounds
+            for cell in (*cells[turn:], *cells[:turn]):
+                again = self._once_more(cell, number)
+                if again.status == "ok":
+                    before = outcomes[cell]
+                    outcomes[cell] = dataclasses.replace(before, seconds=(*before.seconds, *again.seconds))
+        for cell in cells:
+            if cell in self._idle:
+                self._idle.pop(cell).close()
+
+    def _once_more(self, cell: Cell, number: int) -> Outcome:
+        work = self.agenda.repeat(cell, number)
+        found = self.records.find(work)
+        if found.state == "finished" and found.result is not None:
+            return _outcome(cell, found.result)
+        outcome = self._guarded(perform_again, cell)
+        self._keep(work, outcome)
+        return outcome
 
     def _is_repeated(self, outcome: Outcome) -> bool:
         """Cells of suite speed that ended well, and soon enough to be run again."""
@@ -83,7 +107,7 @@ class Cells:
         )
 
     def _guarded(self, function: Callable[[Task], Outcome], cell: Cell) -> Outcome:
-        """The outcome of a cell in a process that is ended at the deadline. Only an interrupt is raised."""
+        """The outcome of a cell in its own process, ended at the deadline. Raises nothing but interrupts."""
         plan, wardrobe = self.plan, self.wardrobe
         if wardrobe is not None and cell.scene.dressed:
             wardrobe = wardrobe.of_motion(cell.scene.name.split("/", 1)[1])
@@ -95,9 +119,9 @@ class Cells:
             folder=plan.folder,
             device=plan.device,
         )
+        process = self._idle.setdefault(cell, Guarded())
         try:
-            with Guarded() as guarded:
-                return guarded.call(function, task, seconds=plan.preset.cell_seconds)
+            return process.call(function, task, seconds=plan.preset.cell_seconds)
         except Broken as broken:
             return Outcome(cell, broken.status, str(broken))
         except Exception as error:
@@ -122,10 +146,3 @@ def _outcome(cell: Cell, result: dict[str, Any]) -> Outcome:
         for name, value in result.items() if name in KEPT
     }  # fmt: skip
     return Outcome(cell, **values)
-
-
-def _by_scene(cells: Iterable[Cell]) -> list[list[Cell]]:
-    groups: dict[str, list[Cell]] = {}
-    for cell in cells:
-        groups.setdefault(cell.scene.name, []).append(cell)
-    return list(groups.values())

@@ -38,9 +38,7 @@ class Reading:
 Made = TypeVar("Made")
 
 
-def clocked(
-    run: Callable[[], Made], *, of: Callable[[Made], np.ndarray]
-) -> tuple[Made, Reading]:
+def clocked(run: Callable[[], Made], *, of: Callable[[Made], np.ndarray]) -> tuple[Made, Reading]:
     """What run() gives, and the time until all positions `of` it are there."""
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())

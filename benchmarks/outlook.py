@@ -1,4 +1,4 @@
-"""What a run would do: every piece of work with what its folder holds of it, and the time where it is known."""
+"""What a run would do: every piece of work, what its folder holds of it, and the time where it is known."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ PRESETS = (
         newton_cuts=(1, 2, 4, 8),
         gap_samples=4,
         repeats=3,
-        repeat_seconds=3.0,
+        repeat_seconds=1.5,
         cell_seconds=600.0,
     ),
     Preset(

@@ -226,9 +226,7 @@ class Stages:
         """Cells one after another, alone; then metrics from their files, scenes side by side."""
         self.cells = Cells(self.plan, self.agenda, self.records, self.wardrobe)
         with self.record.stage("cells"):
-            outcomes = [self.cells.first(c, self.obstacle(c)) for c in _bar(self.plan.cells, "cells", "cell")]
-        with self.record.stage("repeats"):
-            outcomes = self.cells.again(outcomes, bar=_bar)
+            outcomes = self.cells.all(obstacle=self.obstacle, bar=_bar)
         self.record.reused += self.cells.reused
         self.record.note("outdated", self.cells.outdated)
         with self.record.stage("metrics"):
@@ -255,9 +253,7 @@ class Stages:
         recorded = [outcome for outcome in outcomes if outcome.recorded]
         works = {outcome.cell: self.agenda.metrics(outcome.cell) for outcome in recorded}
         jobs = jobs_of_scenes(recorded, works, self.plan, self.records)
-        ended = run_jobs(
-            jobs, self.wardrobe, title="metrics", unit="cell", workers=self.plan.workers
-        )
+        ended = run_jobs(jobs, self.wardrobe, title="metrics", unit="cell", workers=self.plan.workers)
         reasons = {job.label: end.reason for job, end in zip(jobs, ended) if isinstance(end, Failure)}
         rows = []
         for outcome in outcomes:

@@ -26,7 +26,7 @@ from benchmarks.scenes import SMALL_SCENES
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = {scene.name: scene for scene in SMALL_SCENES}
-TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=60.0)
+TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1)
 
 
 def plan_of(folder: Path, *names: str, scene: str = "free_fall", **changes) -> Plan:
@@ -40,6 +40,12 @@ def plan_of(folder: Path, *names: str, scene: str = "free_fall", **changes) -> P
 
 def harness(plan: Plan) -> Cells:
     return Cells(plan, Agenda(plan), Records(RunFolder(plan.folder), only=plan.only), None)
+
+
+def outcome_of(plan: Plan, number: int = 0) -> Outcome:
+    """Of one cell, its process ended."""
+    one = dataclasses.replace(plan, cells=plan.cells[number : number + 1])
+    return harness(one).all(obstacle=lambda cell: None, bar=no_bar)[0]
 
 
 @pytest.fixture
@@ -63,7 +69,7 @@ def no_bar(items, *_):
 
 def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_path):
     plan = plan_of(tmp_path, "simulation", scene="hanging_sheet")
-    outcome = harness(plan).first(plan.cells[0], None)
+    outcome = outcome_of(plan)
     assert (outcome.status, outcome.recorded, outcome.frames) == ("ok", True, 3)
     assert 0.0 < outcome.seconds[0] < 10.0 and 50.0 < outcome.peak < 1000.0
     assert outcome.terms == "strain+bending+gravity+inertia"
@@ -90,7 +96,7 @@ def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_pat
 def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path, misbehaving):
     misbehaving(how)
     plan = plan_of(tmp_path, "newton-1")
-    outcome = harness(plan).first(plan.cells[0], None)
+    outcome = outcome_of(plan)
     assert outcome.status == status and word in outcome.reason and not outcome.recorded
     (row,) = rows_of(outcome, {})
     assert (row.status, row.value) == (status, None) and not list(tmp_path.rglob("*.vtkhdf"))
@@ -101,7 +107,7 @@ def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word,
 def test_a_cell_that_hangs_is_ended_with_all_that_it_has_started(tmp_path, misbehaving):
     misbehaving("hang")
     plan = plan_of(tmp_path, "newton-1", preset=dataclasses.replace(TINY, cell_seconds=4.0))
-    outcome = harness(plan).first(plan.cells[0], None)
+    outcome = outcome_of(plan)
     assert outcome.status == "timeout" and "4 s" in outcome.reason
     assert of_session(os.getsid(0), "time.sleep(60)") == []
 
@@ -125,7 +131,7 @@ def of_session(session: int, word: str = "") -> list[int]:
 
 def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path):
     plan = plan_of(tmp_path, "simulation")
-    first = harness(plan).first(plan.cells[0], None)
+    first = outcome_of(plan)
     again = harness(plan)
     assert again.first(plan.cells[0], None) == first and again.reused == [plan.cells[0].label]
 
@@ -138,7 +144,7 @@ def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path
     elsewhere = dataclasses.replace(
         plan, preset=dataclasses.replace(TINY, garment_vertices=99, gap_samples=9)
     )
-    assert harness(elsewhere).first(plan.cells[0], None) == first
+    assert outcome_of(elsewhere) == first
 
     RunFolder(tmp_path).trajectory_path("free_fall", "simulation").unlink()
     assert Records(RunFolder(tmp_path)).find(Agenda(plan).cell(plan.cells[0])).state == "missing"
@@ -147,34 +153,34 @@ def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path
 def test_only_what_is_asked_for_is_done(tmp_path, misbehaving):
     misbehaving("raise")
     plan = plan_of(tmp_path, "newton-1", "newton-4")
-    assert harness(plan).first(plan.cells[0], None).status == "failed"
+    assert outcome_of(plan).status == "failed"
     misbehaving("still")
     retry = dataclasses.replace(plan, only=frozenset({"failed"}))
-    left_out = harness(retry).first(plan.cells[1], None)
+    left_out = outcome_of(retry, 1)
     assert left_out.status == "skipped" and "--only" in left_out.reason
 
 
-def test_repeats_take_turns_and_are_kept(tmp_path, misbehaving):
+def test_repeats_take_turns_and_are_kept(tmp_path, misbehaving, monkeypatch):
     names = ("simulation", "newton-1", "newton-4")
     misbehaving("still", *names)
     preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=60.0)
     plan = plan_of(tmp_path, *names, preset=preset)
     cells, order = harness(plan), []
+    once_more = Cells._once_more
 
-    def bar(items, *_):
-        order.extend((cell.method, number) for cell, number in items)
-        return items
+    def watched(self, cell, number):
+        order.append((cell.method, number))
+        return once_more(self, cell, number)
 
-    outcomes = [cells.first(cell, None) for cell in plan.cells]
-    repeated = cells.again(outcomes, bar=bar)
+    monkeypatch.setattr(Cells, "_once_more", watched)
+    repeated = cells.all(obstacle=lambda cell: None, bar=no_bar)
     assert [name for name, number in order if number == 1] == ["newton-1", "newton-4", "simulation"]
     assert [name for name, number in order if number == 2] == ["newton-4", "simulation", "newton-1"]
     assert all(len(outcome.seconds) == 3 for outcome in repeated)
     costs = clock_costs(repeated[0])
     assert costs["cost/frame"] == pytest.approx(1e3 * sorted(repeated[0].seconds)[1] / 4)
     assert costs["cost/spread"] > 0.0
-    kept = harness(plan)
-    assert kept.again([kept.first(cell, None) for cell in plan.cells], bar=no_bar) == repeated
+    assert harness(plan).all(obstacle=lambda cell: None, bar=no_bar) == repeated
 
 
 def test_repeats_that_lie_apart_carry_a_remark(tmp_path):
@@ -188,7 +194,7 @@ def test_repeats_that_lie_apart_carry_a_remark(tmp_path):
 def test_a_dry_run_tells_what_is_there(tmp_path):
     plan = plan_of(tmp_path / "run", "simulation", "newton-1", "skinning")
     assert "2 pieces of work to run; 0 cached" in describe(plan) and not plan.folder.exists()
-    harness(plan).first(plan.cells[0], None)
+    outcome_of(plan)
     words = describe(plan)
     assert "free_fall x simulation [speed]: cached, metrics to be computed" in words
     assert "free_fall x newton-1 [speed]: run (missing)" in words and "skinning [speed]: skip" in words
