@@ -14,7 +14,7 @@ from torch import Tensor
 
 from snug.baselines.supervised import VertexTargets
 from snug.dresser import DressedBody
-from snug.guard import Guard, live_tensors
+from snug.guard import SETTLING, Guard, live_tensors
 from snug.loss import PhysicsLoss
 from snug.mixing import mixed_motions
 from snug.parallel import ALONE, Group, GroupError
@@ -24,8 +24,10 @@ from snug.skinning import skin
 from snug.stopwatch import Stopwatch
 from snug.swing import SwingTeacher
 from snug.trained_model import find_kind, make_network
-from snug.training_contact import TrainingContact
+from snug.training_contact import Posed, TrainingContact
 from snug.training_set import CPU, Batch, TrainingError, TrainingSet
+
+MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
 class Trainer:
@@ -147,6 +149,8 @@ class Trainer:
                 planes = self.contact.planes(batch, posed)
         with self.clock.part("energies"):
             terms = self.loss(x, batch.ahead, planes)
+            if self.contact and posed and self._searched_for_high(number, windows, posed, x, terms):
+                terms = self.loss(x, batch.ahead, self.contact.planes(batch, posed))
             if self.teacher:
                 terms["swing"] = self.teacher.swing(offsets, batch)
         means, trusted = self._update(number, windows, terms)
@@ -154,6 +158,26 @@ class Trainer:
             with self.clock.part("renewal"):
                 self.contact.renew(self.data.starts[windows][:, None] + np.arange(self.data.window), posed, x)
         return means
+
+    def _searched_for_high(
+        self, number: int, windows: np.ndarray, posed: Posed, x: Tensor, terms: dict[str, Tensor]
+    ) -> bool:
+        """Search the anchors of windows above the spike limit at once; whether there were any.
+
+        An anchor from the T-pose, or of a garment that has moved on, can claim a contact that is none. Not
+        where most windows are high: then it is the network that is lost, and its vertices are no guide.
+        """
+        assert self.contact is not None
+        if number < SETTLING:
+            return False
+        joules = torch.stack(list(terms.values())).detach().sum(0).mean(1)
+        high = np.flatnonzero(self.group.gathered(joules > self.recipe.spike).cpu().numpy())
+        if not 0 < len(high) <= MOSTLY_FINE * len(windows):
+            return False
+        frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
+        places = (high[:, None] * self.data.window + np.arange(self.data.window)).ravel()
+        self.contact.search(places, frames, posed, x)
+        return True
 
     def start_state(self, count: int, mine: slice) -> Any:
         """What windows start from: noise of the recipe's sigma, or a network's own masks.

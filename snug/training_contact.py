@@ -91,13 +91,17 @@ class TrainingContact:
         frames (N, T): of the whole batch. posed and the predicted vertices x (n, T, V, 3): of the windows
         that this process works on.
         """
-        flat, (rows, positions, _) = frames.ravel(), posed
-        self._credit += self.refresh * len(flat)
+        self._credit += self.refresh * frames.size
         count = int(self._credit)
         self._credit -= count
+        self.search(self.anchors.oldest(frames.ravel(), count), frames, posed, x)
+
+    def search(self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
+        """Search the anchors of some places (n,) among the frames (N T,) of a batch; the rest: see `renew`."""
+        flat, (rows, positions, _) = frames.ravel(), posed
         vertices = x.detach().flatten(0, 1)
         share = len(vertices)
-        for place in self.anchors.oldest(flat, count):
+        for place in places:
             owner, mine = divmod(int(place), share)
             if owner == self.group.rank:
                 samples = self._samples(vertices[mine])

@@ -93,3 +93,26 @@ def test_data_that_is_not_finite_does_not_wear_down_the_rate():
         trainer.step(number)
     assert trainer.guard.rate == 0.5 and trainer.guard.summary["skipped_updates"] == 19
     assert torch.isfinite(weights_of(trainer)).all() and (weights_of(trainer) - good).abs().max() < 0.01
+
+
+def test_a_high_window_has_its_anchors_searched_before_it_is_judged(monkeypatch):
+    """Anchors from the wrong side of the body claim a contact that is none."""
+    recipe = replace(PLAIN, contact_refresh=0.0, batch=8)
+    trainer = made(recipe)
+    row = trainer.step(SETTLING)
+    usual = row["collision"]
+    anchors = trainer.contact.anchors
+    searched, whole = [], anchors.renew
+    monkeypatch.setattr(anchors, "renew", lambda frame, *rest: (searched.append(frame), whole(frame, *rest)))
+    # Every anchor of the next batch's first window on the far side of the trunk.
+    order = trainer.order.copy()
+    frames = trainer.data.starts[order[0]] + np.arange(3)
+    anchors.faces[frames] = anchors.faces[frames][:, ::-1]
+    row = trainer.step(SETTLING + 1)
+    assert set(frames) <= set(searched) and len(searched) <= 6
+    assert row["collision"] < usual + 0.05 and trainer.guard.summary["high_windows"] == 0
+    # A lost network is no guide: nothing is searched where most windows are high.
+    searched.clear()
+    trainer.network.offsets.bias.data.normal_(0, 0.3)
+    trainer.step(SETTLING + 2)
+    assert not searched
