@@ -14,15 +14,19 @@ LIVELY = ("sudden_stop", "spin_jump")  # of the library's test motions: a run an
 
 # The reference from coarse to fine in tolerance and in time, and from a start moved by a billionth of a metre.
 REFERENCES = (
-    "simulation", "simulation-1e-2", "simulation-1e-4", "simulation-1e-8", "simulation-dt/2", "simulation-dt/4",
+    "simulation", "simulation-1e-2", "simulation-1e-8", "simulation-dt/2", "simulation-dt/4",
     "simulation-dt/8", "simulation-moved",
 )  # fmt: skip
+FEW_REFERENCES = ("simulation", "simulation-1e-2", "simulation-dt/2", "simulation-moved")
+FAMILIES = (("newton-", 1), ("lbfgs-", 5), ("snug+lbfgs-", 1))  # and iterations for each unit of a preset's cuts
+RIVALS = ("gradient-descent-10", "vbd-20", "xpbd-40", "skinning+lbfgs-4", "snug+newton-2")
 PEERS = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
 LEARNED = ("skinning", "snug", "supervised", "pbns")
 # Only where methods are named, or at a preset that holds all; learned ones as in suite garments.
 FURTHER = (
-    "pbns-springs", "santesteban2019", "tailornet", "vbd-5", "xpbd-10", "skinning+lbfgs-2", "skinning+lbfgs-8",
-    "skinning+newton-1", "skinning+newton-2", "skinning+newton-4", "skinning+newton-8", "snug+newton-2",
+    "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4", "gradient-descent-40", "vbd-5", "vbd-80",
+    "xpbd-10", "xpbd-160", "skinning+lbfgs-1", "skinning+lbfgs-2", "skinning+lbfgs-8", "skinning+newton-1",
+    "skinning+newton-2", "skinning+newton-4", "skinning+newton-8", "snug+newton-1", "snug+newton-4",
     "snug+newton-8",
 )  # fmt: skip
 
@@ -36,18 +40,7 @@ def scenes(test_motions: Sequence[str], *, full: bool) -> list[str]:
 
 
 def methods(newton_cuts: Sequence[int]) -> list[str]:
-    """The reference, solvers cut short and everything learned; few cuts mean few of each family."""
-    if len(newton_cuts) < 3:
-        rivals = ["gradient-descent-10", "vbd-20", "xpbd-40", "skinning+lbfgs-4", "snug+newton-1"]
-        references = ["simulation", "simulation-1e-2", "simulation-dt/2", "simulation-moved"]
-    else:
-        rivals = [
-            "gradient-descent-10", "gradient-descent-40", "vbd-20", "vbd-80", "xpbd-40", "xpbd-160",
-            "skinning+lbfgs-1", "skinning+lbfgs-4", "snug+newton-1", "snug+newton-4",
-        ]  # fmt: skip
-        references = list(REFERENCES)
+    """The reference, solvers cut short and everything learned; few cuts mean few references too."""
+    references = REFERENCES if len(newton_cuts) > 2 else FEW_REFERENCES
     families = [f"{name}{scale * cut}" for name, scale in FAMILIES for cut in newton_cuts]
-    return [*references, *families, *rivals, *PEERS, *LEARNED]
-
-
-FAMILIES = (("newton-", 1), ("lbfgs-", 5), ("snug+lbfgs-", 1))  # and iterations for each unit of a preset's cuts
+    return [*references, *families, *RIVALS, *PEERS, *LEARNED]
