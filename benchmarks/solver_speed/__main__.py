@@ -18,11 +18,12 @@ from pathlib import Path
 PARTS = {
     "sheet": "64 x 64 sheet pinned at two corners, 30 frames: ms a frame, convergence, where the time goes",
     "tshirt": "T-shirt of 1000 and 4400 vertices on the walking, running and jumping body",
-    "minimisers": "Newton and L-BFGS over the same walk, beside two starts 0.1 mm apart",
+    "minimisers": "Newton and L-BFGS over the same walk, beside ten starts moved by 0.1 mm",
     "barrier": "a sheet on a ball: IPC's barrier beside the penalty, its cost and what passes (ipctk)",
     "guesses": "potential above the minimum of each initial guess of a step",
     "scaling": "cost of an iteration and peak memory from 1k to 64k vertices",
     "left_out": "with and without a body, hinges, inertia, networks that a scene does not need",
+    "closest": "closest points of a frame's samples on the body: the refitted tree beside libigl's",
     "linear": "sparse Cholesky packages on the same Hessian: analyse, factorise, solve",
     "peers": "newton's VBD and XPBD on the same sheet, step and masses (extra `peers`)",
 }
