@@ -15,7 +15,7 @@ from meshes import grid
 from benchmarks.checks import refusals
 from benchmarks.checks.hard_steps import sheet
 from benchmarks.checks.starts import START, VELOCITIES
-from benchmarks.checks.verdict import attempt, examine, judge, price_of_collapse
+from benchmarks.checks.verdict import as_simulated, attempt, examine, judge, price_of_collapse, unknown_energy
 from benchmarks.guarded import Broken, Guarded
 from benchmarks.results import Row
 from benchmarks.suites import extremes
@@ -130,6 +130,26 @@ def test_where_collapse_pays_is_a_matter_of_two_numbers():
     assert "collapse pays" in judge(soft, claiming(soft.guess, "stalled")).reason
     barrier = sheet(stiffness=1e-3, terms="membrane+bending+area")
     assert "collapse pays" not in judge(barrier, claiming(barrier.guess, "stalled")).reason
+
+
+def test_the_simulators_own_way_is_watched_from_start_to_end(solved):
+    step, _ = solved
+    kept = []
+    result = as_simulated(step.potential, step.guess, tolerance=1e-6, observe=kept.append)
+    assert np.array_equal(kept[0], step.guess) and np.array_equal(kept[-1], result.positions)
+    values = [step.potential.value(x) for x in kept]
+    assert len(kept) > 5 and (np.diff(values) < 1e-12 * values[0]).all()
+    assert attempt(step, as_simulated).status == "ok"
+
+
+def test_energy_that_round_off_decides_upon_is_that_of_hinges_of_flat_triangles(solved):
+    step, result = solved
+    assert unknown_energy(step.potential, result.positions) == 0.0
+    a, b, c = step.potential.cloth.faces[60]
+    flat = result.positions.copy()
+    flat[c] = 0.5 * (flat[a] + flat[b])  # its three hinges, and those of no other triangle
+    one = 0.5 * 3.96e-5 * np.pi**2
+    assert unknown_energy(step.potential, flat) == pytest.approx(3 * one)
 
 
 def test_the_judge_uses_no_kernel(solved, monkeypatch):

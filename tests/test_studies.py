@@ -226,7 +226,7 @@ def test_a_mesh_that_fails_is_a_row(tmp_path, monkeypatch):
     )
     rows = dependence.rows(plan_of(tmp_path), RunFolder(tmp_path), None)
     assert [row.status for row in rows] == ["failed"] * 2
-    assert {row.scene for row in rows} == {"dependence/mesh/300", "dependence/mesh/500"}
+    assert {row.scene for row in rows} == {"dependence/mesh/200", "dependence/mesh/300"}
 
 
 # --- hard motions ---------------------------------------------------------------------------------------

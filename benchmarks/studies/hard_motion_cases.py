@@ -177,7 +177,6 @@ HARD_MOTIONS = (
         description="the whole body one metre aside for a single frame",
         make=root_jumps,
         glitch=True,
-        smoke=True,
     ),
     HardMotion(
         name="limb_glitch",

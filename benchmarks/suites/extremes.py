@@ -87,9 +87,9 @@ def refused(case: Case) -> tuple[str, str]:
 
 def judged(case: Case) -> Verdict:
     """The hard step of a case, minimised and judged."""
-    from ..checks.verdict import attempt
+    from ..checks.verdict import as_simulated, attempt
 
-    return attempt(_function(case)(**case.options))
+    return attempt(_function(case)(**case.options), as_simulated)
 
 
 def _function(case: Case) -> Any:

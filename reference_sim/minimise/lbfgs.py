@@ -10,6 +10,7 @@ takes over where the gradient is SWITCH vertex weights, and its factorisations s
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class LBFGS:
         finish: whether Newton takes over at all. Without it the result can only be "max_iterations",
             "stalled" or "timeout": nothing but a factorised Hessian can say "converged".
         timeout: seconds, for both together.
+        observe: called with every point (V, 3) [m] that either of them kept, the start included.
 
     Raises:
         ValueError: no term of the potential has a scalar stiffness.
@@ -51,9 +53,11 @@ class LBFGS:
         patience: int = 100,
         finish: bool = True,
         timeout: float = float("inf"),
+        observe: Callable[[np.ndarray], object] | None = None,
     ) -> None:
         cloth = potential.cloth
         self.potential, self.memory, self.timeout = potential, memory, timeout
+        self.observe = observe
         self.max_iterations = min(patience, max_iterations) if finish else max_iterations
         self.switch = max(switch, tolerance) if finish else tolerance
         if not any(energy.has_scalar_stiffness for energy in potential.energies):
@@ -65,8 +69,9 @@ class LBFGS:
         self._newton: Newton | None = None
         if finish:
             self._newton = Newton(
-                potential, tolerance=tolerance, max_iterations=max_iterations, timeout=timeout, reuse=True
-            )
+                potential, tolerance=tolerance, max_iterations=max_iterations, timeout=timeout, reuse=True,
+                observe=observe,
+            )  # fmt: skip
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]."""
@@ -90,6 +95,7 @@ class _Run(Descent):
             return "diverged", "energy or gradient is not finite at the starting point"
         if not self.precondition():
             return "diverged", "the preconditioner is not positive definite"
+        self.show()
         while self.gradient_norm() > self.o.switch:
             if self.iterations >= self.o.max_iterations:
                 return "max_iterations", f"gave up after {self.iterations} iterations"
@@ -98,7 +104,12 @@ class _Run(Descent):
             if not self.secant_step(self.secants, self.solve):
                 return "stalled", "no step along the quasi-Newton direction lowers the energy"
             self.iterations += 1
+            self.show()
         return "max_iterations", "gradient within tolerance; curvature not checked"
+
+    def show(self) -> None:
+        if self.o.observe is not None:
+            self.o.observe(self.x.copy())
 
     def precondition(self) -> bool:
         start = time.perf_counter()
