@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +19,6 @@ from .named_metrics import Reference, against, contact, rms, shape
 from .results import RunFolder
 
 if TYPE_CHECKING:
-    from reference_sim import Trajectory
 
     from .scene import BuiltScene
 
@@ -40,6 +37,7 @@ def measure_scene(
     The energies of each frame are added to the trajectory files.
     """
     from reference_sim import Trajectory
+    from reference_sim.trajectory import replace_frame_fields
 
     paths = [run.trajectory_path(scene.name, o.cell.method, o.cell.seed) for o in outcomes]
     trajectories = [Trajectory.load(path) for path in paths]
@@ -52,7 +50,9 @@ def measure_scene(
     skinned = skinned_frames(scene) if any("speed" in o.cell.suites for o in outcomes) else None
     found: list[dict[str, float]] = []
     for k, (outcome, trajectory) in enumerate(zip(outcomes, trajectories)):
-        _add_fields(trajectory, paths[k], energies[k], curvatures[k])
+        fields = {f"energy/{term}": series for term, series in energies[k].items()}
+        fields["curvature/mean"] = curvatures[k].means()
+        replace_frame_fields(paths[k], fields, family="energy/")
         metrics = {f"energy/{term}": mean_energy(series) for term, series in energies[k].items()}
         metrics["curvature/mean"] = float(curvatures[k].means().mean())
         metrics |= shape(scene, positions[k])
@@ -99,13 +99,3 @@ def find_reference(
     at, moved = whole[REFERENCE], whole.get(MOVED)
     floor = None if moved is None else rms(positions[moved], positions[at])
     return Reference(positions[at], curvatures[at], floor)
-
-
-def _add_fields(
-    trajectory: Trajectory, path: Path, energies: Mapping[str, np.ndarray], curvature: CurvatureSeries
-) -> None:
-    """Write the trajectory again with one number per frame for each energy and for the curvature."""
-    fields = {name: v for name, v in trajectory.frame_fields.items() if not name.startswith("energy/")}
-    fields |= {f"energy/{term}": series for term, series in energies.items()}
-    fields["curvature/mean"] = curvature.means()
-    dataclasses.replace(trajectory, frame_fields=fields).save(path)
