@@ -259,6 +259,56 @@ def test_one_minimiser_serves_again_and_gives_the_same_bits():
     assert (again.positions == first.positions).all() and again.iterations == first.iterations
 
 
+def crumpled() -> tuple[Potential, np.ndarray]:
+    """A step of a sheet that is far from any minimum: its Hessian is indefinite for a while."""
+    cloth = Cloth(SHEET, FACES)
+    inertia = Inertia(cloth, 1 / 30)
+    x0 = SHEET + np.random.default_rng(5).normal(0, 0.02, SHEET.shape)
+    inertia.x_hat = x0
+    return Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), inertia]), x0
+
+
+@pytest.mark.parametrize("case", [hanging, crumpled])
+def test_a_factorisation_used_again_saves_others_and_ends_in_a_minimum(case):
+    potential, x0 = case()
+    kept: list[np.ndarray] = []
+    fresh = minimise(potential, x0)
+    again = minimise(potential, x0, reuse=True, observe=kept.append)
+    assert_minimum(potential, x0, again)
+    assert again.factorisations < 0.9 * fresh.factorisations and again.iterations > again.factorisations
+    assert len(kept) <= again.iterations + 1  # every step that was kept is an iteration
+    assert (np.diff([potential.value(x) for x in kept]) <= 1e-12 * abs(again.energy)).all()
+
+
+def test_no_matrix_is_factorised_twice_and_no_step_measured_twice():
+    """A fence forbids the second half of every step, so that none is a full one."""
+
+    class Fence(Poisoned):
+        def largest_step(self, x, direction):
+            asked.append((x.tobytes(), direction.tobytes()))
+            return 0.5
+
+    potential, x0 = crumpled()
+    potential = Potential([*potential.energies, Fence(potential.cloth)])
+    newton, asked, factorised = make_minimiser(potential, max_iterations=25), [], []
+    factorise = newton._solver.factorise
+    newton._solver.factorise = lambda data: factorised.append(data.tobytes()) or factorise(data)
+    assert newton.minimise(x0).iterations == 25
+    assert len(set(factorised)) == len(factorised) > 25
+    assert len(set(asked)) == len(asked) >= 25
+
+
+def test_lbfgs_and_its_finish_share_iterations_and_clock(monkeypatch):
+    potential, x0 = hanging()
+    result = minimise(potential, x0, "lbfgs", max_iterations=30, patience=20)
+    assert (result.status, result.iterations) == ("max_iterations", 30)
+    ticks = iter(range(100_000))
+    monkeypatch.setattr("time.perf_counter", lambda: float(next(ticks)))  # a second for every look at it
+    cut = minimise(potential, x0, "lbfgs", patience=10, switch=1e-6, timeout=90)
+    assert cut.status == "timeout" and cut.iterations > 10
+    assert next(ticks) < 90 + 40
+
+
 def test_unknown_names_are_refused():
     potential, x0 = hanging()
     with pytest.raises(ValueError, match=r"unknown minimiser 'bfgs': choose one of newton, lbfgs"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ def dressed(case: str) -> BuiltScene:
 
 
 def walk(
-    scene: BuiltScene, *, frames: int | None = None, start: np.ndarray | None = None, method: str = "newton"
+    scene: BuiltScene, *, frames: int | None = None, start: np.ndarray | None = None, **options: Any
 ) -> Trajectory:
     """Simulate a dressed scene, from its settled start or another one (V, 3) [m]."""
     return simulate(
@@ -39,7 +40,7 @@ def walk(
         frames=frames or scene.frames,
         obstacle=scene.obstacle,
         start=scene.start if start is None else start,
-        method=method,
+        **options,
     )
 
 

@@ -43,7 +43,7 @@ EXCURSION = 40  # full steps in a row before the energy has to be below its star
 FORESEEN = 0.9  # share of the predicted decrease from which on the quadratic model needs no help
 ROUND_OFF = 1e-2  # [vertex weights] what round-off may at most excuse in the gradient
 MEMORY = 20  # steps that correct a factorisation used again
-WINDOW, RATE = 6, 0.5  # it is given up where so many steps do not bring the gradient down to this share
+WINDOW, RATE = 8, 0.5  # it is given up where so many steps do not bring the gradient down to this share
 
 
 class Newton:
