@@ -97,7 +97,7 @@ class TrainingContact:
         self.search(self.anchors.oldest(frames.ravel(), count), frames, posed, x)
 
     def search(self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
-        """Search the anchors of some places (n,) among the frames (N T,) of a batch; the rest: see `renew`."""
+        """Search the anchors of some places (n,) among the frames (N T,) of a batch; else as `renew`."""
         flat, (rows, positions, _) = frames.ravel(), posed
         vertices = x.detach().flatten(0, 1)
         share = len(vertices)
