@@ -9,27 +9,25 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 
+from .methods import METHODS
 from .results import Row
 
 METRIC = "gap/relative"
 REMARK = "the error does not fall here"
-# The families of suite speed from coarse to fine; the last of "simulation" is the reference's finest.
-CURVES = {
-    "simulation": ("simulation-1e-2", "simulation-1e-4", "simulation", "simulation-1e-8"),
-} | {
-    family: tuple(f"{family}-{cut}" for cut in cuts)
-    for family, cuts in (
-        ("newton", (1, 2, 4, 8)),
-        ("lbfgs", (5, 10, 20, 40)),
-        ("gradient-descent", (10, 40)),
-        ("vbd", (5, 20, 80)),
-        ("xpbd", (10, 40, 160)),
-        ("skinning+lbfgs", (1, 2, 4, 8)),
-        ("skinning+newton", (1, 2, 4, 8)),
-        ("snug+lbfgs", (1, 2, 4, 8)),
-        ("snug+newton", (1, 2, 4, 8)),
-    )
-}
+
+
+def _families() -> dict[str, tuple[str, ...]]:
+    """Methods that are cut short, "<family>-<number>", from few iterations to many."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for entry in METHODS:
+        if entry.cut_short:
+            family, _, cut = entry.name.rpartition("-")
+            found.setdefault(family, []).append((int(cut), entry.name))
+    return {family: tuple(name for _, name in sorted(cuts)) for family, cuts in found.items()}
+
+
+# Each from coarse to fine.
+CURVES = _families() | {"simulation": ("simulation-1e-2", "simulation-1e-4", "simulation", "simulation-1e-8")}
 ROUND_OFF = 1e-6  # a gap below it counts as none: who is called lower there is chance
 
 

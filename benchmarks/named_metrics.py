@@ -23,7 +23,7 @@ UNITS = {
     "penetration/deep": "%", "penetration": "mm", "intersections": "%", "deformation": "%",
     "dihedral": "deg", "drift": "mm", "dynamics": "mm", "dynamics/amplitude": "1",
     "dynamics/correlation": "1", "dynamics/gain": "1", "dynamics/spectrum": "1", "dynamics/lag": "frames",
-    "gap": "1", "gradient": "1", "exact": "m",
+    "gap": "1", "gap/energy": "J", "gradient": "1", "exact": "m",
     "time_error/curvature": "1/m", "time_error/order": "1", "time_error": "J",
     "cost/frame": "ms", "cost/batch": "ms", "cost/spread": "%", "cost/peak": "MB",
     "cost/data": "s", "cost/train": "s", "cost/memory": "MB",

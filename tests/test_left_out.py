@@ -62,7 +62,7 @@ def loaded(code: str, *arguments: str) -> set[str]:
     ("scene", "present", "absent"),
     [
         ("hanging_sheet", MATERIAL, (*BODY, *CONTACT, "torch")),
-        ("sheet_on_sphere", (*MATERIAL, CONTACT[0], "reference_sim.obstacle"), ("snug.body", "torch", CONTACT[1])),
+        ("sheet_on_sphere", (*MATERIAL, CONTACT[0], BODY[4]), ("snug.body", "torch", CONTACT[1])),
         ("free_fall", ("reference_sim.energies.gravity",), (*MATERIAL, *BODY, *CONTACT, "torch")),
     ],
 )

@@ -13,7 +13,7 @@ from benchmarks.evaluate import measure_scene
 from benchmarks.ground_truth import settle, simulate_motion
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
-from benchmarks.plan import Cell
+from benchmarks.plan import Cell, Network
 from benchmarks.presets import find_preset
 from benchmarks.results import RunFolder
 from benchmarks.rows import clock_costs, model_costs, rows_of
@@ -25,7 +25,7 @@ from reference_sim import Trajectory
 TINY = dataclasses.replace(find_preset("smoke"), frames=16, settle_frames=4, sheet_cells=4, sheet_frames=5)
 TRAIN, TEST = "arm_raise", "kick"
 KINDS = ("untrained", "snug", "supervised", "pbns")
-# Further learned methods have tests of their own. On a body the coarsest of each family of solvers speaks for it.
+# Further learned methods have tests of their own. On a body the coarsest speaks for each family of solvers.
 SMALL_METHODS = [entry for entry in METHODS if entry not in LEARNED]
 FINER = {name for family in CURVES.values() for name in family[1:]} - {"simulation"}
 FINER |= {"simulation-dt/4", "simulation-dt/8"}
@@ -51,7 +51,8 @@ def trained(run, wardrobe):
     simulated = simulate_motion(wardrobe, silent, dressed_scene(TRAIN), TINY, run.path)
     assert simulated.whole and simulated.frames == TINY.frames and simulated.seconds > 0
     motions = {TRAIN: run.path / simulated.files[0]}
-    return {kind: train_network(wardrobe, silent, kind, 0, 2, motions, run.path, "cpu") for kind in KINDS}
+    networks = {kind: Network(kind, 0) for kind in KINDS}
+    return {k: train_network(wardrobe, silent, n, 2, motions, run.path, "cpu") for k, n in networks.items()}
 
 
 @pytest.fixture(scope="module")
@@ -64,10 +65,14 @@ def outcomes(run, wardrobe, trained):
         if scene.dressed:
             start = np.load(run.start_path(scene.name))
             built = dataclasses.replace(built, settle=lambda start=start: start)
-        found[scene.name] = built, [
-            run_cell(Cell(scene, m.name, 0, ("garments", "speed")), m, built, run, device="cpu")
-            for m in (DRESSED_METHODS if scene.dressed else SMALL_METHODS)
-        ]
+        methods = DRESSED_METHODS if scene.dressed else SMALL_METHODS
+        found[scene.name] = (
+            built,
+            [
+                run_cell(Cell(scene, m.name, 0, ("garments", "speed")), m, built, run, device="cpu")
+                for m in methods
+            ],
+        )
     return found
 
 

@@ -1,4 +1,4 @@
-"""A network's frame, or skinning's, as the first guess of a step that a few iterations of a solver go on from.
+"""A network's frame, or skinning's, as the first guess of a step, and a few iterations of a solver from it.
 
 The state is carried: x_hat comes from the hybrid's own two previous frames, so that inertia acts, while the
 network sees what it always sees. The potential of the step is frozen as for every solver (contact planes at
@@ -54,7 +54,7 @@ class Hybrid:
             starts = frames()
             next(starts)  # frame 0 is the scene's start, as for every solver
             inner = make_minimiser(potential, **self.solver)
-            return FromElsewhere(inner, starts, potential.cloth.pins)
+            return FromElsewhere(inner, starts, np.asarray(potential.cloth.pins))
 
         self.simulation = Simulation(options={"method": from_elsewhere})
         self.simulation.prepare(scene)

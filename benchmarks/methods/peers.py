@@ -1,7 +1,7 @@
 """Vertex block descent and XPBD as NVIDIA's newton has them: peers on their own energies, in float32.
 
-Membrane and hinges become newton's as solver_speed.newton_peer says: close to ours at small strain, other ones
-at large. Sub-steps are those of newton's examples, so a frame is not the minimum of one step of ours, and its
+Membrane and hinges become newton's as solver_speed.newton_peer says: close to ours at small strain, not at
+large. Sub-steps are those of newton's examples, so a frame is not the minimum of one step of ours, and its
 energy gap says so. Copies into and out of newton are off a frame's own time, as a program would do without
 them; they are on the cell's clock.
 """
@@ -72,8 +72,6 @@ class NewtonPeer:
         }
 
 
-def make(
-    *, models: Path, seed: int, device: str, solver: str, iterations: int, substeps: int
-) -> NewtonPeer:
+def make(*, models: Path, seed: int, device: str, solver: str, iterations: int, substeps: int) -> NewtonPeer:
     """The solver "VBD" or "XPBD" of newton."""
     return NewtonPeer(solver, iterations, substeps)

@@ -41,10 +41,11 @@ def _sweep(x, faces, low, high, order, hit):
                 continue
             if low[f, 2] > high[e, 2] or low[e, 2] > high[f, 2]:
                 continue
-            if not (hit[e] and hit[f]) and not _neighbours(faces[e], faces[f]):
-                if _crosses(x, faces[e], faces[f]) or _crosses(x, faces[f], faces[e]):
-                    hit[e] = True
-                    hit[f] = True
+            if (hit[e] and hit[f]) or _neighbours(faces[e], faces[f]):
+                continue
+            if _crosses(x, faces[e], faces[f]) or _crosses(x, faces[f], faces[e]):
+                hit[e] = True
+                hit[f] = True
 
 
 @njit(cache=True, inline="always")

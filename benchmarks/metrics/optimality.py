@@ -1,18 +1,22 @@
-"""How far a frame is from the minimum of its own time step: as a share of what had to be gained, and as force.
+"""How far a frame is from the minimum of its own time step: energy, share of skinning's, and force.
 
 At frame t the step's objective is Phi(x) = inertia + all declared terms, with x_hat from the method's own
 two previous frames and contact planes frozen at the step's initial guess x_0 (the same guess as the
 simulator's: carried by the obstacle, else x + dt v). Over the sampled frames
 
-    gap   = sum (Phi(x_t) - Phi*) / sum (Phi(x_s) - Phi*)
-    local = sum (Phi(x_t) - Phi(minimum below x_t)) / the same denominator
-    norm  = mean over frames of the largest component of grad Phi(x_t), in mean vertex weights
+    energy = mean of Phi(x_t) - Phi* [J]
+    gap    = sum (Phi(x_t) - Phi*) / sum (Phi(x_s) - Phi*)
+    local  = sum (Phi(x_t) - Phi(minimum below x_t)) / the same denominator
+    norm   = mean of the largest component of grad Phi(x_t), in mean vertex weights
 
 x_s is the garment skinned to the frame's pose or, where there is no body, the guess x_0: 0 is a minimiser, 1
 no better than that. Phi* is the lowest value found by L-BFGS and Newton from x_0 (as the simulator does), by
-Newton alone from x_0, by both from x_t, or x_t itself, and who found it is counted. A step has several minima, so the reference's own local gap is 0
-by construction and its gap is what another solver found below it. Each method is judged from its own history:
-a small gap says that a step was solved, not that the past was right; it does not measure dynamics.
+Newton alone from x_0, by both from x_t, or x_t itself, and who found it is counted. A step has several
+minima, so the reference's own local gap is 0 by construction and its gap is what another solver found below.
+
+Each method is judged from its own history: a small gap says that a step was solved, not that the past was
+right; it does not measure dynamics. And where the past went far from the body, as a solver's that stops much
+too early, skinning is far from that past, the denominator grows and the share flatters: the energy does not.
 """
 
 from __future__ import annotations
@@ -35,7 +39,7 @@ ALIKE = 1e-9  # of the denominator: minima this near are one
 
 @dataclass
 class Optimality:
-    """Sums over sampled frames; `found_by` counts whose minimum was the lowest, the first in FINDERS of equals."""
+    """Sums over sampled frames. found_by: whose minimum was the lowest; of equals the first in FINDERS."""
 
     missed: float = 0.0
     missed_locally: float = 0.0
@@ -49,6 +53,7 @@ class Optimality:
             return {}
         scale = self.to_gain if self.to_gain > 0.0 else float("nan")
         return {
+            "gap/energy": self.missed / len(self.gradients),
             "gap/relative": self.missed / scale,
             "gap/local": self.missed_locally / scale,
             "gradient/norm": float(np.mean(self.gradients)),

@@ -134,8 +134,9 @@ def fold(x, hinge, rest, gradient):
             gradient[1, i] += along * m
             gradient[2 + side, i] = -length * m
     a, b = normals[0], normals[1]
-    cross = e0 * (a[1] * b[2] - a[2] * b[1]) + e1 * (a[2] * b[0] - a[0] * b[2]) + e2 * (a[0] * b[1] - a[1] * b[0])
-    angle = np.arctan2(cross / length, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) - rest
+    c0, c1, c2 = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    sine = (e0 * c0 + e1 * c1 + e2 * c2) / length
+    angle = np.arctan2(sine, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) - rest
     return angle - 2.0 * np.pi * np.floor(angle / (2.0 * np.pi) + 0.5)
 
 

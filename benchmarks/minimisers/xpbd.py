@@ -2,9 +2,9 @@
 
 Each element is a constraint C(x) (a vector for the membrane) with energy C . K C / 2:
 
-    strain      C = (G00, G11, G01),    K = A [[lambda + 2 mu, lambda, 0], [lambda, lambda + 2 mu, 0], [0, 0, 4 mu]]
-    bending     C = theta - theta_0,    K = k
-    collision   C = depth^(3/2),        K = 2 k a_s
+    strain      C = (G00, G11, G01),  K = A [[l + 2 mu, l, 0], [l, l + 2 mu, 0], [0, 0, 4 mu]], l = lambda
+    bending     C = theta - theta_0,  K = k
+    collision   C = depth^(3/2),      K = 2 k a_s
 
 so the sum over elements is StVK, hinges and the cubic penalty, to the last digit; the weight is in the
 predicted positions x_hat + dt^2 g, where a step starts. A sweep solves one constraint after the other:

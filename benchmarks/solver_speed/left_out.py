@@ -1,7 +1,7 @@
 """What is saved by leaving out what a scene does not need: the same frames with and without it.
 
-The term that is put in changes nothing of the answer but round-off: a body 5 m away, hinges of a membrane that stays
-flat, inertia of an infinite time step. Both sides run in turns, so that a busy machine slows both down.
+The term that is put in changes nothing of the answer but round-off: a body 5 m away, hinges of a membrane
+that stays flat, inertia of an infinite time step. Both sides run in turns: a busy machine slows both down.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def _body() -> tuple[Run, Run]:
     from ..scenes.sheet_on_sphere import sphere
 
     cloth, (points, faces) = _sheet(), sphere(0.1, 24)
-    far = Obstacle(points + [5.0, 0.0, 0.0], faces)
+    far = Obstacle(points + np.array([5.0, 0.0, 0.0]), faces)
     terms: list[Energy] = [StretchStVK(cloth), Gravity(cloth)]
     return (
         lambda: simulate(cloth, terms, frames=FRAMES),
