@@ -17,7 +17,7 @@ from . import provenance
 from .clips import SUFFIX
 from .fingerprint import ROOT, code_of, digest, digest_of_file, preset_values
 from .methods import find_method
-from .plan import Cell, Plan, runs
+from .plan import Cell, Network, Plan, network_of, runs
 from .records import Work
 from .scene import Scene
 from .scenes import dressed_scene
@@ -43,30 +43,32 @@ class Agenda:
         """The garment settled in the first pose of a dressed scene, and the posed body."""
         return self._on_body("start", scene)
 
-    def data(self, motion: str) -> Work:
+    def data(self, motion: str, garment: str) -> Work:
         """The simulation of a training motion."""
-        return self._on_body("data", dressed_scene(motion))
+        return self._on_body("data", dressed_scene(motion, garment))
 
-    def network(self, kind: str, seed: int) -> Work:
+    def network(self, network: Network) -> Work:
         """A trained network."""
-        training, plan = TRAININGS.get(kind), self.plan
+        kind, plan = network.name, self.plan
+        training, motions = TRAININGS.get(kind), plan.train_of(network.garment)
         code = code_of("benchmarks.training", "benchmarks.wardrobe")
         inputs = self._inputs(code) | {
             "kind": kind,
-            "seed": seed,
+            "seed": network.seed,
+            "garment": network.garment,
             "steps": plan.preset.steps_of(kind),
             "recipe": dataclasses.asdict(training.recipe if training else DEFAULT),
-            "motions": {name: self._motion(name) for name in plan.train},
+            "motions": {name: self._motion(name) for name in motions},
         }
         if training and training.simulated:
-            inputs["targets"] = [self.data(name).key for name in plan.train]
-        return Work("network", f"{kind}-seed{seed}", inputs, code)
+            inputs["targets"] = [self.data(name, network.garment).key for name in motions]
+        return Work("network", f"{flat(network.garment)}/{kind}-seed{network.seed}", inputs, code)
 
     def cell(self, cell: Cell) -> Work:
         """The trajectory of a method in a scene, timed once."""
         entry = find_method(cell.method)
         code = code_of("benchmarks.cell", cell.scene.module, entry.module)
-        inputs = self._scene(cell.scene, code) | {"method": _declared(entry)}
+        inputs = self._scene(cell.scene, code) | {"method": declared(entry)}
         if entry.seeded:
             inputs["seed"] = cell.seed
         if entry.package:
@@ -75,8 +77,8 @@ class Agenda:
             inputs["recipe"] = dataclasses.asdict(DEFAULT)
         if cell.scene.dressed:
             inputs["start"] = self.start(cell.scene).key
-        if entry.trained:
-            inputs["network"] = self.network(entry.trained, cell.seed).key
+        if network := network_of(cell):
+            inputs["network"] = self.network(network).key
         return Work("cell", name_of(cell), inputs, code)
 
     def repeat(self, cell: Cell, number: int) -> Work:
@@ -101,9 +103,9 @@ class Agenda:
         for scene in self.plan.scenes:
             if scene.dressed:
                 yield self.start(scene)
-        if self.plan.needs_targets:
-            yield from (self.data(motion) for motion in self.plan.train)
-        yield from (self.network(kind, seed) for kind, seed in self.plan.models)
+        for garment in self.plan.simulated:
+            yield from (self.data(motion, garment) for motion in self.plan.train_of(garment))
+        yield from map(self.network, self.plan.networks)
         cells = [cell for cell in self.plan.cells if runs(cell)]
         yield from map(self.cell, cells)
         yield from map(self.metrics, cells)
@@ -113,7 +115,7 @@ class Agenda:
         return Work(kind, flat(scene.name), self._scene(scene, code), code)
 
     def _scene(self, scene: Scene, code: Mapping[str, str]) -> dict[str, Any]:
-        inputs = self._inputs(code) | {"scene": _declared(scene)}
+        inputs = self._inputs(code) | {"scene": declared(scene)}
         if scene.dressed:
             inputs["motion"] = self._motion(scene.name.split("/", 1)[1])
         return inputs
@@ -140,7 +142,7 @@ def flat(scene: str) -> str:
     return scene.replace("/", "-")
 
 
-def _declared(entry: Any) -> dict[str, Any]:
+def declared(entry: Any) -> dict[str, Any]:
     """What a scene or a method declares, but for the words about it."""
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     fields.pop("description")

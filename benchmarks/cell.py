@@ -82,9 +82,8 @@ def perform_again(task: Task) -> Outcome:
     """Take the time of one more run, in the scene that this process has built."""
     try:
         scene = _SCENES.get(task.cell.scene.name) or built(task)
-        method = task.entry.make(
-            models=RunFolder(task.folder).models, seed=task.cell.seed, device=task.device
-        )
+        models = RunFolder(task.folder).models_of(task.cell.scene.garment)
+        method = task.entry.make(models=models, seed=task.cell.seed, device=task.device)
         method.prepare(scene)
         _, reading = clocked(method.run, of=lambda made: made.positions)
     except Exception as error:
@@ -113,7 +112,7 @@ def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder, 
         return Outcome(cell, "skipped", reason)
     path = run.trajectory_path(cell.scene.name, cell.method, cell.seed)
     try:
-        method = entry.make(models=run.models, seed=cell.seed, device=device)
+        method = entry.make(models=run.models_of(cell.scene.garment), seed=cell.seed, device=device)
         method.prepare(scene)
         trajectory, reading = clocked(method.run, of=lambda made: made.positions)
         status, reason = judge(trajectory, reading, scene, cut_short=entry.cut_short)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from .methods import METHODS
 from .presets import PRESETS
-from .scenes import PREFIX, SMALL_SCENES
+from .scenes import SMALL_SCENES, WORN
 from .studies import STUDIES
 from .suites import SUITES
 from .suites.extremes import MAPS, REFUSALS, STEPS
@@ -15,14 +15,19 @@ from .suites.validation import CHECKS
 
 def listing() -> str:
     """Suites, scenes, methods, motions and presets, one line each."""
-    from snug.motion import TEST, TRAIN
+    from snug.motion import SWING_TEST, SWING_TRAIN, TEST, TRAIN
 
-    dressed = [(PREFIX + name, "a body in a T-shirt; unseen in training") for name in TEST]
+    dressed = [
+        (wear.prefix + name, f"a body in {wear.words}; unseen in training")
+        for wear in WORN
+        for name in (SWING_TEST if wear.swings else TEST)
+    ]
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),
         ("scenes", [*((s.name, s.description) for s in SMALL_SCENES), *dressed]),
         ("methods", ((m.name, m.description) for m in METHODS)),
         ("training motions", ((name, "") for name in TRAIN)),
+        ("training motions of garments that swing", ((name, "") for name in SWING_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
         ("validation checks", ((c.name, c.description) for c in CHECKS)),
         ("extreme cases", [*((c.name, c.description) for c in (*STEPS, *REFUSALS)), *map(_map, MAPS)]),

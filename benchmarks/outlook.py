@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from .agenda import Agenda
+from .judged import work_of
 from .plan import Plan, runs
 from .records import Found, Records, Work
 from .results import RunFolder
@@ -24,8 +25,8 @@ def describe(plan: Plan) -> str:
         f"{len(plan.cases)} extreme cases, {len(plan.studies)} studies",
         *outlook.of_cells(),
     ]
-    lines += [f"  {check.name} [validation]" for check in plan.checks]
-    lines += [f"  {case.name} [extremes]" for case in plan.cases]
+    for suite, items in (("validation", plan.checks), ("extremes", plan.cases)):
+        lines += [f"  {i.name} [{suite}]: {outlook.verdict(work_of(i, outlook.agenda))}" for i in items]
     lines += [f"  {study.name} [{study.suite}]" for study in plan.studies]
     return "\n".join([*lines, outlook.total()])
 
@@ -44,19 +45,20 @@ class Outlook:
         """Garment, ground truth and networks."""
         plan, agenda = self.plan, self.agenda
         if plan.needs_wardrobe:
-            yield f"T-shirt of about {plan.preset.garment_vertices} vertices"
-            yield f"test motions {', '.join(plan.test)}"
+            for garment in plan.garments:
+                yield f"{garment} of about {plan.preset.garment_vertices} vertices"
+                yield f"test motions {', '.join(plan.test_of(garment))}"
             for scene in (scene for scene in plan.scenes if scene.dressed):
                 yield f"  settle {scene.name}: {self.verdict(agenda.start(scene))}"
-        if plan.needs_training_motions:
-            targets = "simulated for networks that learn from it" if plan.needs_targets else "not simulated"
-            yield f"training motions {', '.join(plan.train)} ({targets})"
-            for motion in plan.train if plan.needs_targets else ():
-                yield f"  simulate {motion}: {self.verdict(agenda.data(motion))}"
-            for name, seed in plan.models:
-                steps = plan.preset.steps_of(name)
-                verdict = self.verdict(agenda.network(name, seed))
-                yield f"  train {name}, seed {seed}: {steps} steps, {verdict}"
+        for garment in dict.fromkeys(network.garment for network in plan.networks):
+            simulated = garment in plan.simulated
+            targets = "simulated for networks that learn from it" if simulated else "not simulated"
+            yield f"training motions {', '.join(plan.train_of(garment))} ({targets})"
+            for motion in plan.train_of(garment) if simulated else ():
+                yield f"  simulate {motion}: {self.verdict(agenda.data(motion, garment))}"
+        for network in plan.networks:
+            steps = plan.preset.steps_of(network.name)
+            yield f"  train {network.label}: {steps} steps, {self.verdict(agenda.network(network))}"
 
     def of_cells(self) -> Iterator[str]:
         """Each cell, with the state of its metrics where the trajectory is there."""

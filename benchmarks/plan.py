@@ -15,7 +15,7 @@ from snug.recipe import learns_from_simulation
 from .methods import METHODS, find_method
 from .presets import Preset
 from .scene import Scene
-from .scenes import PREFIX, SMALL_SCENES, all_scenes
+from .scenes import SMALL_SCENES, TSHIRT, WORN, all_scenes
 from .studies import METHOD as STUDIES_METHOD
 from .studies import STUDIES, Study
 from .suites import SUITE_NAMES
@@ -48,10 +48,24 @@ class Cell:
         return f"{self.scene.name} x {self.method}" + (f" (seed {self.seed})" if self.seed else "")
 
 
+@dataclass(frozen=True)
+class Network:
+    """A network that some cell needs: its name in snug.recipe.TRAININGS, its seed, the garment it is for."""
+
+    name: str
+    seed: int
+    garment: str = TSHIRT
+
+    @property
+    def label(self) -> str:
+        return f"{self.name} seed {self.seed}" + (f" ({self.garment})" if self.garment != TSHIRT else "")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Plan:
     """Everything to be done. train and test are names of motions; files holds those read from files.
 
+    swing_train, swing_test: the same for garments that swing.
     only: states of the folder's records in which a piece of work is done again; fresh: all records are
     forgotten first. workers: processes side by side where nothing is timed against another.
     """
@@ -64,6 +78,8 @@ class Plan:
     studies: tuple[Study, ...] = ()
     train: tuple[str, ...]
     test: tuple[str, ...]
+    swing_train: tuple[str, ...] = ()
+    swing_test: tuple[str, ...] = ()
     files: dict[str, Motion] = field(default_factory=dict)
     seeds: tuple[int, ...]
     device: str
@@ -79,28 +95,53 @@ class Plan:
         return tuple({cell.scene.name: cell.scene for cell in self.cells}.values())
 
     @property
+    def networks(self) -> tuple[Network, ...]:
+        """Every network that some cell needs."""
+        return tuple(dict.fromkeys(filter(None, (network_of(cell) for cell in self.cells if runs(cell)))))
+
+    @property
     def models(self) -> tuple[tuple[str, int], ...]:
-        """(kind, seed) of every network that some cell needs."""
-        wanted = ((find_method(cell.method), cell) for cell in self.cells if runs(cell))
-        return tuple(dict.fromkeys((entry.trained, cell.seed) for entry, cell in wanted if entry.trained))
+        """(kind, seed) of the T-shirt's networks, which studies look at."""
+        return tuple((network.name, network.seed) for network in self.networks if network.garment == TSHIRT)
+
+    @property
+    def garments(self) -> tuple[str, ...]:
+        """What bodies wear in the scenes of the plan."""
+        return tuple(dict.fromkeys(cell.scene.garment for cell in self.cells if cell.scene.dressed))
+
+    def train_of(self, garment: str) -> tuple[str, ...]:
+        """Names of the motions that networks of a garment train on."""
+        return self.swing_train if swings(garment) else self.train
+
+    def test_of(self, garment: str) -> tuple[str, ...]:
+        """Names of the motions of a garment's scenes."""
+        return self.swing_test if swings(garment) else self.test
+
+    @property
+    def simulated(self) -> tuple[str, ...]:
+        """Garments whose training motions have to be simulated."""
+        learning = (network for network in self.networks if learns_from_simulation(network.name))
+        return tuple(dict.fromkeys(network.garment for network in learning))
 
     @property
     def needs_wardrobe(self) -> bool:
         return any(cell.scene.dressed for cell in self.cells)
 
-    @property
-    def needs_training_motions(self) -> bool:
-        return bool(self.models)
-
-    @property
-    def needs_targets(self) -> bool:
-        """Whether training motions have to be simulated."""
-        return any(learns_from_simulation(name) for name, _ in self.models)
-
 
 def runs(cell: Cell) -> bool:
     """Whether the cell is computed at all."""
     return find_method(cell.method).skip(cell.scene) is None
+
+
+def network_of(cell: Cell) -> Network | None:
+    """The network that a cell needs."""
+    entry = find_method(cell.method)
+    return Network(entry.trained, cell.seed, cell.scene.garment) if entry.trained else None
+
+
+def swings(garment: str) -> bool:
+    """Whether a garment's motions are those that stop within a frame."""
+    return any(wear.swings for wear in WORN if wear.garment == garment)
 
 
 @dataclass(frozen=True)
@@ -110,6 +151,8 @@ class Motions:
     train: tuple[str, ...]
     test: tuple[str, ...]
     files: dict[str, Motion]
+    swing_train: tuple[str, ...] = ()
+    swing_test: tuple[str, ...] = ()
 
 
 def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Preset) -> Motions:
@@ -120,12 +163,12 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     motions of the library test, and of files alone the first in order of names. A single file tests, and the
     library trains.
     """
-    from snug.motion import TEST, TRAIN, load_motions
+    from snug.motion import LIBRARY, SWING_TEST, SWING_TRAIN, TEST, TRAIN, load_motions
 
     files: dict[str, Motion] = {}
     for path in paths:
         for motion in load_motions(path) if path != "library" else ():
-            if motion.name in files or motion.name in (*TRAIN, *TEST):
+            if motion.name in files or motion.name in LIBRARY:
                 raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             files[motion.name] = motion
     with_library = not paths or "library" in paths
@@ -142,7 +185,9 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     if not train:
         train = tuple(name for name in TRAIN if name not in test)
     # Whoever names the test motions means all of them, whatever the size of the preset.
-    return Motions(train[: preset.train_motions], test if test_names else test[: preset.test_motions], files)
+    few, fewer = preset.train_motions, preset.test_motions
+    test = test if test_names else test[:fewer]
+    return Motions(train[:few], test, files, SWING_TRAIN[:few], SWING_TEST[:fewer])
 
 
 def names_no_motion(scenes: Sequence[str]) -> bool:
@@ -165,21 +210,25 @@ def choose_cells(
 
     scenes and methods are names or patterns; empty means all. Naming scenes reaches all of each suite.
     """
-    declared = all_scenes(motions.test)
+    declared = all_scenes(motions.test, motions.swing_test)
     rows = [item.name for group in (CHECKS, CASES, STUDIES) for item in group]
     _check_words("scene", scenes, [*declared, *rows])
     _check_words("method", methods, [entry.name for entry in METHODS])
-    full = full or bool(scenes)
+    full, further = full or bool(scenes), bool(scenes) or preset.further
 
     found: dict[tuple[str, str, int], Cell] = {}
     for suite in suites:
         if suite not in MEETINGS:
             continue
         module = importlib.import_module(f"benchmarks.suites.{suite}")
-        for scene in module.scenes(motions.test, full=full):
-            further = module.FURTHER if methods or preset.further else ()
-            for method in (*module.methods(preset.newton_cuts), *further):
+        for scene in module.scenes(motions.test, motions.swing_test, full=full, further=further):
+            others = module.FURTHER if methods or preset.further else ()
+            # Networks for a second garment double the training: only for whoever names its scenes.
+            plain = not further and declared[scene].garment not in ("", TSHIRT)
+            for method in (*module.methods(preset.newton_cuts), *others):
                 if not (_named(scene, scenes) and _named(method, methods)):
+                    continue
+                if plain and find_method(method).trained:
                     continue
                 for seed in seeds if find_method(method).seeded else seeds[:1]:
                     key = (scene, method, seed)
@@ -228,7 +277,7 @@ def _check_words(what: str, patterns: Sequence[str], names: Sequence[str]) -> No
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in names):
             hint = ""
-            if what == "scene" and pattern.startswith(PREFIX):
+            if what == "scene" and pattern.startswith(tuple(wear.prefix for wear in WORN)):
                 hint = " (scenes of a dressed body are the test motions: see --test-motions)"
             raise PlanError(f"unknown {what} '{pattern}'; {_nearest(pattern, names)}{hint}")
 

@@ -143,6 +143,10 @@ class RunFolder:
     def models(self) -> Path:
         return self.path / "models"
 
+    def models_of(self, garment: str) -> Path:
+        """Where networks of that garment lie: those of the T-shirt, the usual one, in `models` itself."""
+        return self.models if garment in ("", "tshirt") else self.models / garment
+
     @property
     def trajectories(self) -> Path:
         return self.path / "trajectories"

@@ -168,6 +168,8 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         studies=studies,
         train=motions.train,
         test=motions.test,
+        swing_train=motions.swing_train,
+        swing_test=motions.swing_test,
         files=motions.files,
         seeds=seeds,
         device=options.device,

@@ -25,15 +25,20 @@ if TYPE_CHECKING:
 class Scene:
     """The declaration of a scene: cheap to list. Its module is imported when it is built.
 
-    `dressed` says that it needs a body wearing a garment, hence the wardrobe; networks work on no other.
+    `garment` names what a body wears in it; it then needs the wardrobe, and networks work on no other.
     `obstacle` says that there is another thing to touch.
     """
 
     name: str
     description: str
     module: str
-    dressed: bool = False
+    garment: str = ""
     obstacle: bool = False
+
+    @property
+    def dressed(self) -> bool:
+        """Whether there is a body that wears a garment."""
+        return bool(self.garment)
 
     def build(self, preset: Preset, wardrobe: Wardrobe | None = None) -> BuiltScene:
         """Make everything the scene declares. Deterministic. A dressed scene needs the wardrobe."""

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 
 from snug.recipe import learns_from_simulation
 
+from . import judged
 from .agenda import Agenda
 from .cell import Outcome
 from .cells import LEFT_OUT, Cells
 from .curves import REMARK, remarked
-from .methods import find_method
-from .plan import Cell, Plan, runs
+from .plan import Cell, Network, Plan, network_of, runs
 from .record import Record, now
 from .records import Work
 from .results import Row
-from .scenes import dressed_scene
+from .scenes import TSHIRT, dressed_scene, worn_in
 from .workers import Failure, Job, run_jobs
 
 if TYPE_CHECKING:
@@ -67,11 +67,11 @@ class Stages:
         self.record = record
         self.plan, self.folder, self.records = record.plan, record.folder, record.records
         self.agenda = Agenda(self.plan)
-        self.trained: dict[tuple[str, int], Trained] = {}
-        self.untrained: dict[tuple[str, int], str] = {}  # why a network could not be trained
+        self.trained: dict[Network, Trained] = {}
+        self.untrained: dict[Network, str] = {}  # why a network could not be trained
         self.unsettled: dict[str, str] = {}  # scene -> why its garment has no start
-        self.data_seconds = 0.0
-        self.targets: dict[str, Path] = {}  # training motion -> its whole simulation
+        self.data_seconds: dict[str, float] = {}  # by garment
+        self.targets: dict[str, dict[str, Path]] = {}  # garment, training motion -> its whole simulation
         self.wardrobe: Wardrobe | None = None
         self.naked = ""  # why there is no wardrobe
         self.cells: Cells | None = None
@@ -80,12 +80,12 @@ class Stages:
         """Everything but the report."""
         plan = self.plan
         if plan.needs_wardrobe:
-            with self.record.stage("body, T-shirt and motions"):
+            with self.record.stage("body, garments and motions"):
                 self.open_wardrobe()
         if self.wardrobe is not None:
             with self.record.stage("ground truth"):
                 self.ground_truth()
-            if plan.models:
+            if plan.networks:
                 with self.record.stage("training"):
                     self.train()
         if plan.cells:
@@ -96,12 +96,14 @@ class Stages:
             with self.record.stage("validation"):
                 from .suites.validation import run_check
 
-                self.record.rows += [run_check(check) for check in _bar(plan.checks, "validation", "check")]
+                checks = _bar(plan.checks, "validation", "check")
+                self.record.rows += judged.rows_of(checks, run_check, self.agenda, self.records)
         if plan.cases:
             with self.record.stage("extremes"):
                 from .suites.extremes import run_case
 
-                self.record.rows += [run_case(case) for case in _bar(plan.cases, "extremes", "case")]
+                cases = _bar(plan.cases, "extremes", "case")
+                self.record.rows += judged.rows_of(cases, run_case, self.agenda, self.records)
         for study in plan.studies:
             with self.record.stage(f"{study.suite}: {study.name}"):
                 self.record.rows += study.run(plan, self.folder, self.wardrobe)
@@ -111,19 +113,23 @@ class Stages:
         from .wardrobe import embedded_motions, open_wardrobe
 
         plan = self.plan
-        names = [*plan.test, *(plan.train if plan.needs_training_motions else ())]
+        names = [name for garment in plan.garments for name in plan.test_of(garment)]
+        names += [name for network in plan.networks for name in plan.train_of(network.garment)]
+        names = list(dict.fromkeys(names))
         motions = [plan.files[name] for name in names if name in plan.files]
         motions += embedded_motions(name for name in names if name not in plan.files)
         try:
-            self.wardrobe = open_wardrobe(plan.preset, motions)
+            self.wardrobe = open_wardrobe(plan.preset, motions, plan.garments)
         except ValueError as error:  # of all cells only the dressed ones fail
             self.naked = one_line(error)
             return
-        garment = self.wardrobe.garment
-        self.record.note("garment", {
-            "name": garment.name, "vertices": len(garment.rest_positions), "triangles": len(garment.faces),
-            "parameters": {name: float(value) for name, value in garment.parameters.items()},
-        })  # fmt: skip
+        for garment in self.wardrobe.garments.values():
+            self.record.note("garment" if garment.name == TSHIRT else garment.name, {
+                "name": garment.name,
+                "vertices": len(garment.rest_positions),
+                "triangles": len(garment.faces),
+                "parameters": {name: float(value) for name, value in garment.parameters.items()},
+            })  # fmt: skip
         motions_of = self.wardrobe.motions
         self.record.config["motions"]["frames"] = {name: motions_of[name].frames for name in names}
         self.record.note("motion_sources", {name: motions_of[name].source for name in names})
@@ -138,11 +144,12 @@ class Stages:
         for scene in (scene for scene in plan.scenes if scene.dressed):
             work, arguments = self.agenda.start(scene), (scene, preset, plan.folder)
             todo[work] = Job(scene.name, ground_truth.settle, arguments, preset.settle_frames)
-        for motion in plan.train if plan.needs_targets else ():
-            scene = dressed_scene(motion)
+        learned = [(garment, motion) for garment in plan.simulated for motion in plan.train_of(garment)]
+        for garment, motion in learned:
+            scene = dressed_scene(motion, garment)
             units = preset.settle_frames + self.wardrobe.motions[motion].frames
-            work, arguments = self.agenda.data(motion), (scene, preset, plan.folder)
-            todo[work] = Job(motion, ground_truth.simulate_motion, arguments, units)
+            work, arguments = self.agenda.data(motion, garment), (scene, preset, plan.folder)
+            todo[work] = Job(scene.name, ground_truth.simulate_motion, arguments, units)
         results = self.finished(todo, title="simulating", unit="frame")
         unused, rough, frames = {}, {}, 0
         for work, job in todo.items():
@@ -153,18 +160,20 @@ class Stages:
                 unused[job.label] = result.reason
             elif work.kind == "data":
                 simulated = ground_truth.Simulated(**result)
-                self.data_seconds += simulated.seconds
+                worn = worn_in(job.label).garment
+                self.data_seconds[worn] = self.data_seconds.get(worn, 0.0) + simulated.seconds
                 frames += simulated.frames
                 ending = f"{simulated.status}: {simulated.reason}"
                 if simulated.status != "converged":
                     rough[job.label] = ending
                 if simulated.whole:
-                    self.targets[job.label] = self.folder.path / simulated.files[0]
+                    targets = self.targets.setdefault(worn, {})
+                    targets[simulated.motion] = self.folder.path / simulated.files[0]
                 else:
                     unused[job.label] = ending
         self.record.note("data", {
             "workers": plan.workers,
-            "seconds": self.data_seconds,
+            "seconds": sum(self.data_seconds.values()),
             "frames": frames,
             "not_converged": rough,
             "unused": unused,
@@ -177,16 +186,17 @@ class Stages:
         plan = self.plan
         assert self.wardrobe is not None
         todo: dict[Work, Job] = {}
-        networks: dict[Work, tuple[str, int]] = {}
+        networks: dict[Work, Network] = {}
         # The longest first: the workers then end at about the same time.
-        for name, seed in sorted(plan.models, key=lambda model: -plan.preset.steps_of(model[0])):
-            simulated = learns_from_simulation(name)
-            motions: Mapping[str, Path | None] = self.targets if simulated else dict.fromkeys(plan.train)
-            steps = plan.preset.steps_of(name)
-            arguments = (name, seed, steps, motions, plan.folder, plan.device)
-            work = self.agenda.network(name, seed)
-            todo[work] = Job(f"{name} seed {seed}", training.train_network, arguments, steps)
-            networks[work] = name, seed
+        for network in sorted(plan.networks, key=lambda network: -plan.preset.steps_of(network.name)):
+            motions: Mapping[str, Path | None] = dict.fromkeys(plan.train_of(network.garment))
+            if learns_from_simulation(network.name):
+                motions = self.targets.get(network.garment, {})
+            steps = plan.preset.steps_of(network.name)
+            arguments = (network, steps, motions, plan.folder, plan.device)
+            work = self.agenda.network(network)
+            todo[work] = Job(network.label, training.train_network, arguments, steps)
+            networks[work] = network
         results = self.finished(todo, title="training", unit="step")
         summary: dict[str, Any] = {"workers": plan.workers}
         for work, job in todo.items():
@@ -236,12 +246,12 @@ class Stages:
 
     def obstacle(self, cell: Cell) -> str | None:
         """Why the cell cannot be run, or None."""
-        entry = find_method(cell.method)
         if cell.scene.dressed and self.naked:
             return self.naked
         if cell.scene.name in self.unsettled:
             return self.unsettled[cell.scene.name]
-        if entry.trained and (reason := self.untrained.get((entry.trained, cell.seed))):
+        network = network_of(cell)
+        if network and (reason := self.untrained.get(network)):
             return f"its network could not be trained: {reason}"
         return None
 
@@ -260,8 +270,9 @@ class Stages:
             found = self.records.find(works[outcome.cell]) if outcome.recorded else None
             metrics: dict[str, float] = {}
             if found is not None and found.state == "finished" and found.result is not None:
-                network = (find_method(outcome.cell.method).trained or "", outcome.cell.seed)
-                costs = model_costs(self.trained.get(network), self.data_seconds)
+                network = network_of(outcome.cell)
+                data = self.data_seconds.get(outcome.cell.scene.garment, 0.0)
+                costs = model_costs(self.trained[network] if network else None, data)
                 metrics = found.result | clock_costs(outcome) | costs
             elif found is not None:
                 reason = f"metrics: {reasons.get(outcome.cell.scene.name, 'the worker ended')}"

@@ -11,6 +11,7 @@ from .results import RunFolder
 from .wardrobe import Wardrobe
 
 if TYPE_CHECKING:
+    from .plan import Network
     from .workers import Tell
 
 LOG_EVERY = 20  # training steps between two reports of progress
@@ -38,14 +39,13 @@ class Trained:
 def train_network(
     wardrobe: Wardrobe,
     tell: Tell,
-    name: str,
-    seed: int,
+    network: Network,
     steps: int,
     motions: Mapping[str, Path | None],
     folder: Path,
     device: str,
 ) -> Trained:
-    """Train the network of that name (or make an untrained one) and write it to models/.
+    """Train that network (or make an untrained one) and write it where its garment's networks lie.
 
     motions: name -> file of its simulation, which is read where the network learns from one. device: cpu or
     cuda, for every part of a step.
@@ -60,7 +60,8 @@ def train_network(
     from .methods.networks import model_path
 
     torch.set_num_threads(1)
-    dressed = DressedBody(wardrobe.body, wardrobe.garment)
+    name, seed = network.name, network.seed
+    dressed = DressedBody(wardrobe.body, wardrobe.garments[network.garment])
     clips = wardrobe.named(motions)
     if name == "untrained":
         model = untrained_model("snug", dressed, clips, seed=seed)
@@ -81,7 +82,7 @@ def train_network(
             recipe=training.recipe, log=log, progress=False, every=LOG_EVERY, device=device,
         )  # fmt: skip
     run = RunFolder(folder)
-    path = model_path(run.models, name, seed)
+    path = model_path(run.models_of(network.garment), name, seed)
     model.save(path)
     return Trained(
         kind=name,

@@ -1,10 +1,12 @@
-"""What all dressed scenes share: one body, one T-shirt tailored to it, and the motions."""
+"""What all dressed scenes share: one body, the garments tailored to it, and the motions."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+
+from .scenes import TSHIRT
 
 if TYPE_CHECKING:
     import numpy as np
@@ -18,15 +20,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Wardrobe:
-    """A body, the garment it wears and the motions by name, each at most `preset.frames` long.
+    """A body, what it may wear and the motions, all by name; each motion at most `preset.frames` long.
 
     bodies: motion -> posed body (T,B,3) [m], where it is ready made.
     """
 
     body: Body
-    garment: Garment
+    garments: dict[str, Garment]
     motions: dict[str, Motion]
     bodies: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def garment(self) -> Garment:
+        """The T-shirt, which every study wears."""
+        return self.garments[TSHIRT]
 
     def named(self, names: Iterable[str]) -> list[Motion]:
         """The motions of those names, in that order."""
@@ -43,21 +50,23 @@ class Wardrobe:
         return self.body.vertices(motion.poses, motion.translations) if ready is None else ready
 
 
-def open_wardrobe(preset: Preset, motions: Iterable[Motion]) -> Wardrobe:
-    """Load the body and tailor the T-shirt (about ten seconds); motions are cut to the preset's length.
+def open_wardrobe(
+    preset: Preset, motions: Iterable[Motion], garments: Iterable[str] = (TSHIRT,)
+) -> Wardrobe:
+    """Load the body, tailor these garments and no other; motions are cut to the preset's length.
 
     The liveliest part of each is there too, under a name of its own: see clips.
     """
     from snug.body import Body
-    from snug.garments import tailor_tshirt
+    from snug.garments import find_pattern
 
     from .clips import clip
 
     body = Body.load()
-    garment = tailor_tshirt(body, vertices=preset.garment_vertices)
+    tailored = {name: find_pattern(name).tailor(body, vertices=preset.garment_vertices) for name in garments}
     whole = [motion.cut(0, preset.frames) for motion in motions]
     clips = [clip(body, motion, preset.clip_frames) for motion in whole]
-    return Wardrobe(body, garment, {motion.name: motion for motion in (*whole, *clips)})
+    return Wardrobe(body, tailored, {motion.name: motion for motion in (*whole, *clips)})
 
 
 def embedded_motions(names: Iterable[str]) -> list[Motion]:

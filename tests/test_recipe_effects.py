@@ -47,7 +47,7 @@ def test_a_trial_tells_the_steps():
 def test_the_command_writes_rows_that_the_report_understands(tmp_path, monkeypatch, capsys):
     dressed = tube_dress()
     motions = {name: swaying(12, name=name) for name in TRAIN}
-    wardrobe = Wardrobe(dressed.body, dressed.garment, motions)
+    wardrobe = Wardrobe(dressed.body, {"tshirt": dressed.garment}, motions)
     monkeypatch.setattr("benchmarks.wardrobe.open_wardrobe", lambda *whatever: wardrobe)
     monkeypatch.setattr(recipe_effects, "HELD_OUT", HELD_OUT[:1])
     words = ["--seconds", "0.01", "--recipes", "default*mixed*", "-o", str(tmp_path / "out")]

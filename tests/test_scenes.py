@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from benchmarks.agenda import Agenda
+from benchmarks.methods import find_method
 from benchmarks.plan import choose_suites
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.scenes import SMALL_SCENES, all_scenes, dressed_scene
 from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
+from benchmarks.wardrobe import embedded_motions, open_wardrobe
 
 SMOKE = find_preset("smoke")
+TINY = dataclasses.replace(SMOKE, garment_vertices=300, frames=8)
 
 
 @pytest.mark.parametrize("scene", SMALL_SCENES, ids=lambda scene: scene.name)
@@ -36,8 +41,10 @@ def test_the_terms_are_those_of_the_descriptions():
 
 
 def test_scene_names_are_unique_and_a_dressed_scene_needs_a_wardrobe():
-    scenes = all_scenes(["walk", "run"])
-    assert len(scenes) == len(SMALL_SCENES) + 2 and scenes["dressed/walk"].dressed
+    scenes = all_scenes(["walk", "run"], ["twist_stop"])
+    assert len(scenes) == len(SMALL_SCENES) + 2 * 2 + 2  # each motion whole and as a clip
+    assert scenes["dressed/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
+    assert scenes["dressed/walk"].dressed and not scenes["flag"].dressed
     with pytest.raises(ValueError, match="needs a wardrobe"):
         dressed_scene("walk").build(SMOKE)
 
@@ -97,3 +104,42 @@ def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(t
         assert name not in loaded, f"{name} was loaded"
     text = (out / "results.csv").read_text()
     assert "energy/strain" in text and "energy/collision" not in text and "penetration" not in text
+
+
+def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):
+    """And each scene is built with its own: the tunic is not the T-shirt."""
+    wardrobe = open_wardrobe(TINY, embedded_motions(["twist_stop"]), ["tunic"])
+    assert list(wardrobe.garments) == ["tunic"]
+    built = dressed_scene("twist_stop", "tunic").build(TINY, wardrobe)
+    assert built.dressed.garment.name == "tunic" and built.dressed.garment.parameters["flare"] > 0
+    assert len(built.cloth.rest_positions) == pytest.approx(300, abs=3)
+    with pytest.raises(KeyError):
+        dressed_scene("twist_stop").build(TINY, wardrobe)
+
+
+def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes():
+    plan = plan_of("--scenes", "tunic/*,dressed/kick", "--methods", "simulation,snug,snug-dynamic")
+    by_garment = {garment: plan.train_of(garment) for garment in plan.garments}
+    assert set(by_garment) == {"tshirt", "tunic"} and "twist_1" in by_garment["tunic"]
+    assert not set(by_garment["tunic"]) & {*plan.test_of("tunic"), *by_garment["tshirt"]}
+    assert {(n.name, n.garment) for n in plan.networks} == {
+        (name, garment) for name in ("snug", "snug-dynamic") for garment in by_garment
+    }
+    assert set(plan.simulated) == {"tshirt", "tunic"}  # snug-dynamic learns from simulations
+    assert set(plan.models) == {("snug", 0), ("snug-dynamic", 0)}
+    keys = {Agenda(plan).network(network).key for network in plan.networks}
+    assert len(keys) == 4
+
+
+def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_tunic_without_networks():
+    assert plan_of().garments == ("tshirt",)
+    speed = plan_of("--suite", "speed")
+    tunics = [cell for cell in speed.cells if cell.scene.garment == "tunic"]
+    assert len({cell.method for cell in tunics}) >= 10
+    assert not any(find_method(cell.method).trained for cell in tunics)
+
+
+def plan_of(*words):
+    from benchmarks.run import make_parser, make_plan
+
+    return make_plan(make_parser().parse_args(list(words)), words)

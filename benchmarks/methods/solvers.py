@@ -68,7 +68,7 @@ SOLVERS = (
         "newton", "iteration", "Newton's method on the true Hessian, cut after {} a step",
         "benchmarks.methods.truncated_newton", (1, 2, 4, 8),
     ),
-    *_cut("lbfgs", "iteration", "L-BFGS with a factored preconditioner, cut after {}", _LBFGS, (5, 10, 20, 40)),
+    *_cut("lbfgs", "iteration", "L-BFGS, factored preconditioner, cut after {}", _LBFGS, (5, 10, 20, 40)),
     *_cut(
         "gradient-descent", "iteration", "preconditioned gradient descent, cut after {}", _LBFGS, (10, 40),
         memory=0,
@@ -84,7 +84,7 @@ SOLVERS = (
     *(
         MethodEntry(
             name=f"newton-{solver.lower()}",
-            description=f"{solver} of the package newton on its own energies, {iterations} x {substeps} a frame",
+            description=f"newton's {solver} on its own energies, {iterations} x {substeps} a frame",
             module="benchmarks.methods.peers",
             options={"solver": solver, "iterations": iterations, "substeps": substeps},
             dtype="float32",
@@ -96,5 +96,6 @@ SOLVERS = (
     *_hybrids("skinning", "lbfgs", None),
     *_hybrids("skinning", "newton", None),
     *_hybrids("snug", "lbfgs", "snug"),
+    *_hybrids("snug-dynamic", "lbfgs", "snug-dynamic"),
     *_hybrids("snug", "newton", "snug"),
 )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from ..clips import SUFFIX
 from ..scene import Scene
@@ -36,20 +37,53 @@ SMALL_SCENES = (
     ),
 )
 
-PREFIX = "dressed/"
+
+@dataclass(frozen=True)
+class Wear:
+    """A garment of snug.garments.PATTERNS, and the name that its scenes have before the motion's.
+
+    swings: whether its motions are those that stop within a frame, instead of the run's own.
+    """
+
+    prefix: str
+    garment: str
+    words: str
+    swings: bool = False
 
 
-def dressed_scene(motion: str) -> Scene:
-    """The scene of a body in a T-shirt doing the motion of that name."""
+TSHIRT = "tshirt"
+WORN = (
+    Wear("dressed/", TSHIRT, "a T-shirt"),
+    Wear("tunic/", "tunic", "a flared tunic", swings=True),
+)
+
+
+def worn_in(scene: str) -> Wear:
+    """What a body wears in the scene of that name. Raises KeyError for a scene without one."""
+    return {wear.prefix: wear for wear in WORN}[scene.partition("/")[0] + "/"]
+
+
+def dressed_scene(motion: str, garment: str = TSHIRT) -> Scene:
+    """The scene of a body in that garment doing the motion of that name."""
+    wear = next(wear for wear in WORN if wear.garment == garment)
     return Scene(
-        name=PREFIX + motion,
-        description=f"a body in a T-shirt: {motion}",
+        name=wear.prefix + motion,
+        description=f"a body in {wear.words}: {motion}",
         module="benchmarks.scenes.dressed_body",
-        dressed=True,
+        garment=garment,
     )
 
 
-def all_scenes(motions: Iterable[str]) -> dict[str, Scene]:
-    """Every scene by name: the small ones, then a dressed body for each motion and for its clip."""
-    dressed = [dressed_scene(name) for motion in motions for name in (motion, motion + SUFFIX)]
+def all_scenes(motions: Iterable[str], swings: Iterable[str]) -> dict[str, Scene]:
+    """Every scene by name: the small ones, then dressed bodies in each test motion and in its clip.
+
+    motions: those of the T-shirt; swings: those of garments that swing.
+    """
+    chosen = {False: list(motions), True: list(swings)}
+    dressed = [
+        dressed_scene(name, wear.garment)
+        for wear in WORN
+        for motion in chosen[wear.swings]
+        for name in (motion, motion + SUFFIX)
+    ]
     return {scene.name: scene for scene in (*SMALL_SCENES, *dressed)}

@@ -1,6 +1,6 @@
-"""A body in a T-shirt, doing one motion. The simulator sees the body as a moving mesh and nothing more.
+"""A body in a garment, doing one motion. The simulator sees the body as a moving mesh and nothing more.
 
-Before the motion starts the shirt settles: the body, already facing and standing as in the first frame,
+Before the motion starts the garment settles: the body, already facing and standing as in the first frame,
 moves its limbs from the T-pose into the first pose, then holds still for a while.
 """
 
@@ -14,13 +14,14 @@ from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, S
 from ..presets import Preset
 from ..scene import BuiltScene, Dressed
 from ..wardrobe import Wardrobe
+from . import worn_in
 
 HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
 
 
 def build(name: str, preset: Preset, wardrobe: Wardrobe) -> BuiltScene:
-    """The built scene of "dressed/<motion>"."""
-    body, garment = wardrobe.body, wardrobe.garment
+    """The built scene of "<what is worn>/<motion>"."""
+    body, garment = wardrobe.body, wardrobe.garments[worn_in(name).garment]
     motion = wardrobe.motions[name.split("/", 1)[1]]
     cloth = Cloth(garment.rest_positions, garment.faces, Material())
     energies = declared_energies(cloth)
@@ -60,16 +61,16 @@ def settled(
     poses = np.concatenate([approach, np.repeat(first[None], int(HOLD * frames), axis=0)])
     translations = np.repeat(motion.translations[:1], len(poses), axis=0)
     obstacle = Obstacle(body.vertices(poses, translations), body.faces, rest_positions=body.shaped())
-    # The shirt, still in its rest shape, goes where the root takes a body in T-pose: a rigid motion.
+    # The garment, still in its rest shape, goes where the root takes a body in T-pose: a rigid motion.
     root = body.transforms(t_pose[None], translations[:1])[0, 0]
     start = cloth.rest_positions @ root[:, :3].T + root[:, 3]
     trajectory: Trajectory = simulate(
         cloth, energies, dt=1.0 / motion.fps, frames=len(poses), obstacle=obstacle, start=start
     )
-    # A step that diverges ends a simulation: what it leaves is a shirt half-way, on a body that moved on.
+    # A step that diverges ends a simulation: what it leaves is a garment half-way, on a body that moved on.
     if trajectory.frames < len(poses):
         raise RuntimeError(
-            f"the shirt did not come to rest in the first pose of {motion.name}: {trajectory.reason}; "
+            f"the garment did not come to rest in the first pose of {motion.name}: {trajectory.reason}; "
             "the pose may leave it no room"
         )
     return trajectory.positions[-1]

@@ -20,15 +20,16 @@ import numpy as np
 from ..methods import find_method
 from ..plan import Plan, runs
 from ..results import Row, RunFolder
+from ..scenes import TSHIRT
 from ..study import Tell
 from .hard_motion_cases import AFTER, GLITCH, HARD_MOTIONS, MOTION, ORDINARY_CASE, HardMotion
 from .hard_motion_stage import FREE, REFERENCE, Contestant, HardStage, RollOut, Trained, strains
 
 if TYPE_CHECKING:
-    from ..workers import Tell
     from ..presets import Preset
     from ..scene import BuiltScene
     from ..wardrobe import Wardrobe
+    from ..workers import Tell
 
 LONG = {"smoke": 300, "quick": 10_000, "paper": 10_000}  # frames of the long roll-out
 SAMPLED = 50  # of the long roll-out, one frame in so many is skinned and measured
@@ -71,7 +72,8 @@ def trained(plan: Plan, folder: RunFolder) -> tuple[Trained, ...]:
     found = {}
     for cell in plan.cells:
         entry = find_method(cell.method)
-        if entry.trained in (None, "untrained") or entry.cut_short or not runs(cell):
+        other = cell.scene.garment != TSHIRT
+        if entry.trained in (None, "untrained") or entry.cut_short or other or not runs(cell):
             continue
         path = model_path(folder.models, str(entry.trained), cell.seed)
         if path.is_file():

@@ -8,12 +8,15 @@ from ..methods.learned import LEARNED
 
 METHODS = ("simulation", "skinning", "untrained", "snug", "supervised", "pbns")
 # Only where methods are named, or at a preset that holds all.
-FURTHER = tuple(entry.name for entry in LEARNED)
+FURTHER = (*(entry.name for entry in LEARNED), "snug-dynamic+lbfgs-4", "snug-dynamic+lbfgs-8", "lbfgs-10")
 
 
-def scenes(test_motions: Sequence[str], *, full: bool) -> list[str]:
-    """One dressed body for each test motion, in a full run and in its quick subset alike."""
-    return [f"dressed/{name}" for name in test_motions]
+def scenes(
+    test_motions: Sequence[str], swing_motions: Sequence[str], *, full: bool, further: bool
+) -> list[str]:
+    """A T-shirt in each test motion; a tunic too where scenes are named, or at a preset that holds all."""
+    tunics = [f"tunic/{name}" for name in swing_motions if further]
+    return [f"dressed/{name}" for name in test_motions] + tunics
 
 
 def methods(newton_cuts: Sequence[int]) -> list[str]:

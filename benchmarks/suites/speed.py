@@ -11,32 +11,37 @@ from ..clips import SUFFIX
 
 SMALL = ("hanging_sheet", "sheet_on_sphere", "flag", "twisted_strip", "free_fall")
 LIVELY = ("sudden_stop", "spin_jump")  # of the library's test motions: a run and its stop, a jump with a turn
+SWINGING = ("turning_stop",)  # of those in which a tunic swings
 
-# The reference from coarse to fine in tolerance and in time, and from a start moved by a billionth of a metre.
+# The reference from coarse to fine in tolerance and in time, and from a start moved by 1e-9 m.
 REFERENCES = (
     "simulation", "simulation-1e-2", "simulation-1e-8", "simulation-dt/2", "simulation-dt/4",
     "simulation-dt/8", "simulation-moved",
 )  # fmt: skip
 FEW_REFERENCES = ("simulation", "simulation-1e-2", "simulation-dt/2", "simulation-moved")
-FAMILIES = (("newton-", 1), ("lbfgs-", 5), ("snug+lbfgs-", 1))  # and iterations for each unit of a preset's cuts
+FAMILIES = (("newton-", 1), ("lbfgs-", 5), ("snug+lbfgs-", 1))  # iterations per unit of a preset's cuts
 RIVALS = ("gradient-descent-10", "vbd-20", "xpbd-40", "skinning+lbfgs-4", "snug+newton-2")
 PEERS = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
 LEARNED = ("skinning", "snug", "supervised", "pbns")
 # Only where methods are named, or at a preset that holds all; learned ones as in suite garments.
 FURTHER = (
-    "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4", "gradient-descent-40", "vbd-5", "vbd-80",
+    "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4", "gradient-descent-40", "vbd-5",
+    "vbd-80",
     "xpbd-10", "xpbd-160", "skinning+lbfgs-1", "skinning+lbfgs-2", "skinning+lbfgs-8", "skinning+newton-1",
     "skinning+newton-2", "skinning+newton-4", "skinning+newton-8", "snug+newton-1", "snug+newton-4",
     "snug+newton-8",
 )  # fmt: skip
 
 
-def scenes(test_motions: Sequence[str], *, full: bool) -> list[str]:
+def scenes(
+    test_motions: Sequence[str], swing_motions: Sequence[str], *, full: bool, further: bool
+) -> list[str]:
     """Small scenes and clips of dressed bodies; the quick subset is one of each."""
     lively = [name for name in test_motions if name in LIVELY] or list(test_motions[:2])
     if not full:
         return [SMALL[0], *(f"dressed/{name}{SUFFIX}" for name in lively[:1])]
-    return [*SMALL, *(f"dressed/{name}{SUFFIX}" for name in lively)]
+    tunics = [f"tunic/{name}{SUFFIX}" for name in swing_motions if name in SWINGING]
+    return [*SMALL, *(f"dressed/{name}{SUFFIX}" for name in lively), *tunics]
 
 
 def methods(newton_cuts: Sequence[int]) -> list[str]:
