@@ -49,10 +49,10 @@ def clocked(run: Callable[[], Made], *, of: Callable[[Made], np.ndarray]) -> tup
     touch(of(made))
     _synchronise()
     seconds, used = time.perf_counter() - clock, time.process_time() - used
-    complaint = _still_at_work(of(made), before, children)
-    if not complaint and used > CROWDED * seconds + GRAIN:
-        complaint = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked"
-    return made, Reading(seconds, complaint)
+    if used > CROWDED * seconds + GRAIN:
+        crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked"
+        return made, Reading(seconds, crowd)
+    return made, Reading(seconds, _still_at_work(of(made), before, children))
 
 
 def touch(positions: np.ndarray) -> float:

@@ -207,6 +207,35 @@ def test_a_dry_run_tells_what_is_there(tmp_path):
 # --- a kill ----------------------------------------------------------------------------------------------
 
 
+HANGING = """
+import time
+from benchmarks.guarded import Guarded
+if __name__ == "__main__":
+    with Guarded() as guarded:
+        guarded.call(print, "begun", seconds=60)
+        guarded.call(time.sleep, 60, seconds=60)
+"""
+
+
+def test_a_process_ends_when_its_parent_was_killed(tmp_path):
+    (tmp_path / "hanging.py").write_text(HANGING)
+    parent = subprocess.Popen(
+        [sys.executable, tmp_path / "hanging.py"],
+        env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    assert parent.stdout is not None and parent.stdout.readline() == b"begun\n"
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+    deadline = time.monotonic() + 30
+    while of_session(parent.pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
 def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
     out = tmp_path / "run"
     words = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall", "-o", str(out)]

@@ -27,7 +27,8 @@ FILES = {
         "def make(preset):\n    from reference_sim.terms import Stretch\n    return preset.frames\n"
     ),
     "benchmarks/methods/other.py": "import snug.network\nfrom . import one\n",
-    "benchmarks/scene.py": "def build(sizes: Preset):\n    return sizes.sheet_cells\n",
+    "benchmarks/plan.py": "from .methods import other\n",
+    "benchmarks/scene.py": "from .plan import Cell\ndef build(sizes: Preset):\n    return sizes.sheet_cells\n",
 }
 
 
