@@ -52,6 +52,8 @@ def measure_scene(
     for k, (outcome, trajectory) in enumerate(zip(outcomes, trajectories)):
         fields = {f"energy/{term}": series for term, series in energies[k].items()}
         fields["curvature/mean"] = curvatures[k].means()
+        if hem is not None:
+            fields |= hem.curves(positions[k])
         replace_frame_fields(paths[k], fields, family="energy/")
         metrics = {f"energy/{term}": mean_energy(series) for term, series in energies[k].items()}
         metrics["curvature/mean"] = float(curvatures[k].means().mean())

@@ -169,6 +169,19 @@ def test_the_simulation_has_all_of_its_own_dynamics():
     )
 
 
+def test_curves_show_the_hem_against_the_root():
+    axes, origins, world, quiet = a_scene()
+    motion = HemMotion(
+        axes=axes, origins=origins, stop=60, hem=np.arange(40), simulated=world, quasi_static=quiet, dt=DT
+    )
+    still, moving = motion.curves(quiet), motion.curves(world)
+    assert np.abs(still["hem/yaw"]).max() < 1e-12 and np.abs(still["hem/from_end"]).max() < 1e-12
+    # After the stop it swings to one side and to the other: 0.2 rad at first, then a third of a second later.
+    after = moving["hem/yaw"][60:] - moving["hem/yaw"][-1]
+    assert after[0] == pytest.approx(0.2, abs=0.02) and after.min() < -0.05
+    assert moving["hem/from_end"][-1] == 0
+
+
 def test_half_of_the_dynamics_is_half_the_amplitude():
     found = measured(a_scene(dynamic=0.5)[2])
     assert found["dynamics/amplitude"] == pytest.approx(0.5, abs=0.02)

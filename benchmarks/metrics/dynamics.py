@@ -160,6 +160,14 @@ class HemMotion:
         frames = len(positions)
         return in_root_frame(positions[:, self.hem], self.axes[:frames], self.origins[:frames])
 
+    def curves(self, positions: Array) -> dict[str, Array]:
+        """To be drawn over time: yaw of the hem against the root [rad], its rms distance to its end [m]."""
+        hem = self.of(positions)
+        # In the root's own axes the root does not turn: what is left is the hem's lead and overshoot.
+        own = np.broadcast_to(np.eye(3), (len(hem), 3, 3))
+        away = np.sqrt(((hem - hem[-1]) ** 2).sum(axis=-1).mean(axis=-1))
+        return {"hem/yaw": hem_yaw(hem, own), "hem/from_end": away}
+
     def measure(self, positions: Array, static: Array | None = None) -> dict[str, float]:
         """Every dynamic metric of positions (T,V,3), [1], [frames] or [mm]; what is not defined is left out.
 
