@@ -28,7 +28,10 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str
     unfinished = path.with_name(f".{path.name}.part")
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     try:
+        unfinished.touch()
+        mode = unfinished.stat().st_mode  # what the user's files have; the library would make a private one
         save_file(plain, unfinished, metadata={HEADER: json.dumps(header)})
+        unfinished.chmod(mode)
         with open(unfinished, "rb+") as file:
             os.fsync(file.fileno())
         os.replace(unfinished, path)

@@ -124,6 +124,12 @@ def test_a_kill_while_writing_leaves_the_older_checkpoint(tmp_path, monkeypatch)
     same_model(short(), short(saving=Saving(path=path, resume=True)))
 
 
+def test_files_are_the_users_own(tmp_path):
+    (tmp_path / "plain").touch()
+    path = tensor_file.write_tensors(tmp_path / "a.safetensors", {"a": torch.zeros(2)}, {})
+    assert path.stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
 def test_a_checkpoint_of_another_run_is_refused(tmp_path):
     path = tmp_path / "run.safetensors"
     with pytest.raises(Interrupted):
