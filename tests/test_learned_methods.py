@@ -1,0 +1,71 @@
+"""Further baselines and ablations run when they are named or at a preset that holds them, never unasked."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.learned import LEARNED
+from benchmarks.presets import PRESETS, find_preset
+from benchmarks.run import make_parser, make_plan
+from benchmarks.suites import garments
+from snug.recipe import ABLATIONS, RECIPES, TERMS, TRAININGS
+
+
+def plan(*words):
+    return make_plan(make_parser().parse_args(["--suite", "garments", *words]), words)
+
+
+def methods(*words):
+    return {cell.method for cell in plan(*words).cells}
+
+
+def test_they_run_when_named_and_not_otherwise(tmp_path):
+    further = {entry.name for entry in LEARNED}
+    out = ("-o", str(tmp_path))
+    assert further <= set(garments.FURTHER) and not further & methods(*out)
+    assert further < methods(*out, "--methods", "*")
+    named = methods(*out, "--methods", "snug-no-*")
+    assert named == {
+        "snug-no-bending",
+        "snug-no-strain",
+        "snug-no-gravity",
+        "snug-no-inertia",
+        "snug-no-noise",
+    }
+    assert further < methods(*out, "--preset", "paper")
+
+
+@pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])
+def test_every_trained_method_has_a_training_and_steps_in_each_preset(entry):
+    assert entry.trained in TRAININGS and entry.seeded
+    assert all(preset.steps_of(entry.trained) > 0 for preset in PRESETS)
+
+
+def test_an_ablation_trains_as_long_as_the_whole():
+    quick = find_preset("quick")
+    assert quick.steps_of("snug-no-bending") == quick.steps_of("snug-springs") == quick.steps["snug"]
+    assert quick.steps_of("pbns-springs") == quick.steps["pbns"] and quick.steps_of("untrained") == 0
+
+
+def test_what_is_cleaned_up_is_a_row_of_its_own_over_the_same_network(tmp_path):
+    cleaned = find_method("snug+cleanup")
+    assert cleaned.trained == find_method("snug").trained
+    chosen = plan("-o", str(tmp_path), "--methods", "snug,snug+cleanup", "--seeds", "0,1")
+    assert chosen.models == (("snug", 0), ("snug", 1))
+
+
+def test_each_ablation_differs_from_the_default_in_what_its_name_says():
+    changes = {
+        recipe.name: {
+            name: value for name, value in recipe.as_dict().items()
+            if value != RECIPES["default"].as_dict()[name] and name != "name"
+        }
+        for recipe in ABLATIONS
+    }  # fmt: skip
+    assert changes["no-noise"] == {"h0_sigma": 0.0} and changes["springs"] == {"material": "springs"}
+    for term in ("bending", "strain", "gravity", "inertia"):
+        assert set(TERMS) - set(changes[f"no-{term}"]["terms"]) == {term}
+    for frames in (6, 12):
+        changed = changes[f"window{frames}"]
+        assert changed == {"window": frames, "batch": 48 // frames}
