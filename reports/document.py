@@ -105,7 +105,7 @@ def document(
             "title": "Extremes: where it breaks",
             "blocks": _figures(rest, "extremes", "maps")
             + _figures(rest, "extremes", "outcomes")
-            + _tables(tables, "hard_motions", "extremes", "refusals"),
+            + _tables(tables, "hard_motions", "hard_aftermath", "extremes", "refusals"),
         },
         {"title": "What did not run to its end", "blocks": _trouble(tables, problems)},
     ]

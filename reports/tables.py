@@ -12,7 +12,7 @@ from benchmarks.results import Row
 from reports.findings import findings, recipes
 from reports.garment_tables import cost, curvature, dynamics, energies, energies_by_scene, geometry, shape
 from reports.stability import refusals
-from reports.study_tables import dependence, hard_motions, laws
+from reports.study_tables import dependence, hard_aftermath, hard_motions, laws
 from reports.summary import Measurements, excess_energy, speed_measurements, suite_rows
 from reports.table import Cell, Column, Table
 
@@ -147,6 +147,7 @@ MAKERS = (
     dependence,
     extremes,
     hard_motions,
+    hard_aftermath,
     refusals,
     unfinished,
     metrics,

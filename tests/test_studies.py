@@ -366,4 +366,7 @@ def test_tables_say_how_each_ended(stage):
     assert {line[0] for line in table.rows} == {"walk_x4"}
     words = {line[1]: line[2] for line in table.rows}
     assert words == {"simulation": "converged", "skinning": "bounded", "snug": "bounded"}
+    assert study_tables.hard_aftermath(rows) is None
+    rows = hard_motions.do_case(None, lambda _: None, SMOKE, stage.networks, "root_glitch")
+    assert all(None not in line[2:5] and line[5] is None for line in study_tables.hard_aftermath(rows).rows)
     assert study_tables.hard_motions([]) is study_tables.laws([]) is study_tables.dependence([]) is None

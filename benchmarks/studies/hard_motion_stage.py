@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..wardrobe import Wardrobe
 
 REFERENCE, FREE = "simulation", "skinning"
-MOST_ITERATIONS = 400  # of a step: a clock would make the outcome a matter of the machine
+MOST_ITERATIONS = 1500  # of a step: a clock would make the outcome a matter of the machine
 STATUS = {"converged": "ok", "max_iterations": "stalled"}  # a simulator's words in those of a row
 CHUNK = 500  # frames of a long roll-out whose offsets are held at once
 
