@@ -39,6 +39,7 @@ def findings(rows: Sequence[Row]) -> list[tuple[str, str]]:
         ("Wrinkles", curvature(dressed)),
         *answers(rows),
         ("Validation", checks(rows)),
+        ("Laws", laws(rows)),
         ("Extremes", outcomes(rows)),
         ("Not finished", trouble(rows)),
     ]
@@ -146,6 +147,21 @@ def checks(rows: Sequence[Row]) -> str:
     text += f"; failed: {_listed(dict.fromkeys(bad))}." if bad else "."
     known = len(asked) - len(ran)
     return text + (f" {known} more numbers are reported without a verdict." if known else "")
+
+
+def laws(rows: Sequence[Row]) -> str:
+    """How far each method's roll-outs are from the laws of a time step, the simulation's first."""
+    measured = Measurements([row for row in suite_rows(rows, "validation") if row.metric.startswith("law/")])
+    missing = {m: v for m in measured.methods if (v := measured.value(m, "law/momentum")) is not None}
+    if REFERENCE not in missing or len(missing) == 1:
+        return ""
+    own = number(missing.pop(REFERENCE))
+    text = f"Of the balance of momentum {name(REFERENCE)} misses {own} % of the cloth's weight in a mean frame"
+    order = sorted(missing, key=lambda method: missing[method])
+    text += f", {_listed(f'{name(m)} {number(missing[m])} %' for m in order)}."
+    above = {m: v for m in order if (v := measured.value(m, "law/descent_frames"))}
+    words = [f"{name(m)} in {number(v, 2)} %" for m, v in above.items()]
+    return text + (f" Frames that end above a guess that costs nothing: {_listed(words)}." if words else "")
 
 
 def outcomes(rows: Sequence[Row]) -> str:

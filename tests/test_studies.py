@@ -13,7 +13,7 @@ from benchmarks import workers
 from benchmarks.metrics.laws import UNITS, law_series
 from benchmarks.plan import Plan, PlanError, choose_cells, choose_studies
 from benchmarks.presets import find_preset
-from benchmarks.results import RunFolder
+from benchmarks.results import Row, RunFolder
 from benchmarks.scene import Dressed
 from benchmarks.scenes import free_fall, hanging_sheet, sheet_on_sphere
 from benchmarks.studies import STUDIES, dependence, hard_motion_cases, hard_motion_stage, hard_motions, laws
@@ -21,7 +21,7 @@ from benchmarks.studies.hard_motion_cases import HARD_MOTIONS
 from benchmarks.studies.hard_motion_stage import HardStage, RollOut, Trained
 from benchmarks.wardrobe import open_wardrobe
 from reference_sim import simulate
-from reports import study_tables
+from reports import study_tables, words
 from snug.dresser import DressedBody
 from snug.motion import make_motion
 from snug.rollout import roll_out
@@ -132,6 +132,17 @@ def test_one_moved_vertex_is_seen_by_every_law(dropped):
     assert series.residual[-1] > 1.0 and series.force[-1] > 1e-3 and series.torque[-1] > 1e-5
     assert series.climb[-1] > honest.climb[-1]
     assert np.array_equal(series.residual[:-1], honest.residual[:-1])
+
+
+def test_the_laws_are_put_in_words():
+    def row(method, metric, value):
+        return Row("validation", "dressed/kick", method, 0, metric, "%", value)
+
+    rows = [row("simulation", "law/momentum", 1e-6), row("snug", "law/momentum", 203.0)]
+    rows += [row("snug", "law/descent_frames", 17.0), row("simulation", "law/descent_frames", 0.0)]
+    text = words.laws(rows)
+    assert "203 %" in text and text.endswith("costs nothing: SNUG in 17 %.")
+    assert words.laws(rows[:1]) == words.laws([]) == ""
 
 
 def test_laws_are_refused_where_they_mean_nothing(dropped):
@@ -364,8 +375,8 @@ def test_tables_say_how_each_ended(stage):
     rows = hard_motions.do_case(None, lambda _: None, SMOKE, stage.networks, "walk_x4")
     table = study_tables.hard_motions([*rows, *rows[:1]])
     assert {line[0] for line in table.rows} == {"walk_x4"}
-    words = {line[1]: line[2] for line in table.rows}
-    assert words == {"simulation": "converged", "skinning": "bounded", "snug": "bounded"}
+    ended = {line[1]: line[2] for line in table.rows}
+    assert ended == {"simulation": "converged", "skinning": "bounded", "snug": "bounded"}
     assert study_tables.hard_aftermath(rows) is None
     rows = hard_motions.do_case(None, lambda _: None, SMOKE, stage.networks, "root_glitch")
     assert all(None not in line[2:5] and line[5] is None for line in study_tables.hard_aftermath(rows).rows)
