@@ -156,7 +156,7 @@ def laws(rows: Sequence[Row]) -> str:
     if REFERENCE not in missing or len(missing) == 1:
         return ""
     own = number(missing.pop(REFERENCE))
-    text = f"Of the balance of momentum {name(REFERENCE)} misses {own} % of the cloth's weight in a mean frame"
+    text = f"Of the balance of momentum {name(REFERENCE)} misses {own} % of the weight in a mean frame"
     order = sorted(missing, key=lambda method: missing[method])
     text += f", {_listed(f'{name(m)} {number(missing[m])} %' for m in order)}."
     above = {m: v for m in order if (v := measured.value(m, "law/descent_frames"))}
