@@ -28,7 +28,7 @@ PARTS = {
     "peers": "newton's VBD and XPBD on the same sheet, step and masses (extra `peers`)",
 }
 EXAMPLES = """examples:
-  python -m benchmarks.solver_speed                     everything, medians of 5 (about 20 minutes)
+  python -m benchmarks.solver_speed                     everything, medians of 5 (about half an hour)
   python -m benchmarks.solver_speed --parts sheet,linear --repeats 3
   python -m benchmarks.solver_speed -o reports/runs/solver"""
 
