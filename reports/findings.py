@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from benchmarks.results import Row
-from reports.numbers import CSV_DASH
 from reports.summary import Mean, Measurements, dressed_scenes, suite_rows
 from reports.table import Cell, Column, Table
 from reports.words import TIE
@@ -89,20 +88,20 @@ def findings(rows: Sequence[Row]) -> Table | None:
 
 def _line(claim: Claim, measured: Measurements) -> tuple[Cell, ...]:
     lower, higher = (measured.mean(method, claim.metric) for method in (claim.lower, claim.higher))
-    unit = measured.units.get(claim.metric, CSV_DASH)
+    unit = measured.units.get(claim.metric)
     return claim.words, lower, higher, unit, verdict(lower, higher, claim.allowed)
 
 
 def _steady(measured: Measurements) -> tuple[Cell, ...]:
     first, last = (measured.mean("snug", f"roll_out/{end}") for end in ("first", "last"))
-    unit = measured.units.get("roll_out/last", CSV_DASH)
+    unit = measured.units.get("roll_out/last")
     return "A thousand frames end where they began", last, first, unit, verdict(last, first, STEADY)
 
 
-def verdict(lower: Mean | None, higher: Mean | None, allowed: float | None = None) -> str:
-    """In words, whichever way it comes out."""
+def verdict(lower: Mean | None, higher: Mean | None, allowed: float | None = None) -> str | None:
+    """In words, whichever way it comes out; None where one of the two was not run."""
     if lower is None or higher is None:
-        return CSV_DASH
+        return None
     if allowed is not None:
         within = lower.value <= (1.0 + allowed) * higher.value
         return "reproduced" if within else "not reproduced"
