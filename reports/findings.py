@@ -122,7 +122,10 @@ def recipes(rows: Sequence[Row]) -> Table | None:
         ("train/steps", Column("steps", "Steps")),
     ]
     order = dict.fromkeys(row.method for row in measured.rows)  # default first, as it was run
-    lines = [(name, *(measured.mean(name, metric) for metric, _ in columns)) for name in order]
+    # A training is no scene: each mean is over the scenes that can have its metric.
+    scenes = {m: [r.scene for r in measured.rows if r.metric == m] for m, _ in columns}
+    scenes = {metric: list(dict.fromkeys(found)) for metric, found in scenes.items()}
+    lines = [(name, *(measured.mean(name, m, scenes[m]) for m, _ in columns)) for name in order]
     if not lines:
         return None
     return Table("recipes", (Column("recipe", "Recipe"), *(column for _, column in columns)), tuple(lines))

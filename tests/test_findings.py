@@ -60,6 +60,8 @@ def test_recipes_keep_their_order_and_their_dashes():
         for name, value in (("default", 1.0), ("paper", 9.0), ("default, no zero start", 2.0))
         for seed in (0, 1)
     ]
+    rows.append(row("paper", "train/steps", 7.0, suite="recipes", scene="training", unit="1"))
     table = recipes(rows)
     assert [line[0] for line in table.rows] == ["default", "paper", "default, no zero start"]
     assert table.rows[1][1].value == 9.0 and table.rows[1][1].seeds == 2 and table.rows[1][2] is None
+    assert table.rows[1][-1].value == 7.0 and table.rows[1][1].complete
