@@ -7,7 +7,6 @@ trained networks), or simulates whole motions; it comes after the cells, off eve
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from .plan import Plan
     from .wardrobe import Wardrobe
 
-Tell = Callable[[int], None]  # how a job in a worker reports its progress
 METHOD = "simulation"  # naming methods without it leaves studies out, as checks and cases
 
 

@@ -18,15 +18,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..plan import Plan
 from ..results import Row, RunFolder
-from ..study import Tell
 
 if TYPE_CHECKING:
     from reference_sim import Trajectory
 
-    from ..workers import Tell
     from ..presets import Preset
     from ..scene import BuiltScene
     from ..wardrobe import Wardrobe
+    from ..workers import Tell
 
 MOTION = "walk"  # a training motion: nothing here looks at those that methods are compared on
 CUT = "newton-1"  # the solver that is stopped

@@ -21,7 +21,6 @@ from ..methods import find_method
 from ..plan import Plan, runs
 from ..results import Row, RunFolder
 from ..scenes import TSHIRT
-from ..study import Tell
 from .hard_motion_cases import AFTER, GLITCH, HARD_MOTIONS, MOTION, ORDINARY_CASE, HardMotion
 from .hard_motion_stage import FREE, REFERENCE, Contestant, HardStage, RollOut, Trained, strains
 
