@@ -64,7 +64,8 @@ def test_motions_are_divided_as_help_says(tmp_path):
     from snug.motion import TEST, TRAIN
 
     quick = find_preset("quick")
-    assert choose_motions([], [], quick) == Motions(TRAIN, TEST, {})
+    library = choose_motions([], [], quick)
+    assert (library.train, library.test, library.files) == (TRAIN, TEST, {})
     moved = choose_motions([], ["walk"], quick)
     assert moved.test == ("walk",) and "walk" not in moved.train and set(TEST) <= set(moved.train)
     small = choose_motions([], [], SMOKE)
