@@ -10,6 +10,11 @@ import numpy as np
 LEAST_CURVATURE = 1e-10  # of |s| |y|: pairs of negative curvature would make the estimate indefinite
 
 
+def dot(a: np.ndarray, b: np.ndarray) -> float:
+    """a . b of two (n,). Not by BLAS, whose threads cost more than such a sum, and change its last digit."""
+    return float(np.einsum("i,i", a, b))
+
+
 class Secants:
     """The last `memory` pairs of a step s (3n,) [m] and the change y (3n,) [N] of the gradient along it."""
 
@@ -24,7 +29,7 @@ class Secants:
 
     def add(self, s: np.ndarray, y: np.ndarray) -> None:
         """Remember a pair, if its curvature is positive."""
-        curvature = float(s @ y)
+        curvature = dot(s, y)
         if curvature > LEAST_CURVATURE * float(np.linalg.norm(s) * np.linalg.norm(y)):
             self._pairs.append((s, y, 1.0 / curvature))
 
@@ -36,10 +41,10 @@ class Secants:
         q = -g
         alphas = []
         for s, y, rho in reversed(self._pairs):
-            alpha = rho * float(s @ q)
+            alpha = rho * dot(s, q)
             alphas.append(alpha)
             q = q - alpha * y
         p = solve(q)
         for (s, y, rho), alpha in zip(self._pairs, reversed(alphas)):
-            p += (alpha - rho * float(y @ p)) * s
+            p += (alpha - rho * dot(y, p)) * s
         return p
