@@ -154,7 +154,7 @@ FAULTS = (
         "return (self.masses / self.dt**2)",
         "return (self.masses / self.dt)",
     ),
-    Fault("inertia's energy doubled", INERTIA, "return 0.5 * float(np.vdot", "return 1.0 * float(np.vdot"),
+    Fault("inertia's energy doubled", INERTIA, "0.5 * float(np.einsum", "1.0 * float(np.einsum"),
     Fault(
         "velocity forgets dt",
         INERTIA,

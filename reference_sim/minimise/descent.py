@@ -10,7 +10,7 @@ import numpy as np
 from ..material import GRAVITY
 from ..potential import Potential
 from .result import Result
-from .secants import Secants
+from .secants import Secants, dot
 
 SUFFICIENT_DECREASE = 1e-4
 HALVINGS = 24  # of a step before its direction is given up
@@ -68,8 +68,8 @@ class Descent:
             trial = self.x + alpha * step
             value, gradient = self.evaluate(trial)
             if np.isfinite(value) and np.isfinite(gradient).all():
-                gain = alpha * slope
-                if fallen(self.value, value, gain) or level(self.value, value, gain, alpha * (gradient @ p)):
+                gain, end = alpha * slope, alpha * dot(gradient, p)
+                if fallen(self.value, value, gain) or level(self.value, value, gain, end):
                     self.x, self.value, self.g = trial, value, gradient
                     return alpha
             alpha *= 0.5
@@ -79,7 +79,7 @@ class Descent:
         """One quasi-Newton step, remembered; a direction that fails is tried again without memories."""
         while True:
             p, g = secants.direction(self.g, solve), self.g
-            slope = float(g @ p)
+            slope = dot(g, p)
             if np.isfinite(slope) and slope < 0 and (alpha := self.line_search(p, slope)):
                 secants.add(alpha * p, self.g - g)
                 return True
