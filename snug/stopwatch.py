@@ -10,22 +10,23 @@ import torch
 
 PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "optimiser", "renewal")
 
+WATCHED = 10
+
 
 class Stopwatch:
-    """Sums up wall time by part. On a GPU it waits for the work of each part to end: `live` says whether.
-
-    Waiting costs a GPU a few per cent, so there a caller may watch only some of the steps.
+    """Sums up wall time by part. On a GPU it must wait for the work of each part to end, so there it watches
+    one step in WATCHED.
     """
 
     def __init__(self, device: torch.device) -> None:
         self._waits = device.type == "cuda"
-        self.device, self.live, self.steps = device, True, 0
+        self.device, self._live, self.steps = device, True, 0
         self._seconds = dict.fromkeys(PARTS, 0.0)
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
         """Everything inside counts for the part of that name (one of PARTS)."""
-        if not self.live:
+        if not self._live:
             yield
             return
         start = self._now()
@@ -37,8 +38,10 @@ class Stopwatch:
             torch.cuda.synchronize(self.device)
         return time.perf_counter()
 
-    def step_done(self) -> None:
-        self.steps += self.live
+    def step_begins(self, number: int) -> None:
+        """Said before the parts of each step."""
+        self._live = not self._waits or number % WATCHED == 0
+        self.steps += self._live
 
     def taken(self) -> dict[str, float]:
         """Mean seconds a step of each part that took any, since the last call; starts anew."""

@@ -119,6 +119,7 @@ class Trainer:
 
     def step(self, number: int) -> dict[str, float]:
         """One update; mean joules a frame by term (cm^2 or cm for what simulated vertices teach)."""
+        self.clock.step_begins(number)
         with self.clock.part("draw"):
             self._set_rate(number)
             windows = self.draw()
@@ -136,7 +137,6 @@ class Trainer:
             means, _ = self._update(number, windows, terms)
         else:
             means = self._physics_step(number, windows, batch, state)
-        self.clock.step_done()
         return {"loss": sum(means.values()), **means}
 
     def _physics_step(self, number: int, windows: np.ndarray, batch: Batch, state: Any) -> dict[str, float]:
