@@ -23,7 +23,8 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = ("reference_sim", "snug", "benchmarks")
 # Lists of names and sizes, what they name is an input by itself; and the words of result files.
 LISTS = (
-    "benchmarks/__init__.py", "benchmarks/methods/__init__.py", "benchmarks/scenes/__init__.py",
+    "benchmarks/__init__.py", "benchmarks/methods/__init__.py", "benchmarks/methods/solvers.py",
+    "benchmarks/methods/learned.py", "benchmarks/scenes/__init__.py",
     "benchmarks/suites/__init__.py", "benchmarks/presets.py", "benchmarks/plan.py", "benchmarks/results.py",
     "snug/recipe.py",
 )  # fmt: skip

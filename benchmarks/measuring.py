@@ -1,19 +1,51 @@
-"""Metrics of the cells of one scene, in a worker: nothing is timed here, so two scenes go side by side."""
+"""Metrics of all cells, a scene in a worker: nothing is timed here, so two scenes go side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from .agenda import REFERENCE
+from .agenda import REFERENCE, Agenda
 from .cell import Outcome, Task, built
 from .methods import find_method
 from .plan import Cell, Plan
 from .presets import Preset
 from .records import Records, Work
-from .results import RunFolder
+from .results import Row, RunFolder
+from .rows import clock_costs, rows_of
 from .wardrobe import Wardrobe
-from .workers import Job, Tell
+from .workers import Failure, Job, Tell, run_jobs
+
+
+def rows_of_cells(
+    outcomes: Sequence[Outcome],
+    plan: Plan,
+    records: Records,
+    wardrobe: Wardrobe | None,
+    costs: Callable[[Cell], Mapping[str, float]],
+) -> list[Row]:
+    """The rows of all cells; metrics of those that have none yet are computed, scene by scene.
+
+    costs: cell -> metrics that are no measurement of its trajectory.
+    """
+    agenda = Agenda(plan)
+    recorded = [outcome for outcome in outcomes if outcome.recorded]
+    works = {outcome.cell: agenda.metrics(outcome.cell) for outcome in recorded}
+    jobs = jobs_of_scenes(recorded, works, plan, records)
+    ended = run_jobs(jobs, wardrobe, title="metrics", unit="cell", workers=plan.workers)
+    reasons = {job.label: end.reason for job, end in zip(jobs, ended) if isinstance(end, Failure)}
+    rows = []
+    for outcome in outcomes:
+        found = records.find(works[outcome.cell]) if outcome.recorded else None
+        metrics: dict[str, float] = {}
+        if found is not None and found.state == "finished" and found.result is not None:
+            metrics = {**found.result, **clock_costs(outcome), **costs(outcome.cell)}
+        elif found is not None:
+            reason = f"metrics: {reasons.get(outcome.cell.scene.name, 'the worker ended')}"
+            outcome = dataclasses.replace(outcome, status="failed", reason=reason)
+        rows += rows_of(outcome, metrics)
+    return rows
 
 
 def jobs_of_scenes(

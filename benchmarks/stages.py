@@ -19,10 +19,12 @@ from .agenda import Agenda
 from .cell import Outcome
 from .cells import LEFT_OUT, Cells
 from .curves import REMARK, remarked
+from .measuring import rows_of_cells
 from .plan import Cell, Network, Plan, network_of, runs
 from .record import Record, now
 from .records import Work
 from .results import Row
+from .rows import model_costs
 from .scenes import TSHIRT, dressed_scene, worn_in
 from .workers import Failure, Job, run_jobs
 
@@ -240,7 +242,8 @@ class Stages:
         self.record.reused += self.cells.reused
         self.record.note("outdated", self.cells.outdated)
         with self.record.stage("metrics"):
-            self.record.rows += self.measured(outcomes)
+            rows = rows_of_cells(outcomes, self.plan, self.records, self.wardrobe, self.costs)
+            self.record.rows += remarked(rows)
             self.record.write_rows()
         return outcomes
 
@@ -255,30 +258,11 @@ class Stages:
             return f"its network could not be trained: {reason}"
         return None
 
-    def measured(self, outcomes: list[Outcome]) -> list[Row]:
-        """The rows of all cells; metrics of those that have none yet are computed, scene by scene."""
-        from .measuring import jobs_of_scenes
-        from .rows import clock_costs, model_costs, rows_of
-
-        recorded = [outcome for outcome in outcomes if outcome.recorded]
-        works = {outcome.cell: self.agenda.metrics(outcome.cell) for outcome in recorded}
-        jobs = jobs_of_scenes(recorded, works, self.plan, self.records)
-        ended = run_jobs(jobs, self.wardrobe, title="metrics", unit="cell", workers=self.plan.workers)
-        reasons = {job.label: end.reason for job, end in zip(jobs, ended) if isinstance(end, Failure)}
-        rows = []
-        for outcome in outcomes:
-            found = self.records.find(works[outcome.cell]) if outcome.recorded else None
-            metrics: dict[str, float] = {}
-            if found is not None and found.state == "finished" and found.result is not None:
-                network = network_of(outcome.cell)
-                data = self.data_seconds.get(outcome.cell.scene.garment, 0.0)
-                costs = model_costs(self.trained[network] if network else None, data)
-                metrics = found.result | clock_costs(outcome) | costs
-            elif found is not None:
-                reason = f"metrics: {reasons.get(outcome.cell.scene.name, 'the worker ended')}"
-                outcome = dataclasses.replace(outcome, status="failed", reason=reason)
-            rows += rows_of(outcome, metrics)
-        return remarked(rows)
+    def costs(self, cell: Cell) -> dict[str, float]:
+        """What the cell's network has cost, where it has one."""
+        network = network_of(cell)
+        data = self.data_seconds.get(cell.scene.garment or "", 0.0)
+        return model_costs(self.trained.get(network) if network else None, data)
 
     def remarks(self) -> list[str]:
         """What whoever reads the times should know, in a line each."""
