@@ -46,7 +46,7 @@ class Recipe:
         stiffness and margin of contact).
     detached: previous frames are given to inertia, not moved by it: without it a network makes its past agree
         with a still present instead of learning to move.
-    swing, swing_components: see snug.swing; 0 where no simulation teaches.
+    swing, swing_components, rehearsal: see snug.swing; of no account where no simulation teaches.
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
     """
@@ -77,6 +77,7 @@ class Recipe:
     detached: bool = False
     swing: float = 0.0
     swing_components: int = 128
+    rehearsal: int = 300
     spike: float = 2.0
     gradient_limit: float = 1.0
 
@@ -102,8 +103,8 @@ class Recipe:
             raise RecipeError(
                 f"recipe option swing_components={self.swing_components}: a hidden unit for each, 1 to 256"
             )
-        sizes = ("swing", "mixed", "mixed_turn", "smoothing", "h0_sigma", "shape_range", "contact_refresh")
-        for option in sizes:
+        sizes = ("mixed", "mixed_turn", "smoothing", "h0_sigma", "shape_range", "contact_refresh")
+        for option in ("swing", "rehearsal", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         for option in ("learning_rate", "output_scale", "drop_factor", "gradient_limit", "spike"):

@@ -7,8 +7,9 @@ stretched cloth. So the simulated offsets (unposed, see DressedBody) are split b
 
     offsets(t) = mean + sum_i c_i(t) b_i,     b_i orthonormal, the widest first
 
-The few widest are the swing. The last layer starts with them, one hidden unit for each, and the loss holds
-their coordinates to the simulation's as inertia would hold a whole garment,
+The few widest are the swing. The last layer starts with them, one hidden unit for each, and before any energy
+is asked for the recurrent units rehearse the coordinates on whole motions: that needs no garment, so a step
+costs little. Then the loss holds the coordinates to the simulation's as inertia would hold a whole garment,
 
     swing(t) = s m / (2 dt^2) sum_{i <= K} (<offsets(t) - mean, b_i> - c_i(t))^2      [J]
 
@@ -19,17 +20,21 @@ inertia then takes the network's own previous frames as given (the recipe's `det
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.utils.rnn import pad_sequence
 
 from snug.baselines.supervised import TargetError, matched_targets
 from snug.recipe import Recipe
 from snug.regressor import Regressor
 from snug.training_set import Batch, TrainingSet
 
+REHEARSAL_RATE = 2e-3  # of Adam
+TOGETHER = 6  # motions of a rehearsal's step
 REACH = 3.0  # standard deviations of a component at which its hidden unit is at its end
 BLIND = 12  # frames after a start within a motion in which the state cannot know the swing
 
@@ -64,11 +69,41 @@ class SwingTeacher:
         self.directions = directions[: recipe.swing_components]  # (K, 3V)
         self.spread = widths[: recipe.swing_components] / len(flat) ** 0.5  # (K,) [m]
         self.coordinates = (flat - self.mean) @ self.directions.T  # (F, K) [m]
+        self.features = data.features
+        self.bounds = [(int(a), int(b)) for a, b in pairwise(data.first)]
         self.first = torch.as_tensor(data.first[:-1], device=data.device)
         self.stiffness = recipe.swing * float(dressed.cloth.masses.mean()) / data.dt**2
 
-    def start(self, network: Regressor) -> None:
-        """Give the last layer the mean and the components, and nothing else."""
+    def start(self, network: Regressor, *, steps: int, sigma: float, seed: int) -> None:
+        """Give the last layer the mean and the components, and let the recurrent units rehearse.
+
+        steps: updates of the rehearsal; sigma: of the noise that states start from.
+        """
+        self._begin_with_components(network)
+        optimiser = torch.optim.Adam(network.gru.parameters(), lr=REHEARSAL_RATE)
+        random, noise = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
+        reach = REACH * self.spread
+        # A component that hardly moves is not worth a hidden unit's whole range.
+        weights = (self.spread / self.spread[0]).clamp(min=0.02)
+        for step in range(steps):
+            for group in optimiser.param_groups:
+                group["lr"] = REHEARSAL_RATE * (0.2 if step >= 0.7 * steps else 1.0)
+            chosen = random.choice(len(self.bounds), min(TOGETHER, len(self.bounds)), replace=False)
+            parts = [slice(*self.bounds[number]) for number in chosen]
+            features = pad_sequence([self.features[part] for part in parts], batch_first=True)
+            wanted = pad_sequence([self.coordinates[part] / reach for part in parts], batch_first=True)
+            there = pad_sequence(
+                [torch.ones_like(self.features[part, 0]) for part in parts], batch_first=True
+            )
+            state = network.random_state(len(parts), sigma, noise)
+            hidden, _ = network.gru((features - network.input_mean) / network.input_std, state)
+            apart = ((hidden[..., : len(reach)] - wanted) * weights).square().sum(-1) * there
+            optimiser.zero_grad(set_to_none=True)
+            (apart.sum() / there.sum()).backward()
+            torch.nn.utils.clip_grad_norm_(network.gru.parameters(), 1.0)
+            optimiser.step()
+
+    def _begin_with_components(self, network: Regressor) -> None:
         count = len(self.directions)
         with torch.no_grad():
             network.offsets.weight.zero_()

@@ -92,7 +92,7 @@ class Trainer:
         self.teacher: SwingTeacher | None = None
         if how.teacher:
             self.teacher = how.teacher(self.data, motions, trajectories, self.weights, recipe)
-            self.teacher.start(self.network)
+            self.teacher.start(self.network, steps=recipe.rehearsal, sigma=recipe.h0_sigma, seed=seed)
         self.guard = Guard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
 

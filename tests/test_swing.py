@@ -21,7 +21,7 @@ from snug.trained_model import TrainedModel, make_network
 from snug.training_set import TrainingSet
 from tests.dressing import swaying, tube_dress
 
-SMALL = replace(DYNAMIC, window=BLIND + 8, batch=2, swing_components=6)
+SMALL = replace(DYNAMIC, window=BLIND + 8, batch=2, swing_components=6, rehearsal=0)
 
 
 def swung(motion, seed=0):
@@ -87,7 +87,9 @@ def test_a_window_in_the_midst_of_a_motion_is_not_asked_what_it_cannot_know(less
 def test_the_network_starts_at_the_mean_and_one_unit_moves_one_component(lesson):
     data, teacher, _ = lesson
     network = make_network("dynamic", data.features.shape[1], tube_dress().vertices, SMALL, seed=0)
-    teacher.start(network)
+    before = network.gru.weight_hh_l0.clone()
+    teacher.start(network, steps=0, sigma=0.0, seed=0)
+    assert torch.equal(network.gru.weight_hh_l0, before)
     with torch.no_grad():
         hidden = torch.zeros(network.gru.hidden_size)
         rest = network.offsets(hidden) * network.output_scale
@@ -95,6 +97,19 @@ def test_the_network_starts_at_the_mean_and_one_unit_moves_one_component(lesson)
         hidden[1] = 1.0
         moved = network.offsets(hidden) * network.output_scale - teacher.mean
     torch.testing.assert_close(moved, REACH * teacher.spread[1] * teacher.directions[1], atol=1e-6, rtol=1e-4)
+
+
+def test_a_rehearsal_brings_the_recurrent_units_to_the_coordinates(lesson):
+    data, teacher, offsets = lesson
+    found = []
+    for steps in (0, 40, 40):
+        network = make_network("dynamic", data.features.shape[1], tube_dress().vertices, SMALL, seed=0)
+        network.normalise_by(*data.input_statistics())
+        teacher.start(network, steps=steps, sigma=0.1, seed=3)
+        with torch.no_grad():
+            answer, _ = network(data.features[None, : data.first[1]])
+        found.append(float((answer[0] - offsets[: data.first[1]]).square().mean()))
+    assert found[1] < 0.5 * found[0] and found[2] == found[1]  # and the same again
 
 
 def test_too_few_frames_for_the_components_are_refused():
@@ -155,10 +170,10 @@ def test_training_learns_the_swing_and_the_file_brings_it_back(tmp_path):
     rows = []
     assert TRAININGS["snug-dynamic"].simulated
     model = train(
-        "dynamic", tube_dress(), motions, steps=40, seed=1, recipe=SMALL, trajectories=trajectories,
-        log=rows.append, progress=False, every=10,
+        "dynamic", tube_dress(), motions, steps=16, seed=1, recipe=replace(SMALL, rehearsal=30),
+        trajectories=trajectories, log=rows.append, progress=False, every=4,
     )  # fmt: skip
-    assert rows[-1]["swing"] < 0.5 * rows[0]["swing"]
+    assert rows[-1]["swing"] < rows[0]["swing"] and rows[-1]["loss"] < rows[0]["loss"]
     again = TrainedModel.load(model.save(tmp_path / "dynamic.safetensors"))
     one, two = (roll_out(m, tube_dress(), motions[0]).positions for m in (model, again))
     np.testing.assert_array_equal(one, two)
