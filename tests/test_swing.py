@@ -167,7 +167,7 @@ def test_detached_inertia_moves_the_last_frame_alone():
 def test_training_learns_the_swing_and_the_file_brings_it_back(tmp_path):
     motions = [swaying(30), swaying(26, name="other", degrees=15.0)]
     trajectories = {motion.name: swung(motion)[0] for motion in motions}
-    rows = []
+    rows: list[dict[str, float]] = []
     assert TRAININGS["snug-dynamic"].simulated
     model = train(
         "dynamic", tube_dress(), motions, steps=16, seed=1, recipe=replace(SMALL, rehearsal=30),

@@ -1,10 +1,11 @@
-"""Methods that run when they are named: further baselines, ablations of SNUG, clean-up, the free bound."""
+"""Methods that run when named: further baselines, ablations of SNUG, its swing, clean-up, the free bound."""
 
 from __future__ import annotations
 
 from snug.recipe import ABLATIONS
 
 from ..method import MethodEntry
+from .solvers import hybrids
 
 
 def _network(name: str, description: str) -> MethodEntry:
@@ -41,6 +42,7 @@ LEARNED = (
     _network("snug-dynamic", "SNUG that learns its swing from a simulation, the rest from the energies"),
     _network("snug-paper", "SNUG by the paper's text to the letter"),
     *(_network(f"snug-{recipe.name}", f"ablation: SNUG, recipe {recipe.name}") for recipe in ABLATIONS),
+    *hybrids("snug-dynamic", "lbfgs", "snug-dynamic"),
     _cleaned("snug"),
     _cleaned("pbns"),
     MethodEntry(

@@ -23,7 +23,7 @@ def _cut(name: str, unit: str, description: str, module: str, cuts: tuple[int, .
     )
 
 
-def _hybrids(guess: str, solver: str, trained: str | None) -> tuple[MethodEntry, ...]:
+def hybrids(guess: str, solver: str, trained: str | None) -> tuple[MethodEntry, ...]:
     """A network or skinning, and some iterations from there."""
     return tuple(
         MethodEntry(
@@ -93,9 +93,8 @@ SOLVERS = (
         )
         for solver, iterations, substeps in (("VBD", 10, 20), ("XPBD", 1, 128))
     ),
-    *_hybrids("skinning", "lbfgs", None),
-    *_hybrids("skinning", "newton", None),
-    *_hybrids("snug", "lbfgs", "snug"),
-    *_hybrids("snug-dynamic", "lbfgs", "snug-dynamic"),
-    *_hybrids("snug", "newton", "snug"),
+    *hybrids("skinning", "lbfgs", None),
+    *hybrids("skinning", "newton", None),
+    *hybrids("snug", "lbfgs", "snug"),
+    *hybrids("snug", "newton", "snug"),
 )  # fmt: skip

@@ -8,7 +8,7 @@ from ..methods.learned import LEARNED
 
 METHODS = ("simulation", "skinning", "untrained", "snug", "supervised", "pbns")
 # Only where methods are named, or at a preset that holds all.
-FURTHER = (*(entry.name for entry in LEARNED), "snug-dynamic+lbfgs-4", "snug-dynamic+lbfgs-8", "lbfgs-10")
+FURTHER = (*(entry.name for entry in LEARNED), "lbfgs-5", "lbfgs-10")
 
 
 def scenes(
