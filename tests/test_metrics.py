@@ -217,6 +217,9 @@ def test_the_gap_is_taken_to_the_lowest_minimum_found():
     assert found["gap/local"] == pytest.approx((here - high) / (free - low), rel=1e-6)
     assert found["gap/energy"] == pytest.approx(here - low, rel=1e-6)
     assert found["gap/found_by_simulator"] + found["gap/found_by_newton"] == 1
+    still = np.concatenate([frames, [guess]])  # one more frame: the energy is a mean, the gap a ratio of sums
+    twice = optimality(scene, still, samples=2).metrics()
+    assert 0 < twice["gap/energy"] < found["gap/energy"]
     # The denominator of a dressed frame is the skinned garment's energy: half of it, twice the gap.
     other = frames.copy()
     other[2] = guess

@@ -7,11 +7,13 @@ import pytest
 
 from benchmarks.methods.hybrids import FromElsewhere
 from benchmarks.metrics.optimality import first_guess
-from benchmarks.minimisers.block_descent import VertexBlockDescent, block
-from benchmarks.minimisers.elements import contacts, depth, fold, hinges, membrane, strain, terms_of, weights
+from benchmarks.minimisers.block_descent import VertexBlockDescent
+from benchmarks.minimisers.elements import contacts, hinges, membrane, terms_of, weights
+from benchmarks.minimisers.kernels import block, depth, fold, strain
 from benchmarks.minimisers.xpbd import XPBD
 from benchmarks.presets import find_preset
 from benchmarks.scenes import hanging_sheet, sheet_on_sphere
+from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
@@ -137,6 +139,14 @@ def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_else
     found = [XPBD(potential, max_iterations=n).minimise(guess).energy for n in (10, 100, 3000)]
     gaps = [(energy - best) / to_gain for energy in found]
     assert gaps[0] > gaps[1] > gaps[2] and 1e-6 < gaps[2] < 0.2
+
+
+@pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
+def test_weight_alone_is_one_sweep_to_the_exact_fall(method):
+    positions, faces = square_sheet(3, 0.2)
+    cloth = Cloth(positions, faces, Material())
+    run = simulate(cloth, [Gravity(cloth)], dt=DT, frames=6, method=method, max_iterations=1)
+    assert run.positions == pytest.approx(exact_fall(positions, np.zeros(3), DT, 6), abs=1e-12)
 
 
 @pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
