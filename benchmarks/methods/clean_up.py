@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +62,14 @@ class CleanedNetwork:
             provenance={"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN},
             frame_fields={},
         )
+
+    def held(self) -> Trajectory:
+        """What the network holds to be static, cleaned up as well. Never on the clock."""
+        from snug.rollout import roll_out
+
+        still = roll_out(self.model, self.dressed, self.motion, held_pose=True)
+        cleaned = [self.clean(x, frame) for frame, x in enumerate(still.positions)]
+        return replace(still, positions=np.stack(cleaned))
 
 
 def make(*, models: Path, seed: int, device: str, kind: str) -> CleanedNetwork:
