@@ -26,7 +26,7 @@ TINY = dataclasses.replace(find_preset("smoke"), frames=16, settle_frames=4, she
 TRAIN, TEST = "arm_raise", "kick"
 KINDS = ("untrained", "snug", "supervised", "pbns")
 # Further learned methods have tests of their own. On a body the coarsest speaks for each family of solvers.
-SMALL_METHODS = [entry for entry in METHODS if entry not in LEARNED]
+SMALL_METHODS = [e for e in METHODS if e not in LEARNED and (e.trained is None or e.trained in KINDS)]
 FINER = {name for family in CURVES.values() for name in family[1:]} - {"simulation"}
 FINER |= {"simulation-dt/4", "simulation-dt/8"}
 DRESSED_METHODS = [entry for entry in SMALL_METHODS if entry.name not in FINER]
