@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.methods.hybrids import FromElsewhere
+from benchmarks.methods.hybrids import FromElsewhere, Hybrid
 from benchmarks.metrics.optimality import first_guess
 from benchmarks.minimisers.block_descent import VertexBlockDescent
 from benchmarks.minimisers.elements import contacts, hinges, membrane, terms_of, weights
@@ -196,3 +196,19 @@ def test_a_hybrid_starts_each_step_from_the_next_frame_with_the_pins_of_the_step
         free = potential.cloth.free
         assert np.array_equal(seen[-1][free], start[free]) and np.array_equal(seen[-1][pins], guess[pins])
         assert np.array_equal(result.positions[pins], guess[pins])
+
+
+def test_a_hybrid_has_its_first_guesses_ready_before_the_clock_starts(monkeypatch, tmp_path):
+    scene = hanging_sheet.build("hanging_sheet", find_preset("smoke"))
+    made = []
+
+    def frames():
+        made.append("on the clock" if hybrid.prepared else "before")
+        return (scene.start.copy() for _ in range(scene.frames))
+
+    hybrid = Hybrid("skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1, "finish": False})
+    hybrid.prepared = False
+    monkeypatch.setattr(hybrid, "_frames", lambda scene: frames)
+    hybrid.prepare(scene)
+    hybrid.prepared = True
+    assert hybrid.run().frames == scene.frames and set(made) == {"before"}

