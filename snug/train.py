@@ -50,7 +50,8 @@ def train(
     log: called with each row of the history, every `every` steps. progress: a bar on standard error.
     device: `cpu` or `cuda`, for the whole step. kernels: closed forms in numba (the default on a CPU) or the
     definitions of the energies in torch (everywhere else).
-    saving: checkpoints; a run resumed from one ends, on a CPU, with the bits of an unbroken run.
+    saving: checkpoints; a run resumed from one ends, on a CPU, with the bits of an unbroken run. The last one
+    is there until the caller, who has the model by then, says saving.done().
     validation: held-out motions; the weights that do best on them are kept.
     group: processes of torchrun that share the batch. stop: asked after each step; True writes a checkpoint
     and raises snug.training_run.Interrupted.
@@ -218,6 +219,7 @@ def _train_one(
     if group.writes:
         _tell(model)
         print(model.save(out))
+        saving.done()
 
 
 def _tell(model: TrainedModel) -> None:

@@ -26,14 +26,19 @@ Log = Callable[[dict[str, float]], None]
 class Saving:
     """Where checkpoints go and how often: after `steps` steps or `minutes` minutes, 0 for never.
 
-    resume: go on from the file, when there is one. A finished run deletes it. When a checkpoint is written
-    changes no number, so minutes of a clock do no harm.
+    resume: go on from the file, when there is one. Whoever has written the finished model down calls `done`:
+    until then the checkpoint is all there is. When a checkpoint is written changes no number, so minutes of a
+    clock do no harm.
     """
 
     path: Path
     steps: int = 0
     minutes: float = 5.0
     resume: bool = False
+
+    def done(self) -> None:
+        """Delete the checkpoint, if there is one."""
+        self.path.unlink(missing_ok=True)
 
 
 class Interrupted(Exception):
@@ -91,10 +96,7 @@ class TrainingRun:
                 self.done += 1
                 bar.update()
                 self._between_steps(bar)
-        model = self._finished()
-        if self.saving and trainer.group.writes:
-            self.saving.path.unlink(missing_ok=True)
-        return model
+        return self._finished()
 
     def _between_steps(self, bar: Any) -> None:
         if self.validator and (self.done % self.validated_every == 0 or self.done == self.trainer.steps):

@@ -16,6 +16,7 @@ from snug import tensor_file
 from snug.recipe import DEFAULT, PAPER
 from snug.tensor_file import TensorFileError, read_tensors
 from snug.train import train
+from snug.trained_model import TrainedModel
 from snug.training_run import Interrupted, Saving
 from snug.validation import Validation
 
@@ -56,9 +57,12 @@ def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path):
         saving = Saving(path=path, resume=number > 0)
         with pytest.raises(Interrupted, match=f"after step {(3, 16)[number]} of 24"):
             short(kind, recipe=recipe, saving=saving, stop=asked_after(steps))
-    resumed = short(kind, recipe=recipe, saving=Saving(path=path, resume=True))
+    saving = Saving(path=path, resume=True)
+    resumed = short(kind, recipe=recipe, saving=saving)
     same_model(whole, resumed)
-    assert resumed.history[-1]["step"] == 24 and not list(tmp_path.iterdir())
+    assert resumed.history[-1]["step"] == 24 and list(tmp_path.iterdir()) == [path]
+    saving.done()
+    assert not list(tmp_path.iterdir())
 
 
 def test_validation_resumes_bit_for_bit(tmp_path):
@@ -148,6 +152,10 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path):
     same_model(short(), short(saving=again))  # killed before its first checkpoint: from the beginning
 
 
+def no_space(*_):
+    raise OSError("no space left")
+
+
 def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     from snug import train as module
 
@@ -160,6 +168,11 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     assert "step 1 of 8" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["small.checkpoint.safetensors"]
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: False)
+    with monkeypatch.context() as full, pytest.raises(OSError, match="no space"):
+        full.setattr(TrainedModel, "save", no_space)
+        module.main(words)
+    capsys.readouterr()
+    assert [path.name for path in tmp_path.iterdir()] == ["small.checkpoint.safetensors"]
     assert module.main(words) == 0
     shown = capsys.readouterr().out
     assert "8 steps" in shown and "validation" in shown and "ms a step" in shown
