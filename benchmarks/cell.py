@@ -125,7 +125,7 @@ def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder, 
         dataclasses.replace(trajectory, provenance=trajectory.provenance | provenance).save(path)
         held = getattr(method, "held", None)
         if held is not None:
-            held().save(run.trajectory_path(cell.scene.name, f"{cell.method}-held", cell.seed))
+            held().save(run.held_path(cell.scene.name, cell.method, cell.seed))
     except Exception as error:
         return failed(cell, error)
     frames = frames_computed(trajectory)

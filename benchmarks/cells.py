@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .agenda import Agenda
+from .agenda import REFERENCE, Agenda, flat, name_of
 from .cell import Outcome, Task, failed, perform, perform_again
 from .guarded import Broken, Guarded
 from .methods import find_method
@@ -41,6 +41,8 @@ class Cells:
             return Outcome(cell, "skipped", reason)
         work = self.agenda.cell(cell)
         found = self.records.find(work)
+        if found.wanted:
+            self._clear(cell)
         if found.wanted and obstacle:
             return Outcome(cell, "failed", obstacle)
         if found.wanted:
@@ -126,6 +128,20 @@ class Cells:
             return Outcome(cell, broken.status, str(broken))
         except Exception as error:
             return failed(cell, error)
+
+    def _clear(self, cell: Cell) -> None:
+        """Remove what an earlier run of the cell has left: no one is to take it for this one's.
+
+        Keys tell inputs and code apart, not how a cell ended: what the scene's other cells were compared with
+        may have failed then and be there now.
+        """
+        folder, place = self.records.folder, (cell.scene.name, cell.method, cell.seed)
+        folder.trajectory_path(*place).unlink(missing_ok=True)
+        folder.held_path(*place).unlink(missing_ok=True)
+        for number in range(1, self.plan.preset.repeats):
+            self.records.forget("repeat", f"{name_of(cell)}-{number}")
+        compared = cell.method.startswith(REFERENCE)
+        self.records.forget("metrics", f"{flat(cell.scene.name)}/**/*" if compared else name_of(cell))
 
     def _keep(self, work: Work, outcome: Outcome) -> None:
         folder, cell = self.records.folder, outcome.cell

@@ -67,7 +67,7 @@ def measure_scene(
         if scene.exact is not None:
             exact = scene.exact[: trajectory.frames]
             metrics["exact/distance"] = float(np.linalg.norm(positions[k] - exact, axis=2).max())
-        held = run.trajectory_path(scene.name, f"{outcome.cell.method}-held", outcome.cell.seed)
+        held = run.held_path(scene.name, outcome.cell.method, outcome.cell.seed)
         still = Trajectory.load(held).positions if held.is_file() else None
         if still is not None:
             metrics["dynamics/held_difference"] = rms(positions[k], still)

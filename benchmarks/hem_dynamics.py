@@ -38,7 +38,7 @@ def hem_motion(scene: BuiltScene, simulated: np.ndarray, run: RunFolder) -> HemM
         stop=stop_frame(motion.poses, motion.translations),
         hem=scene.dressed.garment.hem,
         simulated=simulated,
-        quasi_static=held_simulation(scene, run.trajectory_path(scene.name, "simulation-held")).positions,
+        quasi_static=held_simulation(scene, run.held_path(scene.name, "simulation")).positions,
         dt=scene.dt,
     )
 

@@ -99,6 +99,11 @@ class Records:
         """Everything is missing from now on."""
         shutil.rmtree(self.folder.records, ignore_errors=True)
 
+    def forget(self, kind: str, names: str) -> None:
+        """Remove the records of that kind whose names fit a pattern of pathlib's."""
+        for path in list((self.folder.records / kind).glob(f"{names}.json")):
+            path.unlink(missing_ok=True)
+
     def path(self, work: Work) -> Path:
         """records/<kind>/<name>.json"""
         return self.folder.records / work.kind / f"{work.name}.json"

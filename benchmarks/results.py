@@ -164,6 +164,10 @@ class RunFolder:
         suffix = "" if seed == 0 else f"-seed{seed}"
         return self.trajectories / scene.replace("/", "-") / f"{method.replace('/', '-')}{suffix}.vtkhdf"
 
+    def held_path(self, scene: str, method: str, seed: int = 0) -> Path:
+        """A method's answer to each frame held still, beside its trajectory."""
+        return self.trajectory_path(scene, f"{method}-held", seed)
+
     def start_path(self, scene: str) -> Path:
         """The settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")

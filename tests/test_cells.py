@@ -150,6 +150,33 @@ def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path
     assert Records(RunFolder(tmp_path)).find(Agenda(plan).cell(plan.cells[0])).state == "missing"
 
 
+def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path, misbehaving):
+    plan = plan_of(tmp_path, "simulation", "newton-1", "newton-4")
+    folder, agenda = RunFolder(tmp_path), Agenda(plan)
+    records = Records(folder)
+
+    def measured() -> list[str]:
+        """Methods whose metrics are there."""
+        return [c.method for c in plan.cells if records.find(agenda.metrics(c)).state == "finished"]
+
+    def after(number: int) -> list[str]:
+        for cell in plan.cells:
+            records.keep(agenda.metrics(cell), {}, seconds=0.0)
+        folder.trajectory_path("free_fall", plan.cells[number].method).unlink(missing_ok=True)
+        folder.held_path("free_fall", plan.cells[number].method).touch()
+        outcome_of(plan, number)
+        assert not folder.held_path("free_fall", plan.cells[number].method).exists()
+        return measured()
+
+    for number in range(3):
+        outcome_of(plan, number)
+    assert after(1) == ["simulation", "newton-4"]
+    assert after(0) == []  # the others are compared with it
+    misbehaving("raise")
+    outcome_of(plan, 1)
+    assert not folder.trajectory_path("free_fall", "newton-1").exists()
+
+
 def test_only_what_is_asked_for_is_done(tmp_path, misbehaving):
     misbehaving("raise")
     plan = plan_of(tmp_path, "newton-1", "newton-4")
