@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from snug.contact import Anchors, Patch
+from reference_sim.obstacle import vertex_normals
+from snug.contact import Patch
 
 MARGIN = 2e-3  # [m]
 
@@ -33,13 +34,18 @@ class CleanUp:
         body_positions: np.ndarray,
     ) -> None:
         self.patch = Patch.around(rest_positions, body_rest, body_faces)
-        self.anchors = Anchors(self.patch, 1)  # searched anew in each frame, from where they were in the last
         self.body = body_positions[:, self.patch.body_vertices].astype(np.float32)
+        self._faces: np.ndarray | None = None  # found last, where the next search begins
 
     def __call__(self, x: np.ndarray, frame: int) -> np.ndarray:
         """Vertices (V, 3) [m] of a frame, pushed out where need be; the given ones are left as they are."""
-        skin, only = self.body[frame : frame + 1], np.zeros(1, np.int64)
-        self.anchors.renew(0, x.astype(np.float32), skin[0])
-        points, normals = self.anchors.planes(only, only, skin, self.patch.normals(skin))
-        lack = MARGIN - np.einsum("vi,vi->v", normals[0], x - points[0])
-        return x + np.maximum(lack, 0.0)[:, None] * normals[0]
+        patch, skin = self.patch, self.body[frame]
+        patch.tree.refit(skin)
+        # Exact at any depth, unlike the anchors of training: what lies deep must find the near way out.
+        found = patch.tree.nearest(x, hints=self._faces, rest_points=patch.sample_rest, region=patch.region)
+        self._faces = found.faces
+        corners = vertex_normals(skin, patch.faces)[patch.faces[found.faces]]
+        normals = np.einsum("va,vai->vi", found.barycentric, corners)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True) + 1e-30
+        lack = MARGIN - np.einsum("vi,vi->v", normals, x - found.points)
+        return x + np.maximum(lack, 0.0)[:, None] * normals

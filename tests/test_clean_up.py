@@ -48,3 +48,20 @@ def test_the_given_vertices_are_not_written_to(scene):
     kept = x[2].copy()
     clean(x[2], 2)
     assert np.array_equal(kept, x[2])
+
+
+def test_what_lies_deep_finds_the_near_way_out_whatever_came_before(scene):
+    """Faces remembered from another pose may speed the search up, and change nothing."""
+    clean, obstacle, x = scene
+    middle = x[0].mean(axis=0)
+    squeezed = middle + (x[0] - middle) * [0.4, 1.0, 0.4]
+    assert (obstacle.signed_distance(squeezed, 0) < -0.03).mean() > 0.3
+    clean(x[5], 5)
+    first = clean(squeezed, 0)
+    clean(middle - 3 * (x[4] - middle), 4)
+    assert np.array_equal(clean(squeezed, 0), first)
+    nearest = obstacle.planes(squeezed.astype(np.float32).astype(float), 0, clean.patch.sample_rest)
+    depth = np.linalg.norm(squeezed - nearest.points, axis=1)
+    moved = np.linalg.norm(first - squeezed, axis=1)
+    deep = depth > 0.03
+    assert (moved[deep] < depth[deep] + 1.5 * MARGIN).all()
