@@ -40,8 +40,8 @@ class Outcome:
     """How a cell ended. A cell that is not recorded has left no trajectory.
 
     seconds: of run(), on the clock, repeats included. frames: those it computed. batch_seconds: per frame,
-    many at once. peak: most memory of the process [MB]. modules: loaded when the run had ended. terms: the
-    energies of the scene, joined by "+".
+    many at once. peak: most memory of the process until its run had ended [MB]. modules: all that it has
+    loaded. terms: the energies of the scene, joined by "+".
     """
 
     cell: Cell
@@ -75,7 +75,8 @@ def perform(task: Task) -> Outcome:
         outcome = run_cell(task.cell, task.entry, scene, RunFolder(task.folder), device=task.device)
     except Exception as error:
         outcome = failed(task.cell, error)
-    return dataclasses.replace(outcome, peak=peak_memory(), modules=loaded())
+    peak = outcome.peak if outcome.recorded else peak_memory()
+    return dataclasses.replace(outcome, peak=peak, modules=loaded())
 
 
 def perform_again(task: Task) -> Outcome:
@@ -115,6 +116,7 @@ def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder, 
         method = entry.make(models=run.models_of(cell.scene.garment), seed=cell.seed, device=device)
         method.prepare(scene)
         trajectory, reading = clocked(method.run, of=lambda made: made.positions)
+        peak = peak_memory()  # many bodies at once, and poses held still, are not what others are compared by
         status, reason = judge(trajectory, reading, scene, cut_short=entry.cut_short)
         if status == "failed":
             return Outcome(cell, status, reason)
@@ -130,13 +132,19 @@ def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder, 
         return failed(cell, error)
     frames = frames_computed(trajectory)
     return Outcome(
-        cell, status, reason, (reading.seconds,), frames, at_once, terms="+".join(scene.terms), recorded=True
-    )
+        cell, status, reason, (reading.seconds,), frames, at_once, peak, terms="+".join(scene.terms),
+        recorded=True,
+    )  # fmt: skip
 
 
 def throughput(run: Callable[[], np.ndarray]) -> float:
-    """Seconds per frame of a method that computes many bodies at once, (T, copies, V, 3)."""
+    """Seconds per frame of a method that computes many bodies at once, (T, copies, V, 3).
+
+    Raises RuntimeError for a time that cannot be believed.
+    """
     positions, reading = clocked(run, of=lambda made: made)
+    if reading.complaint:
+        raise RuntimeError(f"its time for many at once cannot be believed: {reading.complaint}")
     return reading.seconds / (positions.shape[0] * positions.shape[1])
 
 

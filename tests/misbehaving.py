@@ -36,6 +36,19 @@ class Misbehaving:
             frame_seconds=np.full(scene.frames, 1e-6), status="ok",
         )  # fmt: skip
 
+    def ready_batch(self, copies: int):
+        """Many at once: in a run "greedy" with a third of a gigabyte, in a run "crowded" by another thread."""
+
+        def compute() -> np.ndarray:
+            still = np.zeros((self.scene.frames, copies, len(self.scene.start), 3))
+            if self.how == "greedy":
+                np.ones(40_000_000).sum()
+            if self.how == "crowded":
+                self._early(still)
+            return still
+
+        return compute
+
     def _hang(self, _) -> None:
         subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
         while True:

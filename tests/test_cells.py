@@ -126,6 +126,16 @@ def of_session(session: int, word: str = "") -> list[int]:
     return found
 
 
+def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_path, misbehaving):
+    plan = plan_of(tmp_path, "newton-1")
+    misbehaving("greedy")
+    greedy = outcome_of(plan)
+    assert greedy.status == "ok" and greedy.batch_seconds > 0.0 and greedy.peak < 300.0
+    misbehaving("crowded")
+    crowded = outcome_of(plan)
+    assert crowded.status == "failed" and "many at once" in crowded.reason
+
+
 # --- reuse -----------------------------------------------------------------------------------------------
 
 
