@@ -3,8 +3,10 @@
 Three cases, from harmless to grave:
 - a window is above the recipe's `spike`: the gradient of its step is clipped;
 - a window is not finite: the update is left out;
-- `PATIENCE` batches in a row are not finite, or above `RUNAWAY` times the usual energy: the network is lost.
-  Weights and Adam's moments go back to the last ones seen to be good, and the learning rate is halved.
+- `PATIENCE` batches in a row are not finite, or above `RUNAWAY` times the usual energy with a window above
+  `spike`: the network is lost. Weights and Adam's moments go back to the last ones seen to be good, and the
+  learning rate is halved.
+A recipe with a spike beyond all energies, as the paper's, is left alone until something is not finite.
 No decision comes from a clock, so a run with incidents repeats as exactly as one without.
 """
 
@@ -61,7 +63,8 @@ class Guard:
         self._skipped_in_a_row = 0
         judged = self.spike is not None and number >= SETTLING
         mean = float(joules.mean(dtype=np.float64))
-        runaway = judged and self._usual is not None and mean > RUNAWAY * self._usual
+        peaks = joules > self.spike if judged else np.zeros(len(joules), bool)
+        runaway = bool(peaks.any()) and self._usual is not None and mean > RUNAWAY * self._usual
         if runaway:
             if self._count_bad(number, joules, name):
                 return "leave out"
@@ -70,7 +73,6 @@ class Guard:
             self._usual = mean if self._usual is None else MEMORY * self._usual + (1 - MEMORY) * mean
             if number - self._good_step >= SNAPSHOT_EVERY or not self._good:
                 self._good, self._good_step = self._copied(), number
-        peaks = joules > self.spike if judged else np.zeros(len(joules), bool)
         if peaks.any():
             self._remark(number, peaks, joules, name, "gradient clipped")
         return "distrust" if runaway else "clip" if peaks.any() else "update"

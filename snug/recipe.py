@@ -47,7 +47,8 @@ class Recipe:
     detached: previous frames are given to inertia, not moved by it: without it a network makes its past agree
         with a still present instead of learning to move.
     swing, swing_components, rehearsal: see snug.swing; of no account where no simulation teaches.
-    spike: a window above this many joules a frame is named and counted, and its step's gradient clipped.
+    spike: a window above this many joules a frame is named and counted, and its step's gradient clipped; what
+        else the guard does about such batches: see snug.guard.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
     """
 

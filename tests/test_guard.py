@@ -8,7 +8,7 @@ import torch
 from dressing import swaying, tube_dress
 
 from snug.guard import PATIENCE, SETTLING, SNAPSHOT_EVERY
-from snug.recipe import DEFAULT
+from snug.recipe import DEFAULT, PAPER
 from snug.trainer import Trainer
 from snug.training_run import TrainingRun
 from snug.training_set import TrainingError
@@ -82,6 +82,20 @@ def test_runaway_energy_brings_good_weights_back():
     losses = [trainer.step(SETTLING + 1 + k)["loss"] for k in range(PATIENCE + 1)]
     assert min(losses[:PATIENCE]) > 10 * usual and losses[PATIENCE] < 3 * usual  # step 0
     assert trainer.guard.summary["restored"] == 1 and trainer.guard.summary["skipped_updates"] == 0
+
+
+def test_the_papers_recipe_is_left_alone_by_the_guard():
+    """No clip, no weights back: the paper has neither."""
+    trainer = made(replace(PLAIN, spike=PAPER.spike))
+    for number in range(SETTLING + 1):
+        trainer.step(number)
+    with torch.no_grad():
+        trainer.network.offsets.weight.normal_(0, 0.3, generator=torch.Generator().manual_seed(0))
+    for number in range(PATIENCE + 1):
+        trainer.step(SETTLING + 1 + number)
+    assert trainer.guard.summary["restored"] == 0 and trainer.guard.rate == 1.0
+    norms = [p.grad.norm() for p in trainer.network.parameters()]
+    assert torch.stack(norms).norm() > 2 * PLAIN.gradient_limit
 
 
 def test_data_that_is_not_finite_does_not_wear_down_the_rate():
