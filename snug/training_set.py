@@ -60,6 +60,7 @@ class TrainingSet:
             )
         self.dt = 1.0 / rates.pop()
         self.dressed, self.recipe, self.device = dressed, recipe, device
+        self._ends_in_shape = features in ("motion", "pose_shape")
         self.names = [motion.name for motion in motions]
         self.first = np.cumsum([0, *(len(motion.poses) for motion in motions)])
         self.features = torch.cat([dressed.features(m, recipe, kind=features) for m in motions]).to(device)
@@ -91,7 +92,7 @@ class TrainingSet:
         mean, std = self.features.mean(0).cpu().numpy(), self.features.std(0).cpu().numpy()
         std = np.maximum(std, STD_FLOOR)
         shapes = self.dressed.body.shape_count
-        if self.recipe.shape_range and self.features.shape[1] > 72:
+        if self.recipe.shape_range and self._ends_in_shape:
             mean[-shapes:], std[-shapes:] = 0.0, self.recipe.shape_range / np.sqrt(3.0)
         return mean, std
 

@@ -52,6 +52,10 @@ class Validator:
             trainer.dressed, motions, trainer.recipe, features=how.features, sequences=how.sequences,
             device=trainer.device,
         )  # fmt: skip
+        if self.data.dt != trainer.data.dt:
+            raise TrainingError(
+                f"validation has {1 / self.data.dt:g} frames a second, training {1 / trainer.data.dt:g}: resample"
+            )
         self.contact = trainer.contact_of(self.data)
         if self.contact:
             self.contact.refresh = 1.0
@@ -66,11 +70,10 @@ class Validator:
         """Mean over all frames of the sum of the loss's terms [J], or what the simulated vertices give."""
         total = 0.0
         for first, end in zip(self.data.first[:-1], self.data.first[1:]):
-            rows = np.arange(first, end)
-            batch = Batch(
-                rows[None], self.data.features[rows][None], self.data.rest, self.data.transforms[rows][None],
-                self.data.ahead[rows][None],
-            )  # fmt: skip
+            # One long window, or, for a static network, windows of one frame: it has no inertia.
+            rows = np.arange(first, end).reshape((1, -1) if self.trainer.how.sequences else (-1, 1))
+            data = self.data
+            batch = Batch(rows, data.features[rows], data.rest, data.transforms[rows], data.ahead[rows])
             total += float(torch.stack(list(self._terms(batch).values())).sum())
         if self.contact:
             self.contact.refresh = RENEWED

@@ -106,6 +106,26 @@ def test_unfit_validations_are_refused():
         Validator(trainer(), Validation(motions=[swaying(20)]))
     with pytest.raises(TrainingError, match="every"):
         Validator(trainer(), Validation(motions=[HELD], every=0))
+    with pytest.raises(TrainingError, match="60 frames a second, training 30"):
+        Validator(trainer(), Validation(motions=[replace(HELD, fps=60.0)]))
+
+
+def test_a_static_network_is_validated_by_what_it_is_taught():
+    """No inertia, which its loss does not have."""
+    made = Trainer("pbns", tube_dress(), [swaying(30)], steps=40, seed=0, recipe=PLAIN)
+    calm = made.dressed.skinned(HELD, smoothing=20)
+    value = Validator(made, Validation(motions=[HELD])).value()
+    own = [BendHinge, StretchStVK, Gravity]
+    cloth = made.dressed.cloth
+    pelvis = made.dressed.pelvis(HELD)
+    total = sum(E(cloth).value_and_gradient(x - p)[0] for E in own for x, p in zip(calm, pelvis))
+    contact = 0.0
+    body = Obstacle(made.dressed.body.vertices(HELD.poses, HELD.translations), made.dressed.body.faces)
+    for t, x in enumerate(calm):
+        term = ContactPenalty(cloth)
+        term.prepare(Step(x, 0 * x, x, 1 / 30, body, t))
+        contact += term.value_and_gradient(x)[0]
+    assert value == pytest.approx((total + contact) / HELD.frames, rel=1e-4)
 
 
 def test_history_says_where_the_time_goes():

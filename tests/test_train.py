@@ -220,3 +220,13 @@ def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "nowhere" in error and not out.exists()
     assert Recipe() == DEFAULT and isinstance(swaying(), Motion)
+
+
+def test_only_inputs_that_hold_a_shape_are_normalised_by_its_range():
+    shaped = replace(PLAIN, shape_range=3.0)
+    dressed, clips = tube_dress(), [swaying(30)]
+    pose = TrainingSet(dressed, clips, shaped, features="pose", sequences=False)
+    mean, std = pose.input_statistics()
+    assert np.array_equal(mean, pose.features.mean(0).numpy())
+    motion = TrainingSet(dressed, clips, shaped, features="motion", sequences=True)
+    assert np.allclose(motion.input_statistics()[1][-10:], np.sqrt(3.0))
