@@ -7,7 +7,7 @@ stale what was made from it. Loads nothing heavy: a dry run asks the same questi
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -52,8 +52,8 @@ class Agenda:
         kind, plan = network.name, self.plan
         training, motions = TRAININGS.get(kind), plan.train_of(network.garment)
         code = code_of("benchmarks.training", "benchmarks.wardrobe")
-        inputs = self._inputs(code) | {
-            "kind": kind,
+        inputs = self.inputs(code) | {
+            "kind": [kind, training.kind if training else kind],
             "seed": network.seed,
             "garment": network.garment,
             "steps": plan.preset.steps_of(kind),
@@ -96,32 +96,23 @@ class Agenda:
             "suites": sorted(cell.suites),
             "samples": self.plan.preset.gap_samples,
         }
+        if cell.scene.dressed:
+            inputs["recipe"] = dataclasses.asdict(DEFAULT)  # of the skinning that gaps are a share of
         return Work("metrics", name_of(cell), inputs, code)
-
-    def all(self) -> Iterator[Work]:
-        """Every piece of work in the order of a run; skipped cells are none."""
-        for scene in self.plan.scenes:
-            if scene.dressed:
-                yield self.start(scene)
-        for garment in self.plan.simulated:
-            yield from (self.data(motion, garment) for motion in self.plan.train_of(garment))
-        yield from map(self.network, self.plan.networks)
-        cells = [cell for cell in self.plan.cells if runs(cell)]
-        yield from map(self.cell, cells)
-        yield from map(self.metrics, cells)
 
     def _on_body(self, kind: str, scene: Scene) -> Work:
         code = code_of("benchmarks.ground_truth", scene.module)
         return Work(kind, flat(scene.name), self._scene(scene, code), code)
 
     def _scene(self, scene: Scene, code: Mapping[str, str]) -> dict[str, Any]:
-        inputs = self._inputs(code) | {"scene": declared(scene)}
+        inputs = self.inputs(code) | {"scene": declared(scene)}
         if scene.dressed:
             inputs["motion"] = self._motion(scene.name.split("/", 1)[1])
         return inputs
 
-    def _inputs(self, code: Mapping[str, str]) -> dict[str, Any]:
-        inputs = {"preset": preset_values(self.plan.preset, code), "machine": self.machine}
+    def inputs(self, code: Mapping[str, str]) -> dict[str, Any]:
+        """What code depends on besides itself: sizes that it reads, machine, packages, files it may read."""
+        inputs: dict[str, Any] = {"preset": preset_values(self.plan.preset, code), "machine": self.machine}
         if any(path.startswith("snug/") for path in code):
             inputs["files"] = _data_files()
         return inputs

@@ -25,8 +25,8 @@ LAYERS = ("reference_sim", "snug", "benchmarks")
 LISTS = (
     "benchmarks/__init__.py", "benchmarks/methods/__init__.py", "benchmarks/methods/solvers.py",
     "benchmarks/methods/learned.py", "benchmarks/scenes/__init__.py",
-    "benchmarks/suites/__init__.py", "benchmarks/presets.py", "benchmarks/plan.py", "benchmarks/results.py",
-    "snug/recipe.py",
+    "benchmarks/suites/__init__.py", "benchmarks/suites/extreme_cases.py", "benchmarks/presets.py",
+    "benchmarks/plan.py", "benchmarks/results.py", "snug/recipe.py",
 )  # fmt: skip
 
 

@@ -21,8 +21,8 @@ def work_of(item: Check | Case, agenda: Agenda) -> Work:
         kind, code = "check", code_of(f"benchmarks.checks.{item.module}", "benchmarks.check")
     else:
         module = item.function.partition(":")[0]
-        kind, code = "case", code_of(f"benchmarks.checks.{module}", "benchmarks.checks.verdict")
-    return Work(kind, item.name, {"declared": declared(item), "machine": agenda.machine}, code)
+        kind, code = "case", code_of(f"benchmarks.checks.{module}", "benchmarks.suites.extremes")
+    return Work(kind, item.name, agenda.inputs(code) | {"declared": declared(item)}, code)
 
 
 def rows_of(

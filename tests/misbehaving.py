@@ -37,7 +37,7 @@ class Misbehaving:
         )  # fmt: skip
 
     def ready_batch(self, copies: int):
-        """Many at once: in a run "greedy" with a third of a gigabyte, in a run "crowded" by another thread."""
+        """Many at once: "greedy" takes a third of a gigabyte, "crowded" leaves the work to a thread."""
 
         def compute() -> np.ndarray:
             still = np.zeros((self.scene.frames, copies, len(self.scene.start), 3))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 from benchmarks import judged
 from benchmarks.agenda import Agenda
@@ -45,3 +46,16 @@ def test_every_check_and_case_has_an_identity_of_its_own(tmp_path):
     works = [judged.work_of(item, agenda) for item in (*CHECKS, *CASES)]
     assert len({records.path(work) for work in works}) == len(works)
     assert all("reports/" not in path for work in works for path in work.code)
+
+
+def test_a_case_depends_on_how_it_is_judged_and_on_the_body_that_it_reads_but_not_on_the_other_cases():
+    plan = Plan(
+        preset=find_preset("smoke"), suites=(), cells=(), checks=(), cases=(), train=(), test=(), seeds=(0,),
+        device="cpu", folder=Path(), command="",
+    )  # fmt: skip
+    works = {case.name: judged.work_of(case, Agenda(plan)) for case in CASES}
+    for work in works.values():
+        assert {"benchmarks/suites/extremes.py", "benchmarks/checks/verdict.py"} < set(work.code)
+        assert "benchmarks/suites/extreme_cases.py" not in work.code
+    assert "snug/data/body.npz" in works["shirt_step"].inputs["files"]
+    assert "files" not in works["twisted"].inputs

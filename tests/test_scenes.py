@@ -8,6 +8,7 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks import agenda
 from benchmarks.agenda import Agenda
 from benchmarks.methods import find_method
 from benchmarks.plan import choose_suites
@@ -121,6 +122,15 @@ def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes
     assert set(plan.models) == {("snug", 0), ("snug-dynamic", 0)}
     keys = {Agenda(plan).network(network).key for network in plan.networks}
     assert len(keys) == 4
+
+
+def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not(monkeypatch):
+    plan = plan_of("--scenes", "dressed/kick,hanging_sheet", "--methods", "simulation")
+    parts = (Agenda(plan).cell, Agenda(plan).metrics)
+    before = {(part.__name__, cell): part(cell).key for part in parts for cell in plan.cells}
+    monkeypatch.setattr(agenda, "DEFAULT", dataclasses.replace(agenda.DEFAULT, smoothing=7))
+    changed = {(n, c.scene.name) for (n, c), key in before.items() if getattr(Agenda(plan), n)(c).key != key}
+    assert changed == {("metrics", "dressed/kick")}
 
 
 def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_tunic_without_networks():
