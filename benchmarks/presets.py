@@ -9,12 +9,12 @@ from dataclasses import dataclass
 class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
-    frames: at most so many frames of each motion, at 30 per second; clip_frames: of its liveliest part. steps: optimiser steps per kind
-    of network, for ablations those of what they vary. further: whether the ablations and further baselines of
-    a suite take part without being named. settle_frames: frames from the T-pose into the first pose of a
-    motion. sheet_cells: the small scenes are sheets of so many cells along each side. gap_samples: frames of a
-    trajectory at which suite speed solves the step again to know the gap to its minimum.
-    repeats: times that a cell of suite speed is run, those whose first run took at most repeat_seconds [s].
+    frames: at most so many frames of each motion, at 30 per second; clip_frames: of its liveliest part.
+    steps: optimiser steps per kind of network, for ablations those of what they vary. further: whether the
+    ablations and further baselines of a suite take part without being named. settle_frames: frames from the
+    T-pose into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along
+    each side. gap_samples: frames of a trajectory at which suite speed solves the step again to know the gap
+    to its minimum. repeats: times that a cell of suite speed is run, those whose first run took at most repeat_seconds [s].
     cell_seconds: time after which the process of a cell is ended [s].
     """
 

@@ -28,7 +28,9 @@ FILES = {
     ),
     "benchmarks/methods/other.py": "import snug.network\nfrom . import one\n",
     "benchmarks/plan.py": "from .methods import other\n",
-    "benchmarks/scene.py": "from .plan import Cell\ndef build(sizes: Preset):\n    return sizes.sheet_cells\n",
+    "benchmarks/scene.py": (
+        "from .plan import Cell\ndef build(sizes: Preset):\n    return sizes.sheet_cells\n"
+    ),
 }
 
 
