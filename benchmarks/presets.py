@@ -14,8 +14,8 @@ class Preset:
     ablations and further baselines of a suite take part without being named. settle_frames: frames from the
     T-pose into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along
     each side. gap_samples: frames of a trajectory at which suite speed solves the step again to know the gap
-    to its minimum. repeats: times that a cell of suite speed is run, those whose first run took at most repeat_seconds [s].
-    cell_seconds: time after which the process of a cell is ended [s].
+    to its minimum. repeats: times that a cell of suite speed is run, those whose first run took at most
+    repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended [s].
     """
 
     name: str
