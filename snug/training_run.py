@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -166,7 +166,8 @@ class TrainingRun:
     def _identity(self) -> dict[str, Any]:
         """What must be the same for a run to be the same run."""
         trainer, digest = self.trainer, hashlib.sha256()
-        for tensor in (trainer.data.features, trainer.data.rest):
+        taught = trainer.targets.vertices if trainer.targets else trainer.data.ahead
+        for tensor in (trainer.data.features, trainer.data.rest, taught):
             digest.update(tensor.cpu().numpy().tobytes())
         return {
             "kind": trainer.kind,
@@ -175,6 +176,7 @@ class TrainingRun:
             "steps": trainer.steps,
             "vertices": trainer.dressed.vertices,
             "data": digest.hexdigest(),
+            "material": asdict(trainer.dressed.cloth.material),
             "every": self.every,
             "validation": [
                 self.validator.data.names if self.validator else [],

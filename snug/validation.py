@@ -53,9 +53,8 @@ class Validator:
             device=trainer.device,
         )  # fmt: skip
         if self.data.dt != trainer.data.dt:
-            raise TrainingError(
-                f"validation has {1 / self.data.dt:g} frames a second, training {1 / trainer.data.dt:g}: resample"
-            )
+            here, there = 1 / self.data.dt, 1 / trainer.data.dt
+            raise TrainingError(f"validation has {here:g} frames a second, training {there:g}: resample them")
         self.contact = trainer.contact_of(self.data)
         if self.contact:
             self.contact.refresh = 1.0

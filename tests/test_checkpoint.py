@@ -12,7 +12,9 @@ import pytest
 import torch
 from dressing import swaying, tube_dress
 
+from reference_sim import Material
 from snug import tensor_file
+from snug.dresser import DressedBody
 from snug.recipe import DEFAULT, PAPER
 from snug.tensor_file import TensorFileError, read_tensors
 from snug.train import train
@@ -150,6 +152,22 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path):
         short(saving=again)
     path.unlink()
     same_model(short(), short(saving=again))  # killed before its first checkpoint: from the beginning
+
+
+def test_a_checkpoint_of_other_targets_or_cloth_is_refused(tmp_path):
+    dressed = tube_dress()
+    simulated = {"sway": dressed.skinned(CLIPS[0], smoothing=20)}
+    saving = Saving(path=tmp_path / "run.safetensors", resume=True)
+    with pytest.raises(Interrupted):
+        short("supervised", trajectories=simulated, saving=saving, stop=asked_after(2))
+    with pytest.raises(TensorFileError, match="another data"):
+        short("supervised", trajectories={"sway": simulated["sway"] + 0.01}, saving=saving)
+    saving.done()
+    with pytest.raises(Interrupted):
+        short(saving=saving, stop=asked_after(2))
+    stiff = DressedBody(dressed.body, dressed.garment, material=Material(young_modulus=1e6))
+    with pytest.raises(TensorFileError, match="another material"):
+        train("snug", stiff, CLIPS, steps=24, seed=0, recipe=PLAIN, every=5, progress=False, saving=saving)
 
 
 def no_space(*_):
