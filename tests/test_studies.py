@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from benchmarks import workers
+from benchmarks.methods.networks import model_path
 from benchmarks.metrics.laws import UNITS, law_series
-from benchmarks.plan import Plan, PlanError, choose_cells, choose_studies
+from benchmarks.plan import Cell, Plan, PlanError, choose_cells, choose_studies
 from benchmarks.presets import find_preset
 from benchmarks.results import Row, RunFolder
 from benchmarks.scene import Dressed
-from benchmarks.scenes import free_fall, hanging_sheet, sheet_on_sphere
+from benchmarks.scenes import dressed_scene, free_fall, hanging_sheet, sheet_on_sphere
 from benchmarks.studies import STUDIES, dependence, hard_motion_cases, hard_motion_stage, hard_motions, laws
 from benchmarks.studies.hard_motion_cases import HARD_MOTIONS
 from benchmarks.studies.hard_motion_stage import HardStage, RollOut, Trained
@@ -50,6 +51,19 @@ def dropped():
     )
     assert trajectory.status == "converged" and trajectory.frame_fields["energy/collision"][-1] > 0
     return scene, trajectory.positions
+
+
+def test_a_network_does_hard_motions_once_and_under_its_own_name_whatever_is_made_of_it(tmp_path):
+    methods = ("snug", "snug+cleanup", "pbns+cleanup", "snug+lbfgs-1", "untrained", "skinning", "supervised")
+    cells = tuple(Cell(dressed_scene("kick"), name, 0, ("garments",)) for name in methods)
+    folder = RunFolder(tmp_path)
+    folder.models.mkdir()
+    for kind in ("snug", "pbns", "untrained"):
+        model_path(folder.models, kind, 0).touch()
+    found = hard_motions.trained(plan_of(tmp_path, cells=cells), folder)
+    assert [(network.method, network.path.name) for network in found] == [
+        (kind, f"{kind}-seed0.safetensors") for kind in ("snug", "pbns")
+    ]
 
 
 def test_the_simulator_keeps_every_law(dropped):

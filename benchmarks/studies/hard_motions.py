@@ -17,10 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..methods import find_method
-from ..plan import Plan, runs
+from ..plan import Plan
 from ..results import Row, RunFolder
-from ..scenes import TSHIRT
 from .hard_motion_cases import AFTER, GLITCH, HARD_MOTIONS, MOTION, ORDINARY_CASE, HardMotion
 from .hard_motion_stage import FREE, REFERENCE, Contestant, HardStage, RollOut, Trained, strains
 
@@ -65,19 +63,11 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
 
 
 def trained(plan: Plan, folder: RunFolder) -> tuple[Trained, ...]:
-    """The networks that lie in the folder of the run; each once."""
+    """The T-shirt's networks that lie in the folder of the run; each once, whichever methods use it."""
     from ..methods.networks import model_path
 
-    found = {}
-    for cell in plan.cells:
-        entry = find_method(cell.method)
-        other = cell.scene.garment != TSHIRT
-        if entry.trained in (None, "untrained") or entry.cut_short or other or not runs(cell):
-            continue
-        path = model_path(folder.models, str(entry.trained), cell.seed)
-        if path.is_file():
-            found[cell.method, cell.seed] = Trained(cell.method, cell.seed, path)
-    return tuple(found.values())
+    paths = {who: model_path(folder.models, *who) for who in plan.models if who[0] != "untrained"}
+    return tuple(Trained(*who, path) for who, path in paths.items() if path.is_file())
 
 
 def do_case(
