@@ -298,6 +298,16 @@ def test_no_matrix_is_factorised_twice_and_no_step_measured_twice():
     assert len(set(asked)) == len(asked) >= 25
 
 
+def test_without_a_preconditioner_newton_takes_over_at_once():
+    potential, x = hanging()
+    minimiser = make_minimiser(potential, "lbfgs")
+    minimiser._solver.factorise = lambda data: False
+    assert_minimum(potential, x, minimiser.minimise(x))
+    alone = make_minimiser(potential, "lbfgs", finish=False)
+    alone._solver.factorise = lambda data: False
+    assert alone.minimise(x).status == "stalled"
+
+
 def test_lbfgs_and_its_finish_share_iterations_and_clock(monkeypatch):
     potential, x0 = hanging()
     result = minimise(potential, x0, "lbfgs", max_iterations=30, patience=20)

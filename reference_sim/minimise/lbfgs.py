@@ -94,7 +94,7 @@ class _Run(Descent):
         if not self.finite:
             return "diverged", "energy or gradient is not finite at the starting point"
         if not self.precondition():
-            return "diverged", "the preconditioner is not positive definite"
+            return "stalled", "the preconditioner is not positive definite"
         self.show()
         while self.gradient_norm() > self.o.switch:
             if self.iterations >= self.o.max_iterations:

@@ -29,7 +29,7 @@ from ..linear_solver import analyse
 from ..potential import Potential
 from .descent import Descent, fallen, level, mean_weight
 from .result import Result
-from .secants import Secants
+from .secants import Secants, dot
 from .verdict import verdict
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
@@ -204,7 +204,7 @@ class Run(Descent):
         start, value, g = self.x, self.value, self.g
         first, foreseen, first_allowed = rung, self.foreseeing, 1.0
         p, rung = first_p, first_rung = self.direction(data, rung)
-        slope = float(g @ p)
+        slope = dot(g, p)
         # Every direction is an iteration, also one that is taken back: the loop counts the first.
         bold = self.iterations - self.aside >= CALM
         patience = min(self.patience, self.n.max_iterations - self.iterations - 1) if bold else 0
@@ -221,7 +221,8 @@ class Run(Descent):
             self.value, self.g = self.evaluate(self.x)
             if not self.finite:
                 break
-            if fallen(value, self.value, slope) or (k == 0 and level(value, self.value, slope, self.g @ p)):
+            flat = k == 0 and level(value, self.value, slope, dot(self.g, p))
+            if flat or fallen(value, self.value, slope):
                 self.foreseeing = bold and (k > 0 or self.value - value > FORESEEN * 0.5 * slope)
                 if not self.foreseeing:
                     self.potential.forget()
@@ -265,7 +266,7 @@ class Run(Descent):
         while shift <= MAX_SHIFT:
             if self.factorise(self.assemble(rung), shift):
                 p = self.solve(-self.g)
-                slope = float(self.g @ p)
+                slope = dot(self.g, p)
                 if np.isfinite(slope) and slope < 0 and self.line_search(p, slope):
                     self.rung, self.climbed = rung, rung > first
                     return True

@@ -30,7 +30,7 @@ class Secants:
     def add(self, s: np.ndarray, y: np.ndarray) -> None:
         """Remember a pair, if its curvature is positive."""
         curvature = dot(s, y)
-        if curvature > LEAST_CURVATURE * float(np.linalg.norm(s) * np.linalg.norm(y)):
+        if curvature > LEAST_CURVATURE * np.sqrt(dot(s, s) * dot(y, y)):
             self._pairs.append((s, y, 1.0 / curvature))
 
     def direction(self, g: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:

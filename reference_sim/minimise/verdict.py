@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .result import Result
+from .secants import dot
 
 if TYPE_CHECKING:
     from .newton import Run
@@ -48,7 +49,7 @@ def escape_saddle(run: Run, data: np.ndarray) -> bool:
     for _ in range(POWER):
         v = run.solve(run.n.metric * v)
         v /= np.abs(v).max()
-    v *= -1.0 if float(v @ run.g) > 0 else 1.0
+    v *= -1.0 if dot(v, run.g) > 0 else 1.0
     step = run.spread(FIRST_ESCAPE * run.n.step_tolerance * v)
     scale = run.potential.largest_step(run.x, step)
     for _ in range(30):
