@@ -5,18 +5,23 @@ that d = n.(x - c). Searching it in every step would cost more than the rest of 
 anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the
 frame carry it to a plane in no time, and a few frames of each batch search anew from the current prediction,
 with the simulator's own search and its rule of regions. All positions are float32, relative to the pelvis.
+With thousands of frames remembered, an anchor has four bytes, two of them for its face: barycentric
+coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numba
 import numpy as np
 
 from reference_sim.closest_point import FaceTree
+from reference_sim.energies import ContactPenalty
 from reference_sim.obstacle import DEFAULT_REGION, vertex_normals
 
+PARTS = 255.0  # of a barycentric coordinate
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
 
@@ -74,8 +79,8 @@ class Patch:
         """Closest allowed body point of each sample in one frame.
 
         points (S, 3), positions (P, 3) of the patch [m], anchor_faces (S,) where to look first
-        -> faces (S,) int32, barycentric (S, 2) float32 of the second and third corner. Beyond EXACT from the
-        skin an old anchor stands as long as no face is half as far.
+        -> faces (S,), barycentric (S, 2) of the second and third corner. Beyond EXACT from the skin an old
+        anchor stands as long as no face is half as far.
         """
         self.tree.refit(positions)
         found = self.tree.nearest(
@@ -85,7 +90,7 @@ class Patch:
             region=self.region,
             exact=EXACT,
         )
-        return found.faces.astype(np.int32), found.barycentric[:, 1:].astype(np.float32)
+        return found.faces, found.barycentric[:, 1:]
 
     def normals(self, positions: np.ndarray) -> np.ndarray:
         """Area-weighted vertex normals: positions (N, P, 3) float32 -> (N, P, 3) int8, 127 times unit length.
@@ -99,11 +104,20 @@ class Patch:
         return normals
 
 
+def kept(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Anchors on a body of so many faces as they are remembered: faces (S,) in as few bytes as hold them,
+    barycentric (S, 2) as uint8 in 1 / PARTS, the two together never more than one.
+    """
+    parts = np.rint(PARTS * barycentric)
+    parts[:, 1] = np.minimum(parts[:, 1], PARTS - parts[:, 0])
+    return faces.astype(np.int16 if body_faces < 2**15 else np.int32), parts.astype(np.uint8)
+
+
 class Anchors:
     """One anchor per frame and sample, and when each frame's were last searched."""
 
     def __init__(self, patch: Patch, frames: int) -> None:
-        faces, barycentric = patch.search(patch.sample_rest, patch.rest)
+        faces, barycentric = kept(*patch.search(patch.sample_rest, patch.rest), len(patch.faces))
         self.patch = patch
         self.faces = np.repeat(faces[None], frames, axis=0)
         self.barycentric = np.repeat(barycentric[None], frames, axis=0)
@@ -131,9 +145,41 @@ class Anchors:
         )
         return points, directions
 
+    def energy(
+        self,
+        contact: ContactPenalty,
+        x: np.ndarray,
+        frames: np.ndarray,
+        rows: np.ndarray,
+        positions: np.ndarray,
+        normals: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Contact energy of garments x (N, V, 3) float32 [m] in frames (N,), with the planes of `planes`.
+
+        -> values (N,) [J], gradients (N, V, 3) [N], float32. A sample that is out of reach costs no more
+        than the look at its anchor, and no plane is stored.
+        """
+        values, gradients = np.empty(len(x), np.float32), np.zeros_like(x)
+        _energy(
+            x,
+            *_samples(contact),
+            contact.power,
+            frames,
+            rows,
+            positions,
+            normals,
+            self.patch.faces.view(np.uint32),
+            self.faces,
+            self.barycentric,
+            values,
+            gradients,
+        )
+        return values, gradients
+
     def renew(self, frame: int, points: np.ndarray, positions: np.ndarray) -> None:
         """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame."""
-        self.faces[frame], self.barycentric[frame] = self.patch.search(points, positions, self.faces[frame])
+        found = self.patch.search(points, positions, self.faces[frame])
+        self.faces[frame], self.barycentric[frame] = kept(*found, len(self.patch.faces))
         self.age[frame] = 0
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
@@ -142,21 +188,85 @@ class Anchors:
         return np.argsort(-self.age[frames], kind="stable")[:count]
 
 
+@lru_cache(maxsize=16)
+def _samples(contact: ContactPenalty) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.float32]:
+    """Stencils, weights, stiffness and margin in the types of the kernel."""
+    weights, stiffness = contact.weights.astype(np.float32), contact.stiffness.astype(np.float32)
+    return contact.stencils.astype(np.uint32), weights, stiffness, np.float32(contact.margin)
+
+
+@numba.njit(cache=True, inline="always", error_model="numpy")
+def _carried(faces, face, parts, vectors, c):
+    """Component c of what vectors (P, 3) of the body's vertices are at an anchor."""
+    v, w = np.float32(parts[0]) / np.float32(PARTS), np.float32(parts[1]) / np.float32(PARTS)
+    u = np.float32(1.0) - v - w
+    return u * vectors[faces[face, 0], c] + v * vectors[faces[face, 1], c] + w * vectors[faces[face, 2], c]
+
+
 @numba.njit(cache=True, error_model="numpy")
 def _planes(frames, rows, positions, normals, faces, anchor_faces, barycentric, out_points, out_normals):
     for n in range(len(frames)):
         x, m = positions[rows[n]], normals[rows[n]]
-        anchors, weights = anchor_faces[frames[n]], barycentric[frames[n]]
+        anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
         for s in range(anchors.shape[0]):
-            i, j, k = faces[anchors[s], 0], faces[anchors[s], 1], faces[anchors[s], 2]
-            v, w = weights[s, 0], weights[s, 1]
-            u = np.float32(1.0) - v - w
             length = np.float32(0.0)
             for c in range(3):
-                out_points[n, s, c] = u * x[i, c] + v * x[j, c] + w * x[k, c]
-                direction = u * m[i, c] + v * m[j, c] + w * m[k, c]
+                out_points[n, s, c] = _carried(faces, anchors[s], parts[s], x, c)
+                direction = _carried(faces, anchors[s], parts[s], m, c)
                 out_normals[n, s, c] = direction
                 length += direction * direction
             length = np.sqrt(length) + np.float32(1e-30)
             for c in range(3):
                 out_normals[n, s, c] /= length
+
+
+# No assumption on NaN or infinity: the guard of training must see them.
+@numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
+def _energy(
+    x, stencils, weights, stiffness, margin, power, frames, rows, positions, normals, faces, anchor_faces,
+    barycentric, values, gradients,
+):  # fmt: skip
+    """k max(margin - d, 0)^power of each sample, summed: values (N,), and added up: gradients (N, V, 3).
+
+    stencils, faces: uint32, for a signed index is first asked whether it counts from the end.
+    """
+    # Normals have 127 times unit length, within 0.9 by rounding.
+    reach, zero, one = np.float32(128.0) * margin, np.float32(0.0), np.float32(1.0)
+    whole = one / np.float32(PARTS)
+    for n in range(len(x)):
+        garment, gradient, skin, m = x[n], gradients[n], positions[rows[n]], normals[rows[n]]
+        anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
+        total = 0.0
+        for s in range(len(stencils)):
+            face = np.uint32(anchors[s])
+            a, b, c = stencils[s, 0], stencils[s, 1], stencils[s, 2]
+            i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+            p, q, r = weights[s, 0], weights[s, 1], weights[s, 2]
+            v, w = whole * np.float32(parts[s, 0]), whole * np.float32(parts[s, 1])
+            u = one - v - w
+            x0 = p * garment[a, 0] + q * garment[b, 0] + r * garment[c, 0]
+            x1 = p * garment[a, 1] + q * garment[b, 1] + r * garment[c, 1]
+            x2 = p * garment[a, 2] + q * garment[b, 2] + r * garment[c, 2]
+            x0 -= u * skin[i, 0] + v * skin[j, 0] + w * skin[k, 0]
+            x1 -= u * skin[i, 1] + v * skin[j, 1] + w * skin[k, 1]
+            x2 -= u * skin[i, 2] + v * skin[j, 2] + w * skin[k, 2]
+            n0 = u * m[i, 0] + v * m[j, 0] + w * m[k, 0]
+            n1 = u * m[i, 1] + v * m[j, 1] + w * m[k, 1]
+            n2 = u * m[i, 2] + v * m[j, 2] + w * m[k, 2]
+            along = n0 * x0 + n1 * x1 + n2 * x2
+            if along >= reach:
+                continue
+            length = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + np.float32(1e-30)
+            depth = margin - along / length
+            if depth <= zero:
+                continue
+            force = stiffness[s]
+            for _ in range(power - 1):
+                force *= depth
+            total += force * depth
+            force *= -np.float32(power) / length
+            for corner, share in ((a, p), (b, q), (c, r)):
+                gradient[corner, 0] += share * force * n0
+                gradient[corner, 1] += share * force * n1
+                gradient[corner, 2] += share * force * n2
+        values[n] = total

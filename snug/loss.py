@@ -18,6 +18,7 @@ normal there, where the simulator searches anew in every step and takes the dire
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,7 @@ from snug.recipe import Recipe
 
 CPU = torch.device("cpu")
 STATIC = ("strain", "bending", "gravity")
+Planes = tuple[Any, Any] | Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
@@ -69,12 +71,15 @@ class ClosedForm(torch.autograd.Function):
     """energy summed over its elements, for each configuration of a batch, by its numba kernel.
 
     apply(x (..., V, 3), energy, *frame data (..., S, 3) numpy) -> (...) [J]. Differentiable once, by x alone.
+    energy may also be a function of numpy x (N, V, 3) that gives values (N,) and gradients (N, V, 3) itself.
     """
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, energy: Any, *frame_data: np.ndarray) -> Tensor:
         flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
-        together = lane_kernel(energy) if flat.dtype == np.float32 and not frame_data else None
+        together = energy if callable(energy) else None
+        if together is None and flat.dtype == np.float32 and not frame_data:
+            together = lane_kernel(energy)
         if together is not None:
             values, gradients = together(flat)
         else:
@@ -128,12 +133,13 @@ class PhysicsLoss:
             self.inertia, self._contact = held_on(self.inertia, device), held_on(self.contact, device)
             self.static = {name: held_on(term, device) for name, term in self.static.items()}
 
-    def __call__(self, x: Tensor, ahead: Tensor, planes: tuple[Any, Any] | None) -> dict[str, Tensor]:
+    def __call__(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Tensor]:
         """Joules of each window and frame, term -> (N, T).
 
         x: (N, T, V, 3) [m], each frame relative to its own pelvis p. ahead: (N, T, 3) [m],
         2 p_{t-1} - p_{t-2} - p_t: where the pelvis would be if it kept its velocity, seen from where it is.
-        planes: points and normals (N, T, S, 3) of the contact samples; numpy for kernels, else tensors.
+        planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors; or a
+        kernel that knows its planes: x (N T, V, 3) -> values (N T,) [J], gradients (N T, V, 3) [N].
         """
         terms = {name: summed(energy, x, kernels=self.kernels) for name, energy in self.static.items()}
         if "inertia" in self.terms and x.shape[1] >= 3:
@@ -142,5 +148,8 @@ class PhysicsLoss:
             inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
             terms["inertia"] = torch.nn.functional.pad(inertia, (2, 0))
         if "collision" in self.terms and planes is not None:
-            terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
+            if callable(planes):
+                terms["collision"] = ClosedForm.apply(x, planes)
+            else:
+                terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
         return terms

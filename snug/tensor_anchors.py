@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from snug.contact import Anchors, Patch
+from snug.contact import PARTS, Anchors, Patch
 
 NEAREST = 3  # body vertices whose faces are tried for each sample
 CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances
@@ -59,7 +59,7 @@ class TensorAnchors:
         chosen = torch.as_tensor(frames, device=device)
         corners = self.corners[self.faces[chosen].long()]  # (N, S, 3)
         row = torch.as_tensor(rows, device=device)[:, None, None]
-        last = self.barycentric[chosen]
+        last = self.barycentric[chosen] / PARTS
         weights = torch.cat([1 - last.sum(-1, keepdim=True), last], -1)[..., None]
         points = (weights * positions[row, corners]).sum(-2)
         directions = (weights * normals[row, corners]).sum(-2)
@@ -70,7 +70,10 @@ class TensorAnchors:
         for start in range(0, len(points), CHUNK):
             part = slice(start, start + CHUNK)
             faces, barycentric = self._searched(points[part], self.sample_rest[part], positions)
-            self.faces[frame, part], self.barycentric[frame, part] = faces.to(self.faces.dtype), barycentric
+            second = (PARTS * barycentric[:, :1]).round()
+            third = torch.minimum((PARTS * barycentric[:, 1:]).round(), PARTS - second)
+            self.faces[frame, part] = faces.to(self.faces.dtype)
+            self.barycentric[frame, part] = torch.cat([second, third], 1).to(torch.uint8)
         self.age[frame] = 0
 
     def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:

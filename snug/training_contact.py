@@ -10,6 +10,7 @@ from torch import Tensor
 
 from reference_sim.energies import ContactPenalty
 from snug.contact import Anchors, Patch
+from snug.loss import Planes
 from snug.parallel import ALONE, Group
 from snug.skinning import skin
 from snug.tensor_anchors import TensorAnchors
@@ -79,9 +80,15 @@ class TrainingContact:
             return rows, positions, self.anchors.normals(positions)
         return rows, positions.numpy(), self.patch.normals(positions.numpy())
 
-    def planes(self, batch: Batch, posed: Posed) -> tuple[Any, Any]:
-        """Points and normals (N, T, S, 3) from the remembered anchors."""
-        points, normals = self.anchors.planes(batch.frames.ravel(), *posed)
+    def planes(self, batch: Batch, posed: Posed) -> Planes:
+        """What the loss takes: of the remembered anchors, points and normals (N, T, S, 3), or, with kernels,
+        the energy itself.
+        """
+        flat = batch.frames.ravel()
+        if isinstance(self.anchors, Anchors):
+            anchors = self.anchors
+            return lambda x: anchors.energy(self.contact, x, flat, *posed)
+        points, normals = self.anchors.planes(flat, *posed)
         shape = (*batch.frames.shape, *points.shape[1:])
         return points.reshape(shape), normals.reshape(shape)
 

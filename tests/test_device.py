@@ -11,7 +11,7 @@ from dressing import swaying, tube_dress
 from torch.overrides import TorchFunctionMode
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
-from snug.contact import Anchors, Patch
+from snug.contact import PARTS, Anchors, Patch
 from snug.device import DeviceError, find_device
 from snug.lanes import lane_kernel
 from snug.loss import held_on
@@ -74,7 +74,7 @@ def test_torch_search_is_no_worse_than_the_walk():
     found = []
     for anchors in (walk, brute):
         faces = patch.faces[np.asarray(anchors.faces[1])]
-        last = np.asarray(anchors.barycentric[1])
+        last = np.asarray(anchors.barycentric[1]) / PARTS
         corner = positions[1].numpy()[faces]
         point = corner[:, 0] + np.einsum("sc,sci->si", last, corner[:, 1:] - corner[:, :1])
         found.append(np.linalg.norm(point - samples, axis=1))

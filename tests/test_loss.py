@@ -8,9 +8,9 @@ import torch
 from dressing import swaying, tube_dress
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
-from snug.contact import EXACT, Anchors, Patch
+from snug.contact import EXACT, PARTS, Anchors, Patch, kept
 from snug.loss import PhysicsLoss, make_contact, summed
-from snug.recipe import DEFAULT, PAPER, Recipe
+from snug.recipe import DEFAULT, PAPER, PBNS_SPRINGS, Recipe
 from snug.skinning import skin
 
 DT = 1 / 30
@@ -91,6 +91,7 @@ def test_paper_recipe_has_the_papers_contact():
 
 
 def found(patch: Patch, anchors: np.ndarray, weights: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    weights = weights / PARTS if weights.dtype == np.uint8 else weights
     corners = positions[patch.faces[anchors]]
     return corners[:, 0] + np.einsum("sc,sci->si", weights, corners[:, 1:] - corners[:, :1])
 
@@ -158,6 +159,43 @@ def test_anchors_follow_the_body_and_forget_nothing_but_what_is_renewed():
     anchors.renew(2, points[0][::-1].copy(), positions[2])
     assert (anchors.faces[:2] == before[:2]).all() and (anchors.faces[2] != before[2]).any()
     assert list(anchors.oldest(frames, 1)) == [1]  # frame 2 is young again
+
+
+@pytest.mark.parametrize("recipe", [DEFAULT, PBNS_SPRINGS], ids=["cubic", "squared"])
+def test_energy_at_anchors_is_that_of_their_planes(recipe):
+    dressed, motion = tube_dress(), swaying()
+    contact, body = make_contact(dressed.cloth, recipe), dressed.body
+    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
+    weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(motion.poses[[2, 9]])
+    skin_now = skin(torch.as_tensor(patch.rest), weights, transforms).numpy()
+    garment = skin(dressed.rest(), dressed.weights(5), transforms)
+    x = garment - torch.tensor([0.0, 0.0, 0.05])  # the back a little off the skin, the front deep under it
+    anchors, frames, normals = Anchors(patch, 3), np.array([2, 0]), patch.normals(skin_now)
+    for row, frame in enumerate(frames):
+        samples = (contact.sample_matrix @ x[row].numpy()).astype(np.float32)
+        anchors.renew(int(frame), samples, skin_now[row])
+    values, gradients = anchors.energy(contact, x.numpy(), frames, np.arange(2), skin_now, normals)
+    points, directions = anchors.planes(frames, np.arange(2), skin_now, normals)
+    for row in range(2):
+        planes = points[row].astype(float), directions[row].astype(float)
+        value, gradient = contact.value_and_gradient(x[row].numpy().astype(float), *planes)
+        assert value > 1e-3 and values[row] == pytest.approx(value, rel=1e-4)
+        assert np.linalg.norm(gradients[row] - gradient) < 1e-4 * np.linalg.norm(gradient)
+    x[1, 3] = np.nan
+    values, _ = anchors.energy(contact, x.numpy(), frames, np.arange(2), skin_now, normals)
+    assert np.isfinite(values[0]) and np.isnan(values[1])
+
+
+def test_remembered_anchors_lie_in_their_faces():
+    random = np.random.default_rng(0)
+    exact = random.dirichlet([0.3, 0.3, 0.3], 5000)[:, 1:]
+    exact[:3] = (0.5, 0.5), (1.0, 0.0), (0.0, 1.0)
+    for count, kind in ((2**15 - 1, np.int16), (2**15, np.int32)):
+        faces, parts = kept(np.full(5000, count - 1), exact, count)
+        assert faces.dtype == kind and (faces == count - 1).all() and parts.dtype == np.uint8
+    assert (parts.astype(int).sum(1) <= 255).all()
+    assert np.abs(parts / PARTS - exact).max() <= 1.01 / 255
 
 
 def test_garment_far_from_the_body_is_refused():

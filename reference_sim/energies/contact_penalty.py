@@ -47,6 +47,7 @@ class ContactPenalty(Energy):
     """
 
     name = "collision"
+    power = 3  # of the depth
 
     def __init__(
         self,

@@ -49,6 +49,7 @@ class SquaredContact(ContactPenalty):
     hessian_blocks = Energy.hessian_blocks
     active_hessian_blocks = Energy.active_hessian_blocks
     scalar_stiffness = Energy.scalar_stiffness
+    power = 2
 
     def __init__(self, cloth: Cloth) -> None:
         super().__init__(cloth, samples="vertices", margin=MARGIN, per_sample_stiffness=CONTACT_STIFFNESS)
