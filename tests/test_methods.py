@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.cell import run_cell
+from benchmarks.cell import Outcome, run_cell
 from benchmarks.curves import CURVES
 from benchmarks.evaluate import measure_scene
 from benchmarks.ground_truth import settle, simulate_motion
@@ -170,3 +170,31 @@ def test_a_hybrid_goes_on_from_skinning_and_keeps_its_networks_time(outcomes, ru
     assert np.array_equal(hybrid.positions[0], built.start) and moved[1:].min() > 1e-4
     assert np.median(hybrid.frame_seconds[1:]) > np.median(skinned.frame_seconds[1:])
     assert hybrid.frame_fields["iterations"].tolist() == [0] + [1] * (built.frames - 1)
+
+
+def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_metrics(tmp_path):
+    scene, run = next(scene for scene in SMALL_SCENES if scene.name == "hanging_sheet"), RunFolder(tmp_path)
+    built = scene.build(TINY)
+    falling = np.asarray(built.start) + 0.001 * np.arange(built.frames)[:, None, None]
+    lost = {"simulation": (9, 0.0), "newton-1": (3, np.nan), "newton-4": (0, np.inf), "newton-8": (4, 1e200)}
+    lost |= {"simulation-dt/2": (9, 0.0), "simulation-dt/4": (9, 0.0), "simulation-dt/8": (3, np.nan)}
+    outcomes = []
+    for method, (first, value) in lost.items():
+        x = falling.copy()
+        x[first:] = value
+        path = run.trajectory_path(scene.name, method)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Trajectory(
+            positions=x, faces=built.cloth.faces, times=built.dt * np.arange(len(x)),
+            frame_seconds=np.full(len(x), 1e-3), status="ok",
+        ).save(path)  # fmt: skip
+        status = "ok" if first > len(x) else "diverged"
+        outcomes.append(Outcome(Cell(scene, method, 0, ("speed",)), status, seconds=(1.0,), recorded=True))
+    with np.errstate(all="ignore"):
+        found = dict(zip(lost, measure_scene(outcomes, built, run, gap_samples=3)))
+    assert np.isfinite(list(found["simulation"].values())).all() and found["newton-4"] == {}
+    assert found["newton-1"]["distance/rms"] == 0.0 and np.isfinite(found["newton-1"]["gap/energy"])
+    assert np.isnan(found["newton-8"]["gap/energy"])
+    fields = Trajectory.load(run.trajectory_path(scene.name, "newton-1")).frame_fields
+    assert np.isfinite(fields["energy/total"]).tolist() == [True] * 3 + [False] * 2
+    assert not any(name.startswith("time_error") for name in found["simulation"])  # dt/8 was not whole

@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
+def whole_frames(positions: Floats) -> Floats:
+    """The frames (T',V,3) of positions (T,V,3) before the first that is not finite."""
+    bad = np.flatnonzero(~np.isfinite(positions).all(axis=(1, 2)))
+    return positions[: bad[0]] if len(bad) else positions
+
+
 def distance_rms(positions: Floats, reference: Floats) -> Floats:
     """(T,) root mean square distance [m] between the same vertices of (T,V,3) and (T,V,3) [m].
 

@@ -85,6 +85,10 @@ def optimality(
         guess = first_guess(scene, previous, velocity, int(frame))
         potential.prepare(Step(previous, velocity, guess, scene.dt, scene.obstacle, int(frame)))
         here, gradient = potential.value_and_gradient(x)
+        if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
+            found.missed = found.missed_locally = float("nan")
+            found.gradients.append(float("nan"))
+            continue
         energies = {
             "simulator": both.minimise(guess).energy,
             "newton": newton.minimise(guess).energy,

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..metrics.geometry import whole_frames
 from ..plan import Plan
 from ..results import Row, RunFolder
 from .hard_motion_cases import AFTER, GLITCH, HARD_MOTIONS, MOTION, ORDINARY_CASE, HardMotion
@@ -161,12 +162,6 @@ def worst_of(strain: np.ndarray, away: np.ndarray, ordinary: float) -> dict[str,
         "motion/strain_ratio": float(strain.max() / ordinary),
         "motion/offset": MM * float(away.max()),
     }
-
-
-def whole_frames(positions: np.ndarray) -> np.ndarray:
-    """The frames (T',V,3) before the first that is not finite."""
-    bad = np.flatnonzero(~np.isfinite(positions).all(axis=(1, 2)))
-    return positions[: bad[0]] if len(bad) else positions
 
 
 def outcome(method: str, rolled: RollOut, metrics: Mapping[str, float]) -> tuple[str, str]:
