@@ -103,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parse(arguments)
     try:
         return _run(options)
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         print(f"snug.train: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
 
@@ -117,6 +117,9 @@ def _run(options: argparse.Namespace) -> int:
     from snug.parallel import join_group, leave_group
     from snug.training_run import Interrupted
 
+    if options.threads < 1:
+        raise ValueError(f"--threads {options.threads}: at least 1")
+    Path(options.out).parent.mkdir(parents=True, exist_ok=True)  # refused now rather than after the training
     patterns = [find_pattern(name) for name in dict.fromkeys(options.garment or ["tshirt"])]
     device = find_device(options.device)
     torch.set_num_threads(options.threads)

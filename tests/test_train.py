@@ -222,6 +222,16 @@ def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
     assert Recipe() == DEFAULT and isinstance(swaying(), Motion)
 
 
+def test_command_line_refuses_what_it_could_not_do_before_any_work(capsys, tmp_path):
+    from snug.train import main
+
+    (tmp_path / "file").touch()
+    assert main(["-o", str(tmp_path / "file" / "model.safetensors")]) == 2
+    assert main(["--threads", "0", "-o", str(tmp_path / "model.safetensors")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 2 and "file" in error and "--threads 0: at least 1" in error
+
+
 def test_only_inputs_that_hold_a_shape_are_normalised_by_its_range():
     shaped = replace(PLAIN, shape_range=3.0)
     dressed, clips = tube_dress(), [swaying(30)]
