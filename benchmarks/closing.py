@@ -1,10 +1,12 @@
-"""The table printed at the end of a run: what came out, in one screen."""
+"""What is printed at the end of a run: what came out, in one screen, and what its reader should know."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from .clock import SPREAD
+from .curves import REMARK
 from .results import Row
 
 COLUMNS = (
@@ -36,6 +38,22 @@ def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
             parts.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in counts.items()))
     parts.append("stages: " + ", ".join(f"{stage['name']} {stage['seconds']:.0f} s" for stage in stages))
     return "\n\n".join(parts)
+
+
+def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> list[str]:
+    """What whoever reads the times should know, in a line each. outdated: cell -> what has changed since."""
+    rows, lines = list(rows), []
+    if reused:
+        lines.append(f"{reused} results taken from earlier runs in this folder")
+    lines += [f"{label}: kept though {why} changed" for label, why in outdated.items()]
+    spreads = {f"{row.scene} x {row.method}": row.value or 0.0 for row in rows if row.metric == "cost/spread"}
+    wide = [f"{cell} ({percent:.0f} %)" for cell, percent in spreads.items() if percent > 100.0 * SPREAD]
+    if wide:
+        lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {', '.join(wide)}")
+    rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(REMARK)]
+    if rising:
+        lines.append(f"more iterations or a smaller tolerance, and a larger gap: {', '.join(rising)}")
+    return lines
 
 
 def _groups(suite: str, rows: list[Row]) -> list[tuple[str, list[Row]]]:

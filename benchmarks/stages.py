@@ -18,7 +18,7 @@ from . import judged
 from .agenda import Agenda
 from .cell import Outcome
 from .cells import LEFT_OUT, Cells
-from .curves import REMARK, remarked
+from .curves import remarked
 from .measuring import rows_of_cells
 from .plan import Cell, Network, Plan, network_of, runs
 from .record import Record, now
@@ -44,13 +44,13 @@ def execute(plan: Plan) -> int:
         record.write_rows()
         raise
     made = stages.make_report()
-    from .closing import summary
+    from .closing import remarks, summary
 
     print(summary(record.rows, record.stages), flush=True)
     failed = [row for row in record.rows if not accepted(row)]
     for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
         print(line, file=sys.stderr)
-    for line in stages.remarks():
+    for line in remarks(record.rows, len(record.reused), record.config.get("outdated", {})):
         print(line, file=sys.stderr)
     if made:
         print(record.folder.report_path.resolve(), flush=True)
@@ -263,22 +263,6 @@ class Stages:
         network = network_of(cell)
         data = self.data_seconds.get(cell.scene.garment or "", 0.0)
         return model_costs(self.trained.get(network) if network else None, data)
-
-    def remarks(self) -> list[str]:
-        """What whoever reads the times should know, in a line each."""
-        lines = []
-        if self.record.reused:
-            lines.append(f"{len(self.record.reused)} results taken from earlier runs in this folder")
-        if self.cells is not None:
-            lines += [f"{label}: kept though {why} changed" for label, why in self.cells.outdated.items()]
-        wide = [r for r in self.record.rows if r.metric == "cost/spread" and r.reason]
-        labels = dict.fromkeys(f"{row.scene} x {row.method} ({row.value:.0f} %)" for row in wide)
-        if labels:
-            lines.append(f"repeats more than 20 % apart: {', '.join(labels)}")
-        rising = [f"{row.scene} x {row.method}" for row in self.record.rows if row.reason.startswith(REMARK)]
-        if rising:
-            lines.append(f"more iterations or a smaller tolerance, and a larger gap: {', '.join(rising)}")
-        return lines
 
     def make_report(self) -> bool:
         """tables/, figures/ and report.pdf from the files; a failure is said and leaves the results."""

@@ -9,7 +9,8 @@ import pytest
 
 from benchmarks.cell import Outcome, frames_computed, judge
 from benchmarks.clock import Reading
-from benchmarks.closing import summary
+from benchmarks.closing import remarks, summary
+from benchmarks.curves import REMARK
 from benchmarks.methods import METHODS
 from benchmarks.named_metrics import UNITS, unit_of
 from benchmarks.plan import Cell
@@ -119,3 +120,15 @@ def test_a_check_that_is_off_or_raises_is_a_failed_row(monkeypatch):
     assert off.status == "failed" and off.value is not None and check.reason in off.reason
     broken = validation.run_check(dataclasses.replace(check, function="nothing"))
     assert broken.status == "failed" and broken.value is None and "nothing" in broken.reason
+
+
+def test_the_remarks_name_repeats_that_lie_apart_gaps_that_rise_and_what_is_out_of_date():
+    base = Row("speed", "flag", "newton-1", 0, "cost/spread", "%", 12.0)
+    late = dataclasses.replace(base, method="lbfgs-5", value=31.0, status="stalled", reason="2 of 4 frames")
+    tight = dataclasses.replace(base, status="stalled", reason="2 of 4 frames")
+    gap = dataclasses.replace(base, method="vbd-20", metric="gap/relative", reason=f"{REMARK}: so")
+    said = remarks([tight, late, gap], 3, {"flag x snug": "preset"})
+    assert [line for line in said if "flag x newton-1" in line] == [] and len(said) == 4
+    assert said[0].startswith("3 results") and said[1] == "flag x snug: kept though preset changed"
+    assert said[2].endswith("flag x lbfgs-5 (31 %)") and said[3].endswith("flag x vbd-20")
+    assert remarks([base], 0, {}) == []
