@@ -1,7 +1,7 @@
 """Recipe: every choice of a training run in one frozen place, each deviation from the paper by name.
 
-Recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text to the
-letter, the ablations are the default with one thing changed. None holds a balancing weight between the
+Recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text but for its
+contact (below), the ablations are the default with one thing changed. None holds a balancing weight between the
 energies: there is none. Imports nothing heavy, so that a command can list recipes without loading torch.
 """
 
@@ -127,6 +127,9 @@ class Recipe:
 
 
 DEFAULT = Recipe()
+# Two things are not the text's: d(x) is taken to remembered points of the skin, of which `contact_refresh`
+# renews a few in a step (the text computes it anew; searching all 48 frames would more than double a step),
+# and only to skin that the rule of regions allows.
 PAPER = Recipe(
     name="paper",
     pose_input="axis_angle",

@@ -40,7 +40,7 @@ LEARNED = (
     _network("santesteban2019", "fit by shape and one GRU of 1500, trained on simulated vertices"),
     _network("tailornet", "low and high frequencies by static networks, trained on simulated vertices"),
     _network("snug-dynamic", "SNUG that learns its swing from a simulation, the rest from the energies"),
-    _network("snug-paper", "SNUG by the paper's text to the letter"),
+    _network("snug-paper", "SNUG by the paper's text, its closest points remembered"),
     *(_network(f"snug-{recipe.name}", f"ablation: SNUG, recipe {recipe.name}") for recipe in ABLATIONS),
     *hybrids("snug-dynamic", "lbfgs", "snug-dynamic"),
     _cleaned("snug"),
