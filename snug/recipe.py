@@ -1,8 +1,8 @@
 """Recipe: every choice of a training run in one frozen place, each deviation from the paper by name.
 
 Recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text but for its
-contact (below), the ablations are the default with one thing changed. None holds a balancing weight between the
-energies: there is none. Imports nothing heavy, so that a command can list recipes without loading torch.
+contact (below), the ablations are the default with one thing changed. None holds a balancing weight between
+the energies: there is none. Imports nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
