@@ -19,7 +19,7 @@ from snug.motions.actions import (
     Action,
 )
 from snug.motions.gait import RUN, WALK, Stride, gait_angles, gait_flights, gait_support, stride_phase
-from snug.motions.posture import RATE, poses_from_angles, root_path
+from snug.motions.posture import RATE, poses_from_angles, root_path, smoothstep
 from snug.motions.strikes import KICK, PUNCH, SIDESTEP, TURN
 from snug.motions.turns import STOPS
 
@@ -75,9 +75,9 @@ def build(name: str) -> Motion:
 
 def _gait(stride: Stride, seconds: float, pace: float, stop: float | None) -> tuple[np.ndarray, np.ndarray]:
     time = np.arange(round(seconds * RATE)) / RATE
-    size = _smoothstep(time / START_SECONDS)
+    size = smoothstep(time / START_SECONDS)
     if stop is not None:
-        size *= 1.0 - _smoothstep((time - stop) / STOP_SECONDS)
+        size *= 1.0 - smoothstep((time - stop) / STOP_SECONDS)
     phase = stride_phase(stride, pace * size)
     angles = gait_angles(stride, phase, size)
     if stop is not None:
@@ -90,8 +90,8 @@ def _gait(stride: Stride, seconds: float, pace: float, stop: float | None) -> tu
 
 def _brake(angles: dict[str, np.ndarray], since: np.ndarray) -> None:
     """Knees give way, the trunk tips forward and comes back, the arms fly forward: since (T,) [s]."""
-    give = _smoothstep(since / 0.3) * (1.0 - _smoothstep((since - 0.4) / 0.7))
-    follow = _smoothstep((since - 0.05) / 0.25) * (1.0 - _smoothstep((since - 0.3) / 0.6))
+    give = smoothstep(since / 0.3) * (1.0 - smoothstep((since - 0.4) / 0.7))
+    follow = smoothstep((since - 0.05) / 0.25) * (1.0 - smoothstep((since - 0.3) / 0.6))
     angles["pelvis_pitch"] += 10.0 * give
     angles["trunk_flexion"] += 20.0 * follow
     angles["head_pitch"] -= 22.0 * follow
@@ -100,8 +100,3 @@ def _brake(angles: dict[str, np.ndarray], since: np.ndarray) -> None:
         angles[f"{side}_knee_flexion"] += 58.0 * give
         angles[f"{side}_arm_flexion"] += 45.0 * follow
         angles[f"{side}_elbow_flexion"] += 20.0 * follow
-
-
-def _smoothstep(s: np.ndarray) -> np.ndarray:
-    s = np.clip(s, 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from snug.motions.gait import WALK, gait_angles, gait_flights, gait_support, stride_phase
-from snug.motions.posture import RATE, SPINE_SHARES, poses_from_angles, root_path
+from snug.motions.posture import RATE, SPINE_SHARES, poses_from_angles, root_path, smoothstep
 from snug.skeleton import JOINT, axis_angles, rotation_matrices
 
 FPS = 30.0
@@ -40,7 +40,7 @@ class Twist:
         """poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS, feet on the floor."""
         time = np.arange(round(self.stop * FPS) + 1 + HELD) / FPS
         time = np.minimum(time, round(self.stop * FPS) / FPS)
-        yaw = self.degrees * np.sin(2 * np.pi * self.hertz * time) * _smoothstep(time / ONSET)
+        yaw = self.degrees * np.sin(2 * np.pi * self.hertz * time) * smoothstep(time / ONSET)
         sided = {
             f"{side}_{name}": np.array(value) for side in ("left", "right") for name, value in STANCE.items()
         }
@@ -65,7 +65,7 @@ class TurningWalk:
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
         """poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS."""
         time = np.arange(round(self.stop * RATE) + 1) / RATE
-        size = _smoothstep(time / 0.7)
+        size = smoothstep(time / 0.7)
         phase = stride_phase(WALK, self.pace * size)
         angles = gait_angles(WALK, phase, size)
         angles["pelvis_yaw"] = angles["pelvis_yaw"] + self.degrees * size * np.sin(
@@ -86,11 +86,6 @@ def _turn(poses: np.ndarray, joint: str, degrees: np.ndarray) -> None:
     """Yaw (T,) of one joint before the rotation that it has."""
     yaw = Rotation.from_euler("y", degrees[:, None], degrees=True).as_matrix()
     poses[:, JOINT[joint]] = axis_angles(yaw @ rotation_matrices(poses[:, JOINT[joint]]))
-
-
-def _smoothstep(s: np.ndarray) -> np.ndarray:
-    s = np.clip(s, 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 # Signs, phases and amplitudes of the stops differ; the last two are for tests alone.
