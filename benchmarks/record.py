@@ -77,13 +77,13 @@ class Record:
             self.folder.write_config(self.config)
 
     def write_rows(self) -> None:
-        """results.csv with the rows so far."""
-        self.rows = with_provenance(
-            self.rows,
-            preset=self.plan.preset.name,
-            commit=self.commit,
-            hardware=provenance.hardware_line(self.hardware),
-        )
+        """results.csv with the rows so far. Of all that is measured training alone uses an accelerator."""
+        everything = provenance.hardware_line(self.hardware)
+        processor = provenance.hardware_line(self.hardware | {"accelerator": None})
+        self.rows = [
+            dataclasses.replace(row, hardware=everything if row.metric == "cost/train" else processor)
+            for row in with_provenance(self.rows, preset=self.plan.preset.name, commit=self.commit)
+        ]
         self.folder.write_rows(self.rows)
 
 

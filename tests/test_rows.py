@@ -7,13 +7,16 @@ import dataclasses
 import numpy as np
 import pytest
 
+from benchmarks import provenance
 from benchmarks.cell import Outcome, frames_computed, judge
 from benchmarks.clock import Reading
 from benchmarks.closing import remarks, summary
 from benchmarks.curves import REMARK
 from benchmarks.methods import METHODS
 from benchmarks.named_metrics import UNITS, unit_of
-from benchmarks.plan import Cell
+from benchmarks.plan import Cell, Plan
+from benchmarks.presets import find_preset
+from benchmarks.record import Record
 from benchmarks.results import Row
 from benchmarks.rows import rows_of
 from benchmarks.scenes import SMALL_SCENES, dressed_scene
@@ -132,3 +135,17 @@ def test_the_remarks_name_repeats_that_lie_apart_gaps_that_rise_and_what_is_out_
     assert said[0].startswith("3 results") and said[1] == "flag x snug: kept though preset changed"
     assert said[2].endswith("flag x lbfgs-5 (31 %)") and said[3].endswith("flag x vbd-20")
     assert remarks([base], 0, {}) == []
+
+
+def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch):
+    facts = {"processor": "a processor", "cores": 2, "device": "cuda", "accelerator": "a GPU"}
+    monkeypatch.setattr(provenance, "hardware", lambda device: facts)
+    record = Record(
+        Plan(preset=find_preset("smoke"), suites=(), cells=(), checks=(), cases=(), train=(), test=(),
+             seeds=(0,), device="cuda", folder=tmp_path, command="")
+    )  # fmt: skip
+    metrics = ("cost/train", "cost/frame")
+    record.rows = [Row("garments", "dressed/kick", "snug", 0, metric, "s", 1.0) for metric in metrics]
+    record.write_rows()
+    found = {row.metric: row.hardware for row in record.folder.read_rows()}
+    assert found == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
