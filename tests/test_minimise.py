@@ -10,6 +10,7 @@ from meshes import grid, patch, random_rotation
 from reference_sim import GRAVITY, Cloth, Material, Potential, Result, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchSpring, StretchStVK
 from reference_sim.minimise import METHODS, STATUSES, make_minimiser
+from reference_sim.minimise.newton import Run
 
 both = pytest.mark.parametrize("method", METHODS)
 TOLERANCE = 1e-6  # [vertex weights], the default that a result promises
@@ -317,6 +318,16 @@ def test_lbfgs_and_its_finish_share_iterations_and_clock(monkeypatch):
     cut = minimise(potential, x0, "lbfgs", patience=10, switch=1e-6, timeout=90)
     assert cut.status == "timeout" and cut.iterations > 10
     assert next(ticks) < 90 + 40
+
+
+def test_an_excursion_ends_when_time_is_up(monkeypatch):
+    """A sheet 1e4 times as stiff as cotton goes up to 40 steps before it looks back."""
+    cloth = Cloth(SHEET, FACES, Material(young_modulus=7e8), pins=[0, 8])
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)])
+    x0 = SHEET + 1e-4 * np.random.default_rng(0).standard_normal(SHEET.shape)
+    monkeypatch.setattr(Run, "late", lambda self, timeout: self.iterations >= 60)
+    result = minimise(potential, x0)
+    assert result.status == "timeout" and result.iterations <= 61
 
 
 def test_unknown_names_are_refused():

@@ -229,9 +229,10 @@ class Run(Descent):
                 self.rung, self.climbed = rung, rung > first
                 self.patience = EXCURSION
                 return True
-            if k < patience:
-                p, rung = self.direction(self.assemble(rung), rung)
-                self.iterations += 1
+            if k == patience or self.late(self.n.timeout):
+                break
+            p, rung = self.direction(self.assemble(rung), rung)
+            self.iterations += 1
         self.potential.forget()
         self.foreseeing = False
         self.patience = self.patience // 2 if bold else EXCURSION
