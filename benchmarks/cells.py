@@ -82,10 +82,12 @@ class Cells:
         for number in range(1, rounds):
             turn = number * len(cells) // rounds
             for cell in (*cells[turn:], *cells[:turn]):
-                again = self._once_more(cell, number)
+                before, again = outcomes[cell], self._once_more(cell, number)
                 if again.status == "ok":
-                    before = outcomes[cell]
                     outcomes[cell] = dataclasses.replace(before, seconds=(*before.seconds, *again.seconds))
+                else:  # what the first run left stands, but not without a word
+                    reason = before.reason or f"repeat {number}: {again.status}: {again.reason}"
+                    outcomes[cell] = dataclasses.replace(before, reason=reason)
         for cell in cells:
             if cell in self._idle:
                 self._idle.pop(cell).close()

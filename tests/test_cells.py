@@ -220,6 +220,18 @@ def test_repeats_take_turns_and_are_kept(tmp_path, misbehaving, monkeypatch):
     assert harness(plan).all(obstacle=lambda cell: None, bar=no_bar) == repeated
 
 
+def test_a_repeat_that_fails_is_said_on_the_rows(tmp_path, misbehaving, monkeypatch):
+    misbehaving("still")
+    plan = plan_of(tmp_path, "newton-1", preset=dataclasses.replace(TINY, repeats=2, repeat_seconds=60.0))
+    cells = harness(plan)
+    crowd = Outcome(plan.cells[0], "failed", "more than one thread", (0.1,))
+    monkeypatch.setattr(cells, "_once_more", lambda cell, number: crowd)
+    (outcome,) = cells.all(obstacle=lambda cell: None, bar=no_bar)
+    assert outcome.status == "ok" and len(outcome.seconds) == 1
+    reasons = {row.reason for row in rows_of(outcome, clock_costs(outcome))}
+    assert reasons == {"repeat 1: failed: more than one thread"}
+
+
 def test_repeats_that_lie_apart_carry_a_remark(tmp_path):
     cell = plan_of(tmp_path, "simulation").cells[0]
     wide, near = (Outcome(cell, "ok", seconds=s, frames=1, recorded=True) for s in ((1.0, 1.5), (1.0, 1.1)))
