@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
+from .clock import one_thread
 from .plan import (
     MEETINGS,
     Motions,
@@ -92,8 +93,8 @@ def make_parser() -> argparse.ArgumentParser:
         "stale,missing; the finished is reused)")  # fmt: skip
     add("--fresh", action="store_true", help="reuse nothing from the folder")
     add("--workers", type=int, metavar="N",
-        help="processes side by side for ground truth, training and metrics (default 2, or the cores there "
-        "are); cells always run alone")  # fmt: skip
+        help="processes side by side for ground truth, training, metrics and studies (default 2, or the "
+        "cores there are); cells always run alone")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
     add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
     return parser
@@ -102,10 +103,7 @@ def make_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    # One thread for everything, whatever the shell says: times are comparable, every row states it, and two
-    # workers do not fight over two cores. Set before anything reads it.
-    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[name] = "1"
+    one_thread()
     try:
         options = make_parser().parse_args(words)
         if options.list:

@@ -379,8 +379,14 @@ def test_the_long_roll_out_is_the_short_one_carried_on(stage, walk, monkeypatch)
 
 def test_without_networks_the_reader_is_told(tmp_path, monkeypatch):
     asked = []
-    monkeypatch.setattr(workers, "run_jobs", lambda jobs, *_, **__: asked.extend(jobs) or [[] for _ in jobs])
-    (row,) = hard_motions.rows(plan_of(tmp_path), RunFolder(tmp_path), None)
+
+    def run_jobs(jobs, *_, workers, **__):
+        assert workers == 5
+        asked.extend(jobs)
+        return [[] for _ in jobs]
+
+    monkeypatch.setattr(workers, "run_jobs", run_jobs)
+    (row,) = hard_motions.rows(plan_of(tmp_path, workers=5), RunFolder(tmp_path), None)
     assert row.status == "skipped" and "no trained network" in row.reason
     assert [job.label for job in asked] == [case.name for case in HARD_MOTIONS if case.smoke]
 

@@ -52,7 +52,7 @@ SIZES = {
 
 
 def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
-    """All meshes and time steps, two at a time; the wardrobe of the run is not looked at."""
+    """All meshes and time steps, some at a time; the wardrobe of the run is not looked at."""
     from ..workers import Failure, Job, run_jobs
 
     sizes = SIZES[plan.preset.name]
@@ -65,7 +65,8 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
         for name, n, steps in sorted(todo, key=lambda job: -job[1] * sum(job[2]))
     ]
     found: list[Row] = []
-    for job, result in zip(jobs, run_jobs(jobs, wardrobe, title="dependence", unit="vertex")):
+    ended = run_jobs(jobs, wardrobe, title="dependence", unit="vertex", workers=plan.workers)
+    for job, result in zip(jobs, ended):
         if isinstance(result, Failure):
             scene, reason = f"dependence/{job.label}", result.reason
             found.append(Row("validation", scene, "simulation", 0, "study", "", None, "failed", reason))

@@ -42,7 +42,7 @@ NO_NETWORK = "no trained network in this run: run suite garments with this one"
 
 
 def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
-    """Every case, two at a time. Without trained networks the simulator and skinning do them alone."""
+    """Every case, some at a time. Without trained networks the simulator and skinning do them alone."""
     from ..workers import Failure, Job, run_jobs
 
     networks = trained(plan, folder)
@@ -51,7 +51,8 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     if networks:
         jobs.append(Job("long", do_long, (plan.preset, networks), 1))
     found: list[Row] = []
-    for job, result in zip(jobs, run_jobs(jobs, wardrobe, title="hard motions", unit="case")):
+    ended = run_jobs(jobs, wardrobe, title="hard motions", unit="case", workers=plan.workers)
+    for job, result in zip(jobs, ended):
         if isinstance(result, Failure):
             found.append(
                 _row(_scene(job.label), REFERENCE, 0, "motion/strain", None, "failed", result.reason)
