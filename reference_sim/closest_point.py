@@ -20,9 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from .group_search import search
+
 LEAF = 4  # faces in a leaf, at most
-SLIVER = 1e-3  # squared sine of a triangle's first angle, below which all of its sides are tried
-ROUND_OFF = 1e-14  # of lengths: some fifty times that of float64
+HALVINGS = 6  # of the longest side, for samples that nothing is remembered of
 
 
 @dataclass(frozen=True)
@@ -56,11 +57,12 @@ class FaceTree:
         _enclose(self._centroids[:, None], self._starts, self._rest_boxes)
         self._corners = np.empty((len(faces), 3, 3), centroids.dtype)
         self._boxes = np.empty_like(self._rest_boxes)
+        self._discs = np.empty((len(faces), 4))  # centre and radius of what holds each face
 
     def refit(self, positions: np.ndarray) -> None:
         """Take the mesh to positions (B, 3) [m]."""
         positions = np.ascontiguousarray(positions, self._corners.dtype)
-        _gather(positions, self._vertices, self._corners)
+        _gather(positions, self._vertices, self._corners, self._discs)
         _enclose(self._corners, self._starts, self._boxes)
 
     def nearest(
@@ -84,12 +86,12 @@ class FaceTree:
             rest_points, region = points, np.inf
         points, rest_points = (np.ascontiguousarray(x, self._corners.dtype) for x in (points, rest_points))
         faces = np.full(len(points), -1) if hints is None else np.array(hints, np.int64)
-        # Neighbours one after another: they visit the same boxes, which saves a sixth.
-        sequence = np.argsort(self._place[faces])
+        # Neighbours one after another: they visit the same boxes, and do so together.
+        sequence = np.argsort(self._place[faces]) if hints is not None else _by_cells(points)
         barycentric, closest = np.empty((len(points), 3)), np.empty((len(points), 3))
-        _search(
-            points, rest_points, float(region), float(exact), self._corners, self._centroids, self._boxes,
-            self._rest_boxes, self._starts, self._order, self._place, self._ascending, sequence,
+        search(
+            points, rest_points, float(region), float(exact), self._corners, self._discs, self._centroids,
+            self._boxes, self._rest_boxes, self._starts, self._order, self._place, self._ascending, sequence,
             faces, barycentric, closest,
         )  # fmt: skip
         return Closest(faces, barycentric, closest)
@@ -110,12 +112,31 @@ def _halved(centroids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return order, starts
 
 
+def _by_cells(points: np.ndarray) -> np.ndarray:
+    """Points (S, 3) in the order (S,) of cells of a grid, halved again and again like the faces."""
+    side = max(float(np.ptp(points, axis=0).max()), 1e-30)
+    with np.errstate(invalid="ignore"):  # whoever asks for NaN gets some face
+        cells = ((points - points.min(axis=0)) / side * (2**HALVINGS - 1)).astype(np.int64)
+    bits, axes = np.arange(HALVINGS), np.arange(3)[:, None]
+    return np.argsort((((cells[:, :, None] >> bits) & 1) << (3 * bits + axes)).sum(axis=(1, 2)))
+
+
 @njit(cache=True)
-def _gather(positions, vertices, corners):
+def _gather(positions, vertices, corners, discs):
     for place in range(len(vertices)):
-        for a in range(3):
-            for i in range(3):
+        for i in range(3):
+            centre = 0.0
+            for a in range(3):
                 corners[place, a, i] = positions[vertices[place, a], i]
+                centre += corners[place, a, i]
+            discs[place, i] = centre / 3.0
+        largest = 0.0
+        for a in range(3):
+            squared = 0.0
+            for i in range(3):
+                squared += (corners[place, a, i] - discs[place, i]) ** 2
+            largest = max(largest, squared)
+        discs[place, 3] = np.sqrt(largest)
 
 
 @njit(cache=True)
@@ -135,170 +156,3 @@ def _enclose(points, starts, boxes):
         for i in range(3):
             boxes[node, 0, i] = min(first[0, i], second[0, i])
             boxes[node, 1, i] = max(first[1, i], second[1, i])
-
-
-@njit(cache=True)
-def _box_distance(boxes, node, x, y, z):
-    """Squared distance from a point to a box."""
-    dx = max(boxes[node, 0, 0] - x, x - boxes[node, 1, 0], 0.0)
-    dy = max(boxes[node, 0, 1] - y, y - boxes[node, 1, 1], 0.0)
-    dz = max(boxes[node, 0, 2] - z, z - boxes[node, 1, 2], 0.0)
-    return dx * dx + dy * dy + dz * dz
-
-
-@njit(cache=True, error_model="numpy")
-def _on_side(corners, place, a, b, x, y, z):
-    """Share of the side from corner a to b at which it comes closest to a point; distance squared.
-
-    The same bits for every face that has the side, and the same for every side that ends in the corner.
-    """
-    a0, a1, a2 = corners[place, a, 0], corners[place, a, 1], corners[place, a, 2]
-    b0, b1, b2 = corners[place, b, 0], corners[place, b, 1], corners[place, b, 2]
-    r0, r1, r2 = x - a0, y - a1, z - a2
-    s0, s1, s2 = np.float64(b0) - a0, np.float64(b1) - a1, np.float64(b2) - a2
-    along, length = s0 * r0 + s1 * r1 + s2 * r2, s0 * s0 + s1 * s1 + s2 * s2
-    if along <= 0.0:
-        return 0.0, r0 * r0 + r1 * r1 + r2 * r2
-    if along >= length:
-        r0, r1, r2 = x - b0, y - b1, z - b2
-        return 1.0, r0 * r0 + r1 * r1 + r2 * r2
-    share = along / length
-    q0, q1, q2 = r0 - share * s0, r1 - share * s1, r2 - share * s2
-    return share, q0 * q0 + q1 * q1 + q2 * q2
-
-
-@njit(cache=True, error_model="numpy")
-def closest_on_triangle(corners, place, x, y, z):
-    """Of triangle corners[place] and a point: weights v, w of the second and third corner at the closest
-    point, and the squared distance to it.
-
-    The foot of the perpendicular, where it lies inside; else the best of the sides that the foot is beyond,
-    one of which holds the closest point. Of a sliver, whose foot is too inexact to tell, all sides.
-    """
-    o0, o1, o2 = corners[place, 0, 0], corners[place, 0, 1], corners[place, 0, 2]
-    r0, r1, r2 = x - o0, y - o1, z - o2
-    s0, s1, s2 = (
-        np.float64(corners[place, 1, 0]) - o0,
-        np.float64(corners[place, 1, 1]) - o1,
-        np.float64(corners[place, 1, 2]) - o2,
-    )
-    t0, t1, t2 = (
-        np.float64(corners[place, 2, 0]) - o0,
-        np.float64(corners[place, 2, 1]) - o1,
-        np.float64(corners[place, 2, 2]) - o2,
-    )
-    ss, tt, st = s0 * s0 + s1 * s1 + s2 * s2, t0 * t0 + t1 * t1 + t2 * t2, s0 * t0 + s1 * t1 + s2 * t2
-    sr, tr = s0 * r0 + s1 * r1 + s2 * r2, t0 * r0 + t1 * r1 + t2 * r2
-    det, v, w = ss * tt - st * st, tt * sr - st * tr, ss * tr - st * sr
-    u = det - v - w
-    best, best_v, best_w = np.inf, 0.0, 0.0
-    sliver = not det > SLIVER * ss * tt
-    if det > 0.0 and u >= 0.0 and v >= 0.0 and w >= 0.0:
-        best_v, best_w = v / det, w / det
-        q0 = r0 - best_v * s0 - best_w * t0
-        q1 = r1 - best_v * s1 - best_w * t1
-        q2 = r2 - best_v * s2 - best_w * t2
-        best = q0 * q0 + q1 * q1 + q2 * q2
-        if not sliver:
-            return best_v, best_w, best
-    if w < 0.0 or sliver:
-        share, distance = _on_side(corners, place, 0, 1, x, y, z)
-        if distance < best:
-            best, best_v, best_w = distance, share, 0.0
-    if v < 0.0 or sliver:
-        share, distance = _on_side(corners, place, 0, 2, x, y, z)
-        if distance < best:
-            best, best_v, best_w = distance, 0.0, share
-    if u < 0.0 or sliver:
-        share, distance = _on_side(corners, place, 1, 2, x, y, z)
-        if distance < best:
-            best, best_v = distance, 1.0 - share
-            best_w = 1.0 - best_v  # so that the first weight, 1 - v - w, is exactly zero
-    return best_v, best_w, best
-
-
-@njit(cache=True, error_model="numpy")
-def _search(
-    points, rest_points, region, exact, corners, centroids, boxes, rest_boxes, starts, order, place,
-    ascending, sequence, faces, barycentric, closest,
-):  # fmt: skip
-    """faces (S,) come in as hints and go out as answers."""
-    stack, bounds = np.empty(64, np.int64), np.empty(64)
-    for s in sequence:
-        hint = place[faces[s]] if faces[s] >= 0 else -1
-        k, v, w = _best_place(
-            points[s], rest_points[s], region, exact, hint, corners, centroids, boxes, rest_boxes, starts,
-            order, stack, bounds,
-        )  # fmt: skip
-        if k < 0 and region < np.inf:
-            k, v, w = _best_place(
-                points[s], rest_points[s], np.inf, exact, hint, corners, centroids, boxes, rest_boxes, starts,
-                order, stack, bounds,
-            )  # fmt: skip
-        u = max(1.0 - v - w, 0.0)
-        faces[s] = order[k]
-        barycentric[s, ascending[k, 0]] = u
-        barycentric[s, ascending[k, 1]], barycentric[s, ascending[k, 2]] = v, w
-        for i in range(3):
-            closest[s, i] = u * corners[k, 0, i] + v * corners[k, 1, i] + w * corners[k, 2, i]
-
-
-@njit(cache=True, error_model="numpy")
-def _best_place(
-    point, home, region, exact, hint, corners, centroids, boxes, rest_boxes, starts, order, stack, bounds
-):  # fmt: skip
-    """Where in the order of the leaves the closest allowed face is, -1 for none, and its weights v, w."""
-    x, y, z = np.float64(point[0]), np.float64(point[1]), np.float64(point[2])
-    hx, hy, hz = np.float64(home[0]), np.float64(home[1]), np.float64(home[2])
-    limit, inner, size = region * region, len(starts) - 2, 0.0
-    for i in range(3):
-        size += np.float64(boxes[0, 1, i]) - boxes[0, 0, i]
-    best, reach, answer, best_v, best_w = np.inf, np.inf, -1, 0.0, 0.0
-    if hint >= 0 and _squared(centroids, hint, hx, hy, hz) <= limit:
-        best_v, best_w, best = closest_on_triangle(corners, hint, x, y, z)
-        reach, answer = _reach(best, size, exact), hint
-    stack[0], bounds[0], depth = 0, _box_distance(boxes, 0, x, y, z), 1
-    while depth > 0:
-        depth -= 1
-        node = stack[depth]
-        if bounds[depth] > reach or _box_distance(rest_boxes, node, hx, hy, hz) > limit:
-            continue
-        if node < inner:
-            near, other = 2 * node + 1, 2 * node + 2
-            to_near, to_other = _box_distance(boxes, near, x, y, z), _box_distance(boxes, other, x, y, z)
-            if to_other < to_near:
-                near, other, to_near, to_other = other, near, to_other, to_near
-            if to_other <= reach:
-                stack[depth], bounds[depth] = other, to_other
-                depth += 1
-            if to_near <= reach:
-                stack[depth], bounds[depth] = near, to_near
-                depth += 1
-            continue
-        for k in range(starts[node - inner], starts[node - inner + 1]):
-            if k == hint or _squared(centroids, k, hx, hy, hz) > limit:
-                continue
-            v, w, distance = closest_on_triangle(corners, k, x, y, z)
-            if distance < best or (distance == best and order[k] < order[answer]):
-                best, best_v, best_w, answer = distance, v, w, k
-                reach = _reach(best, size, exact)
-    return answer, best_v, best_w
-
-
-@njit(cache=True)
-def _squared(points, k, x, y, z):
-    """Squared distance between points."""
-    dx, dy, dz = points[k, 0] - x, points[k, 1] - y, points[k, 2] - z
-    return dx * dx + dy * dy + dz * dz
-
-
-@njit(cache=True)
-def _reach(squared, size, exact):
-    """Squared distance beyond which nothing is of use, once something is found at `squared`.
-
-    size: of the mesh, for the round-off in the distances to boxes and faces.
-    """
-    distance = np.sqrt(squared)
-    if distance > exact:
-        distance = max(exact, 0.5 * distance)
-    return (distance + ROUND_OFF * (distance + size)) ** 2

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from meshes import grid, random_rotation, sphere
 
-from reference_sim.closest_point import FaceTree, closest_on_triangle
+from reference_sim.closest_point import FaceTree
+from reference_sim.group_search import GROUP
 from reference_sim.obstacle import vertex_normals
+from reference_sim.triangle import closest_on_triangle
 
 
 def soup(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -159,6 +161,19 @@ def test_a_refitted_tree_answers_as_one_built_for_the_pose():
         found, fresh = tree.nearest(points), tree_of(moved, faces).nearest(points)
         assert (found.faces == fresh.faces).all() and (found.points == fresh.points).all()
     assert_closest(tree, moved, points)
+
+
+@pytest.mark.parametrize("count", [1, GROUP - 1, GROUP, GROUP + 1])
+def test_company_changes_nothing(count):
+    """Samples are searched in groups: each gets what it would alone, with hints or without, in any order."""
+    positions, faces = mesh("sphere")
+    tree, points = tree_of(positions, faces), samples(positions, faces)
+    home, hints = points[::-1], np.where(np.arange(len(points)) % 3, np.arange(len(points)) % len(faces), -1)
+    whole = tree.nearest(points, rest_points=home, region=0.8)
+    chosen = np.random.default_rng(8).permutation(len(points))[:count]
+    for some in (None, hints[chosen]):
+        found = tree.nearest(points[chosen], rest_points=home[chosen], region=0.8, hints=some)
+        assert (found.faces == whole.faces[chosen]).all() and (found.points == whole.points[chosen]).all()
 
 
 def test_the_direction_of_a_thin_gap_is_kept():
