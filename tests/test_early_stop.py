@@ -57,6 +57,16 @@ def test_value_is_the_energy_of_the_roll_out():
     assert value == pytest.approx(total / HELD.frames, rel=1e-3)
 
 
+def test_a_later_value_is_as_exact_as_the_first():
+    made = trainer()
+    kept = Validator(made, Validation(motions=[HELD]))
+    kept.value()
+    for number in range(30):
+        made.step(number)
+    fresh = Validator(made, Validation(motions=[HELD]))
+    assert kept.value() == pytest.approx(fresh.value(), rel=1e-5)
+
+
 def test_best_weights_are_kept_and_patience_ends_training():
     made = trainer(steps=60)
     run = TrainingRun(made, every=4, validation=Validation(motions=[HELD], every=4, patience=3))
