@@ -10,10 +10,11 @@ import argparse
 import csv
 import json
 import multiprocessing
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from ..clock import one_thread
 
 PARTS = {
     "sheet": "64 x 64 sheet pinned at two corners, 30 frames: ms a frame, convergence, where the time goes",
@@ -56,6 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         print(f"benchmarks.solver_speed: {wrong}", file=sys.stderr)
         return 2
+    one_thread()
     rows: list[dict[str, object]] = []
     failed = False
     for name in parts:
@@ -118,7 +120,7 @@ def _write(folder: Path, rows: list[dict[str, object]]) -> None:
         "commit": commit(),
         "hardware": hardware(),
         "versions": versions(),
-        "threads": os.environ.get("OMP_NUM_THREADS", "all"),
+        "threads": 1,
     }
     with replacing(folder / "solver_speed.json") as path:
         path.write_text(json.dumps(facts, indent=2) + "\n")
