@@ -19,7 +19,6 @@ from .named_metrics import Reference, against, contact, rms, shape
 from .results import RunFolder
 
 if TYPE_CHECKING:
-
     from .scene import BuiltScene
 
 REFERENCE = "simulation"

@@ -18,6 +18,7 @@ from .wardrobe import Wardrobe
 if TYPE_CHECKING:
     from .workers import Tell
 
+
 @dataclass(frozen=True)
 class Settled:
     """A garment at its start: seconds of wall time. files: of the start and the posed body, in the folder."""

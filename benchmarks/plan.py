@@ -247,9 +247,7 @@ def choose_cells(
     return tuple(cells), checks, cases
 
 
-def choose_studies(
-    suites: Sequence[str], scenes: Sequence[str], methods: Sequence[str]
-) -> tuple[Study, ...]:
+def choose_studies(suites: Sequence[str], scenes: Sequence[str], methods: Sequence[str]) -> tuple[Study, ...]:
     """The studies of the suites, chosen by name as scenes are."""
     known = [study for study in STUDIES if study.suite in suites]
     return _matching(known, scenes, _named(STUDIES_METHOD, methods))

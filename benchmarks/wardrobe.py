@@ -50,9 +50,7 @@ class Wardrobe:
         return self.body.vertices(motion.poses, motion.translations) if ready is None else ready
 
 
-def open_wardrobe(
-    preset: Preset, motions: Iterable[Motion], garments: Iterable[str] = (TSHIRT,)
-) -> Wardrobe:
+def open_wardrobe(preset: Preset, motions: Iterable[Motion], garments: Iterable[str] = (TSHIRT,)) -> Wardrobe:
     """Load the body, tailor these garments and no other; motions are cut to the preset's length.
 
     The liveliest part of each is there too, under a name of its own: see clips.
