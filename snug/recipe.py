@@ -78,7 +78,7 @@ class Recipe:
     detached: bool = False
     swing: float = 0.0
     swing_components: int = 128
-    rehearsal: int = 300
+    rehearsal: int = 150
     spike: float = 2.0
     gradient_limit: float = 1.0
 
