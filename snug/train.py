@@ -199,6 +199,8 @@ def _train_one(
     if options.resume and out.is_file() and not saving.path.is_file():
         say(f"{out}: is there, and no checkpoint beside it; nothing to resume")
         return
+    if saving.path.is_file() and not options.resume:
+        say(f"note: {saving.path} of a stopped run will be replaced; --resume would go on with it")
     body, pattern = garment
     dressed = DressedBody(body, pattern.tailor(body, vertices=options.vertices))
     frames = sum(motion.frames for motion in motions)

@@ -185,6 +185,8 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     assert module.main(words) == 130
     assert "step 1 of 8" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["small.checkpoint.safetensors"]
+    assert module.main(words[:-1]) == 130  # without --resume: from the beginning, but not without a word
+    assert "small.checkpoint.safetensors of a stopped run will be replaced" in capsys.readouterr().out
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: False)
     with monkeypatch.context() as full:
         full.setattr(TrainedModel, "save", no_space)
