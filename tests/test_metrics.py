@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import time
 
 import numpy as np
 import pytest
@@ -197,6 +199,15 @@ def test_hem_drift_follows_the_hem_against_the_pelvis():
     x = np.zeros((3, 4, 3))
     x[:, 2:, 1] = np.array([0.5, 0.6, 0.8])[:, None]
     assert hem_drift(x, np.array([2, 3]), np.array([1.0, 1.1, 1.1])) == pytest.approx(0.2, abs=1e-15)
+
+
+def test_a_gap_is_the_same_however_slow_the_machine_is(monkeypatch):
+    scene = hanging_sheet.build("hanging_sheet", dataclasses.replace(find_preset("smoke"), sheet_cells=4))
+    x = np.array([scene.start + 0.02 * k**2 for k in range(4)])
+    quick = optimality(scene, x, samples=1).metrics()
+    clock = itertools.count(0.0, 60.0)
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+    assert optimality(scene, x, samples=1).metrics() == quick
 
 
 def test_the_gap_is_taken_to_the_lowest_minimum_found():

@@ -32,7 +32,7 @@ from .energy import FIRST_FULL_FRAME
 if TYPE_CHECKING:
     from ..scene import BuiltScene
 
-TIMEOUT = 20.0  # [s] for one minimisation
+ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
 FINDERS = ("simulator", "newton", "from_frame", "frame")
 ALIKE = 1e-9  # of the denominator: minima this near are one
 
@@ -77,7 +77,8 @@ def optimality(
     if len(positions) <= FIRST_FULL_FRAME:
         return found
     potential = Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
-    newton, both = Newton(potential, timeout=TIMEOUT), LBFGS(potential, timeout=TIMEOUT)
+    newton = Newton(potential, max_iterations=ITERATIONS)
+    both = LBFGS(potential, max_iterations=ITERATIONS)
     frames = np.unique(np.linspace(FIRST_FULL_FRAME, len(positions) - 1, samples).round().astype(int))
     for frame in frames:
         x, previous = np.ascontiguousarray(positions[frame]), positions[frame - 1]
