@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import resource
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+
+from ..cell import peak_memory
 
 Row = tuple[str, object, str]  # metric, value, unit
 
@@ -17,5 +18,4 @@ def report(part: str, case: str, repeats: int, sender: Connection) -> None:
         rows = measure(case, repeats)
     except Exception as error:
         rows = [("failed", " ".join(f"{type(error).__name__}: {error}".split()), "")]
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    sender.send([*rows, ("peak memory of the process", peak, "MB")])
+    sender.send([*rows, ("peak memory of the process", peak_memory(), "MB")])
