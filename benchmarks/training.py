@@ -60,7 +60,9 @@ def train_network(
     from .methods.networks import model_path
 
     torch.set_num_threads(1)
-    name, seed = network.name, network.seed
+    name, seed, run = network.name, network.seed, RunFolder(folder)
+    path = model_path(run.models_of(network.garment), name, seed)
+    path.unlink(missing_ok=True)  # if this training fails, no study is to take an earlier one's model for it
     dressed = DressedBody(wardrobe.body, wardrobe.garments[network.garment])
     clips = wardrobe.named(motions)
     if name == "untrained":
@@ -81,8 +83,6 @@ def train_network(
             training.kind, dressed, clips, steps=steps, seed=seed, trajectories=targets,
             recipe=training.recipe, log=log, progress=False, every=LOG_EVERY, device=device,
         )  # fmt: skip
-    run = RunFolder(folder)
-    path = model_path(run.models_of(network.garment), name, seed)
     model.save(path)
     return Trained(
         kind=name,

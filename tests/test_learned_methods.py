@@ -6,9 +6,13 @@ import pytest
 
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
+from benchmarks.methods.networks import model_path
+from benchmarks.plan import Network
 from benchmarks.presets import PRESETS, find_preset
+from benchmarks.results import RunFolder
 from benchmarks.run import make_parser, make_plan
 from benchmarks.suites import garments
+from benchmarks.training import train_network
 from snug.recipe import ABLATIONS, RECIPES, TERMS, TRAININGS
 
 
@@ -53,6 +57,16 @@ def test_what_is_cleaned_up_is_a_row_of_its_own_over_the_same_network(tmp_path):
     assert cleaned.trained == find_method("snug").trained
     chosen = plan("-o", str(tmp_path), "--methods", "snug,snug+cleanup", "--seeds", "0,1")
     assert chosen.models == (("snug", 0), ("snug", 1))
+
+
+def test_a_training_that_fails_leaves_no_earlier_model_behind(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.models.mkdir()
+    path = model_path(folder.models, "snug", 0)
+    path.touch()
+    with pytest.raises(AttributeError):
+        train_network(None, print, Network("snug", 0), 2, {}, tmp_path, "cpu")  # there is no body to dress
+    assert not path.exists()
 
 
 def test_each_ablation_differs_from_the_default_in_what_its_name_says():
