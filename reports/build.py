@@ -47,11 +47,12 @@ def build_report(run_dir: str | Path, *, opengl: bool = True) -> tuple[Path, lis
 
 def draw(run: RunFolder, rows: Sequence[Row], problems: list[str], *, opengl: bool) -> list[Picture]:
     """Every figure that the run holds something for."""
-    from reports import break_even, figures, profile, render, stability, training, work_precision
+    from reports import break_even, figures, hem, profile, render, stability, training, work_precision
 
     dressed = dressed_trajectories(run, rows, problems)
     pictures = render.side_by_side(run.figures, dressed, opengl=opengl)
     series = [figures.energy_series(run.figures, kept.scene, kept.series) for kept in dressed]
+    series += [hem.hem_curves(run.figures, kept.scene, kept.series) for kept in dressed]
     pictures += [picture for picture in series if picture is not None]
     pictures += work_precision.error_against_time(run.figures, rows)
     pictures += profile.performance_profile(run.figures, rows)
@@ -86,7 +87,7 @@ def draw_axes(run: RunFolder, x: str, y: str, scenes: str | None) -> Path:
 def dressed_trajectories(run: RunFolder, rows: Sequence[Row], problems: list[str]) -> list[Dressed]:
     """The trajectories on disk of each dressed scene, and its body; a broken file becomes a problem."""
     from reports.render import Dressed
-    from reports.summary import Measurements, dressed_scenes, suite_rows
+    from reports.summary import Measurements, suite_rows, worn_scenes
     from reports.vtkhdf import MeshFileError, MeshSeries, read_series
 
     def opened(path: Path) -> MeshSeries | None:
@@ -98,7 +99,7 @@ def dressed_trajectories(run: RunFolder, rows: Sequence[Row], problems: list[str
 
     measured = Measurements(suite_rows(rows, "garments"))
     found = []
-    for scene in dressed_scenes(measured):
+    for scene in worn_scenes(measured):
         seeds = {row.method: row.seed for row in reversed(rows) if row.scene == scene}
         series = {m: opened(run.trajectory_path(scene, m, seeds[m])) for m in measured.methods if m in seeds}
         kept = {method: mesh for method, mesh in series.items() if mesh is not None}

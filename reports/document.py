@@ -165,6 +165,7 @@ def _garments(tables: dict[str, Table], pictures: Sequence[Picture]) -> list[Blo
         *_with_paper(tables, "energies"),
         *_figures(pictures, "garments", "frames"),
         *_figures(pictures, "garments", "series"),
+        *_figures(pictures, "garments", "hem"),
         *_with_paper(tables, "curvature"),
         *_tables(tables, "dependence", "dynamics", "penetration", "shape"),
         *_with_paper(tables, "cost"),

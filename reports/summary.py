@@ -94,6 +94,11 @@ def dressed_scenes(measurements: Measurements) -> tuple[str, ...]:
     return tuple(scene for scene in measurements.scenes if scene.startswith("dressed/"))
 
 
+def worn_scenes(measurements: Measurements) -> tuple[str, ...]:
+    """The scenes with any garment on a moving body: they are named garment/motion."""
+    return tuple(scene for scene in measurements.scenes if "/" in scene)
+
+
 def suite_rows(rows: Iterable[Row], suite: str) -> list[Row]:
     return [row for row in rows if row.suite == suite]
 

@@ -16,7 +16,19 @@ import pytest
 
 from benchmarks.results import Row, RunFolder
 from reference_sim import Trajectory
-from reports import build, figures, numbers, palette, render, tables, training, vtkhdf, words, work_precision
+from reports import (
+    build,
+    figures,
+    hem,
+    numbers,
+    palette,
+    render,
+    tables,
+    training,
+    vtkhdf,
+    words,
+    work_precision,
+)
 from reports.document import document, merged
 from reports.fronts import Point
 from reports.layout import table_block
@@ -411,3 +423,22 @@ def test_the_command_answers_without_loading_anything_heavy():
         "sys.exit(bool(heavy & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=60).returncode == 0
+
+
+def test_the_hem_is_drawn_where_it_swings(tmp_path):
+    turn = {
+        "hem/yaw": np.radians(np.linspace(0.0, 40.0, FRAMES)),
+        "hem/from_end": np.linspace(0.1, 0.0, FRAMES),
+    }
+    series = {}
+    for method in ("simulation", "snug"):
+        cloth, faces = sheet(0.1)
+        write_mesh(tmp_path / f"{method}.vtkhdf", cloth, faces, turn)
+        series[method] = vtkhdf.read_series(tmp_path / f"{method}.vtkhdf")
+    picture = hem.hem_curves(tmp_path, "tunic/twist", series)
+    assert picture is not None and picture.path.is_file()
+    write_mesh(tmp_path / "still.vtkhdf", cloth, faces, {name: 0.01 * curve for name, curve in turn.items()})
+    assert (
+        hem.hem_curves(tmp_path, "tunic/still", {"snug": vtkhdf.read_series(tmp_path / "still.vtkhdf")})
+        is None
+    )
