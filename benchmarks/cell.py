@@ -41,7 +41,8 @@ class Outcome:
 
     seconds: of run(), on the clock, repeats included. frames: those it computed. batch_seconds: per frame,
     many at once. peak: most memory of the process until its run had ended [MB]. modules: all that it has
-    loaded. terms: the energies of the scene, joined by "+".
+    loaded. terms: the energies of the scene, joined by "+". commit: of the code that ran it, where that was
+    an earlier run.
     """
 
     cell: Cell
@@ -54,6 +55,7 @@ class Outcome:
     modules: tuple[str, ...] = ()
     terms: str = ""
     recorded: bool = False
+    commit: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ from .results import RunFolder
 from .wardrobe import Wardrobe
 
 AT_ONCE = 8  # idle processes at most: each holds some hundred megabytes
-KEPT = tuple(field.name for field in dataclasses.fields(Outcome) if field.name != "cell")
+KEPT = tuple(field.name for field in dataclasses.fields(Outcome) if field.name not in ("cell", "commit"))
 LEFT_OUT = "not asked for: --only names other states"
 
 
@@ -54,7 +54,7 @@ class Cells:
         self.reused.append(cell.label)
         if found.state == "stale":
             self.outdated[cell.label] = found.why
-        return _outcome(cell, found.result)
+        return _outcome(cell, found.result, found.commit)
 
     def all(self, *, obstacle: Callable[[Cell], str | None], bar: Callable[..., Any]) -> list[Outcome]:
         """Every cell of the plan; `obstacle` says why one cannot be run, or None."""
@@ -96,7 +96,7 @@ class Cells:
         work = self.agenda.repeat(cell, number)
         found = self.records.find(work)
         if found.state == "finished" and found.result is not None:
-            return _outcome(cell, found.result)
+            return _outcome(cell, found.result, found.commit)
         outcome = self._guarded(perform_again, cell)
         self._keep(work, outcome)
         return outcome
@@ -158,9 +158,9 @@ def trajectory(folder: RunFolder, cell: Cell) -> Path:
     return folder.trajectory_path(cell.scene.name, cell.method, cell.seed)
 
 
-def _outcome(cell: Cell, result: dict[str, Any]) -> Outcome:
+def _outcome(cell: Cell, result: dict[str, Any], commit: str) -> Outcome:
     values: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value
         for name, value in result.items() if name in KEPT
     }  # fmt: skip
-    return Outcome(cell, **values)
+    return Outcome(cell, **values, commit=commit)

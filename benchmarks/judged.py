@@ -40,5 +40,5 @@ def rows_of(
             records.keep(work, dataclasses.asdict(row), seconds=time.perf_counter() - clock, failed=failed)
             rows.append(row)
         elif found.result is not None:
-            rows.append(Row(**found.result))
+            rows.append(Row(**found.result | {"commit": found.commit}))
     return rows

@@ -50,13 +50,15 @@ class Work:
 class Found:
     """What the folder says of a piece of work. state: one of STATES; why: what has changed, or what failed.
 
-    result and seconds: of the record, also of a stale one; None where there is none. wanted: to be done now.
+    result, seconds and commit: of the record, also of a stale one; None or empty without one.
+    wanted: to be done now.
     """
 
     state: str
     why: str = ""
     result: dict[str, Any] | None = None
     seconds: float | None = None
+    commit: str = ""
     wanted: bool = True
 
 
@@ -70,7 +72,8 @@ class Records:
         """Whether the work is done, and what came of it."""
         state, why, record = self._state(work)
         result, seconds = record.get("result"), record.get("seconds")
-        return Found(state, why, result, seconds, wanted=state in self.only)
+        commit = record.get("commit", "")
+        return Found(state, why, result, seconds, commit, wanted=state in self.only)
 
     def keep(
         self, work: Work, result: Mapping[str, Any], *, seconds: float, files: Iterable[Path] = (),

@@ -226,5 +226,11 @@ class RunFolder:
 
 
 def with_provenance(rows: Iterable[Row], **provenance: Any) -> list[Row]:
-    """The rows with their provenance columns (preset, commit, hardware, ...) filled in."""
-    return [dataclasses.replace(row, **provenance) for row in rows]
+    """The rows with their provenance columns (preset, commit, hardware, ...) filled in.
+
+    A row that names its commit was measured by an earlier run and keeps it.
+    """
+    return [
+        dataclasses.replace(row, **provenance | ({"commit": row.commit} if row.commit else {}))
+        for row in rows
+    ]

@@ -52,7 +52,7 @@ def rows_of(outcome: Outcome, metrics: Mapping[str, float]) -> list[Row]:
         base = Row(
             suite, cell.scene.name, cell.method, cell.seed, "cost/frame", "ms", None,
             outcome.status if outcome.status != "ok" else "failed", outcome.reason,
-            terms=outcome.terms, dtype=find_method(cell.method).dtype,
+            terms=outcome.terms, dtype=find_method(cell.method).dtype, commit=outcome.commit,
         )  # fmt: skip
         if not metrics:
             rows.append(base)

@@ -119,6 +119,11 @@ def test_provenance_is_filled_in():
     assert {row.commit for row in with_provenance(ROWS, commit="abc")} == {"abc"}
 
 
+def test_a_row_of_an_earlier_run_keeps_its_commit():
+    earlier = [dataclasses.replace(row, commit="old") for row in ROWS]
+    assert {row.commit for row in with_provenance(earlier, commit="new", preset="quick")} == {"old"}
+
+
 def test_the_module_is_light():
     code = "import sys, benchmarks.results; print({'numpy', 'torch', 'pandas'} & set(sys.modules))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
