@@ -86,3 +86,13 @@ def test_the_bound_is_far_below_skinning_and_below_a_simulation(scene, bound):
     assert free < reference < start
     sums = trajectory.provenance["sums_J"]
     assert len(sums) > 1 and sums[-1] < sums[0]
+
+
+def test_a_bound_that_still_falls_is_no_bound_yet(scene, bound, monkeypatch):
+    assert bound[1].status == "ok"
+    monkeypatch.setattr("benchmarks.methods.free_bound.ROUNDS", 1)
+    monkeypatch.setattr("benchmarks.methods.free_bound.ITERATIONS", 2)
+    method = FreeBound()
+    method.prepare(scene)
+    trajectory = method.run()
+    assert trajectory.status == "stalled" and "still falling after 1 rounds" in trajectory.reason

@@ -87,7 +87,7 @@ class FreeBound:
         descent = make_minimiser(
             potential, "lbfgs", finish=False, max_iterations=ITERATIONS, memory=MEMORY, tolerance=TOLERANCE
         )
-        finite = True
+        finite = settled = True
         for _ in range(ROUNDS):
             self.search(x)
             before = potential.value(x)
@@ -97,16 +97,22 @@ class FreeBound:
                 break
             x = result.positions
             self.sums.append(result.energy)
-            if before - result.energy < FALL * abs(result.energy):
+            settled = before - result.energy < FALL * abs(result.energy)
+            if settled:
                 break
+        status, reason = "ok", ""
+        if not finite:
+            status, reason = "diverged", f"round {len(self.sums) + 1}: {result.reason}"
+        elif not settled:
+            status, reason = "stalled", f"the sum was still falling after {ROUNDS} rounds"
         frames, seconds = self.scene.frames, time.perf_counter() - clock
         return Trajectory(
             positions=x.reshape(frames, -1, 3),
             faces=np.asarray(self.scene.cloth.faces),
             times=np.arange(frames) * self.scene.dt,
             frame_seconds=np.full(frames, seconds / frames),
-            status="ok" if finite else "diverged",
-            reason="" if finite else f"round {len(self.sums) + 1}: {result.reason}",
+            status=status,
+            reason=reason,
             provenance={"method": "free-bound", "sums_J": [float(value) for value in self.sums]},
             frame_fields={},
         )

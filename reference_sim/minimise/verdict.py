@@ -24,12 +24,13 @@ def verdict(run: Run, data: np.ndarray) -> Result | None:
     unpinned cloth do not count) and its step negligible.
     """
     tiny = run.tiny(data)
+    within = "tolerance" if run.gradient_norm() <= run.n.tolerance else "its round-off, above the tolerance"
     if run.factorise(data, tiny):
         step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
         if step <= run.n.step_tolerance or run.gradient_norm() == 0.0:
-            return run.result("converged", f"gradient within tolerance, Newton step {step:.1e} m")
+            return run.result("converged", f"gradient within {within}, Newton step {step:.1e} m")
         if not run.factorise(data, 0.0):  # no step along such a direction can be told from another
-            return run.result("converged", "gradient within tolerance, a direction without curvature")
+            return run.result("converged", f"gradient within {within}, a direction without curvature")
         return None
     if escape_saddle(run, data):
         run.iterations += 1
