@@ -114,6 +114,8 @@ def _halved(centroids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _by_cells(points: np.ndarray) -> np.ndarray:
     """Points (S, 3) in the order (S,) of cells of a grid, halved again and again like the faces."""
+    if len(points) == 0:
+        return np.empty(0, np.int64)
     side = max(float(np.ptp(points, axis=0).max()), 1e-30)
     with np.errstate(invalid="ignore"):  # whoever asks for NaN gets some face
         cells = ((points - points.min(axis=0)) / side * (2**HALVINGS - 1)).astype(np.int64)

@@ -184,3 +184,8 @@ def test_the_direction_of_a_thin_gap_is_kept():
     found = tree_of(positions, faces).nearest(points)
     assert (found.points[:, 1] == 0).all()
     assert np.abs((points - found.points)[:, [0, 2]]).max() < 1e-15
+
+
+def test_no_points_have_no_closest():
+    found = tree_of(*sphere(1)).nearest(np.empty((0, 3)))
+    assert found.faces.shape == (0,) and found.points.shape == (0, 3)
