@@ -15,6 +15,7 @@ from .child import Row
 
 CASES = ("sheet on ball, 20 x 20", "sheet on ball, 40 x 40")
 FRAMES = 30
+DISTANCE = 1e-3  # [m] of the barrier: below the flattest triangle of both sheets, which is 1.6 mm high
 CONTACTS = ("penalty", "barrier", "barrier, self-contact")
 
 
@@ -30,7 +31,7 @@ def with_contact(scene: BuiltScene, contact: str) -> tuple[Energy, ...]:
     """The scene's terms with one of CONTACTS for its penalty. Raises ImportError without ipctk."""
     if contact == "penalty":
         return scene.energies
-    barrier = ContactBarrier(scene.cloth, self_contact="self" in contact)
+    barrier = ContactBarrier(scene.cloth, distance=DISTANCE, self_contact="self" in contact)
     return (*(energy for energy in scene.energies if energy.name != "collision"), barrier)
 
 
