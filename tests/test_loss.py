@@ -132,6 +132,9 @@ def test_contact_search_finds_the_closest_allowed_point():
     assert np.abs(distance - shortest)[near].max() < 1e-6
     # Farther away an old anchor may stand, but none at more than twice the distance.
     assert (distance < 2 * shortest + 1e-6)[far].all() and (distance > 1.01 * shortest)[far].any()
+    # Where nothing is remembered every answer is exact: it will be remembered for long.
+    first = np.linalg.norm(found(patch, *patch.search(samples, skin_now), skin_now) - samples, axis=1)
+    assert np.abs(first - shortest)[near | far].max() < 1e-6
 
 
 def test_anchors_follow_the_body_and_forget_nothing_but_what_is_renewed():
