@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from benchmarks.results import replacing
 from reports import palette
 
@@ -149,13 +151,25 @@ def legend_above(figure: Figure, methods: Sequence[str], *, lines: bool) -> None
                 label=look.label,
             )
         )
-    letters = sum(len(palette.label(method)) + 8 for method in methods)
     figure.legend(
         handles=handles,
         loc="outside upper center",
-        ncols=max(1, -(-len(handles) // -(-letters // LINE_LETTERS))),
+        ncols=_columns([len(palette.label(method)) + 8 for method in methods]),
         frameon=False,
         handlelength=1.6 if lines else 0.8,
         handletextpad=0.5,
         columnspacing=1.4,
     )
+
+
+def _columns(letters: Sequence[int]) -> int:
+    """As many columns of a legend as fit side by side: it is filled column by column, each as wide as its
+    longest entry.
+    """
+    count = len(letters)
+    for columns in range(count, 1, -1):
+        lines, longer = divmod(count, columns)
+        ends = np.cumsum([lines + (place < longer) for place in range(columns)])
+        if sum(max(part) for part in np.split(np.array(letters), ends[:-1])) <= LINE_LETTERS:
+            return columns
+    return 1

@@ -84,12 +84,12 @@ def geometry(rows: Sequence[Row]) -> Table | None:
         rows,
         [
             ("penetration/vertices", Column("vertices", "Below the skin", "%")),
-            ("penetration/deep", Column("deep", "Deeper than 5 mm", "%")),
-            ("penetration/own_part_p999", Column("own_part_p999", "99.9 % own-part depth", "mm")),
+            ("penetration/deep", Column("deep", "Deep", "%")),
+            ("penetration/own_part_p999", Column("own_part_p999", "Own part", "mm")),
             ("drift/hem", Column("hem_drift", "Hem drift", "mm")),
             ("distance/rms", Column("distance_rms", "Distance", "mm")),
-            ("distance/p95", Column("distance_p95", "95 % distance", "mm")),
-            ("distance/floor", Column("distance_floor", "Floor of it", "mm")),
+            ("distance/p95", Column("distance_p95", "95 %", "mm")),
+            ("distance/floor", Column("distance_floor", "Floor", "mm")),
         ],
     )
 
@@ -100,11 +100,11 @@ def shape(rows: Sequence[Row]) -> Table | None:
         "shape",
         rows,
         [
-            ("deformation/edges", Column("edges", "Change of edges", "%")),
-            ("deformation/areas", Column("areas", "Change of areas", "%")),
-            ("dihedral/mean", Column("dihedral", "Mean fold angle", "deg")),
-            ("intersections/triangles", Column("intersections", "Triangles through others", "%")),
-            ("curvature/histogram", Column("histogram", "Distance of curvature histograms", "1/m")),
+            ("deformation/edges", Column("edges", "Edges", "%")),
+            ("deformation/areas", Column("areas", "Areas", "%")),
+            ("dihedral/mean", Column("dihedral", "Folds", "deg")),
+            ("intersections/triangles", Column("intersections", "Self-cut", "%")),
+            ("curvature/histogram", Column("histogram", "Histogram", "1/m")),
         ],
     )
 
@@ -115,13 +115,13 @@ def dynamics(rows: Sequence[Row]) -> Table | None:
         "dynamics",
         rows,
         [
-            ("dynamics/amplitude", Column("amplitude", "Amplitude ratio A")),
+            ("dynamics/amplitude", Column("amplitude", "A")),
             ("dynamics/correlation", Column("correlation", "Correlation")),
             ("dynamics/gain", Column("gain", "Gain")),
             ("dynamics/lag", Column("lag", "Lag", "frames")),
             ("dynamics/ringing", Column("ringing", "Ringing", "mm")),
-            ("dynamics/spectrum", Column("spectrum", "Distance of spectra")),
-            ("dynamics/held_difference", Column("held_difference", "Held-pose difference", "mm")),
+            ("dynamics/spectrum", Column("spectrum", "Spectrum")),
+            ("dynamics/held_difference", Column("held_difference", "Held", "mm")),
         ],
     )
 
@@ -136,9 +136,9 @@ def cost(rows: Sequence[Row]) -> Table | None:
         [
             ("cost/data", Column("data_generation", "Data generation", "s")),
             ("cost/train", Column("training", "Training", "s")),
-            ("cost/frame", Column("run_time", "Run time per frame", "ms")),
-            ("cost/batch", Column("batch", "In a batch", "ms")),
+            ("cost/frame", Column("run_time", "Frame", "ms")),
+            ("cost/batch", Column("batch", "In batch", "ms")),
             ("cost/memory", Column("memory", "Memory", "MB")),
-            ("cost/peak", Column("peak", "Peak of process", "MB")),
+            ("cost/peak", Column("peak", "Process", "MB")),
         ],
     )

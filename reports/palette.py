@@ -35,6 +35,7 @@ class Style:
 
 _KNOWN = {
     "simulation": Style("Simulation", "#000000", "*"),
+    "simulation-moved": Style("Simulation, start moved", "#444444", "x", "--"),
     "skinning": Style("Skinning alone", "#8C8C8C", "D", "--"),
     "untrained": Style("SNUG, untrained", "#56B4E9", "v", "--"),
     "pbns": Style("PBNS", "#009E73", "^"),
@@ -102,7 +103,7 @@ def style(method: str) -> Style:
     if method.endswith(CLEANED):
         base = style(method.removesuffix(CLEANED))
         return Style(f"{base.label}, cleaned up", base.colour, base.marker, ":")
-    if method.startswith(_VARIANT):
+    if method.startswith(_VARIANT) and "+" not in method:
         base = family_style(method)
         return Style(f"SNUG, {method.removeprefix(_VARIANT).replace('-', ' ')}", base.colour, "o", ":")
     cut = cut_of(method)

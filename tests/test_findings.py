@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from benchmarks.results import Row
-from reports.findings import claims, findings, recipes
+from reports.document import document
+from reports.findings import CAPTIONS, claims, findings, recipes
+from reports.tables import make_tables
 from snug.recipe import TRAININGS
 
 
@@ -65,3 +67,11 @@ def test_recipes_keep_their_order_and_their_dashes():
     assert [line[0] for line in table.rows] == ["default", "paper", "default, no zero start"]
     assert table.rows[1][1].value == 9.0 and table.rows[1][1].seeds == 2 and table.rows[1][2] is None
     assert table.rows[1][-1].value == 7.0 and table.rows[1][1].complete
+
+
+def test_the_page_shows_what_was_judged_and_counts_the_rest():
+    rows = [row(method, "energy/strain", value) for method, value in (("snug", 1.0), ("pbns", 2.0))]
+    sections = document({}, rows, make_tables(rows), [], [])["sections"]
+    block = next(b for s in sections for b in s["blocks"] if b["caption"] == CAPTIONS["findings"])
+    assert len(block["groups"][0]["rows"]) == 1
+    assert f"{len(claims())} more need methods" in block["note"]

@@ -8,6 +8,7 @@ from benchmarks.results import Row, RunFolder
 from reports import build, palette
 from reports.answers import answers
 from reports.break_even import Cost, break_even, crossing, rivals
+from reports.canvas import _columns
 from reports.fronts import Point, fastest, front, hybrids, points_of, solvers
 from reports.profile import performance_profile, staircases, times_to_reach
 from reports.summary import speed_measurements
@@ -58,6 +59,14 @@ def test_names_of_families_cuts_and_hybrids():
     assert palette.label("snug+lbfgs-4") == "SNUG + L-BFGS, 4 iterations"
     assert palette.style("snug+newton-2").colour == palette.style("snug").colour
     assert palette.ordered(["a+newton-2", "lbfgs-10", "lbfgs-5", "snug"])[:2] == ["snug", "lbfgs-5"]
+
+
+def test_a_legend_has_no_more_columns_than_fit():
+    assert _columns([20, 20, 20]) == 3
+    assert _columns([20] * 10) == 5
+    assert _columns([200, 10]) == 1
+    longest = [30, 10] * 4  # two lines: each column holds a long one
+    assert _columns(longest) == 3
 
 
 def test_the_front_holds_those_that_nothing_beats():
