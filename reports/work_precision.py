@@ -29,6 +29,7 @@ OWN_STEP = ("gap/relative", "gradient/norm")  # of the step's own potential, whi
 DECADES = 9  # below the largest error; what is smaller is drawn on the lower edge
 FLOOR = "distance/floor"  # [mm] between two references that began a nanometre apart
 GREY = "#B4B4B4"
+REFERENCES = (palette.REFERENCE, "simulation-moved")  # whose distance is the floor, not an error
 
 
 def error_against_time(folder: Path, rows: Sequence[Row]) -> list[Picture]:
@@ -78,7 +79,7 @@ def _errors(measured: Measurements, scene: str, metric: str) -> list[Point]:
     for point in points_of(measured, [scene], metric):
         cut = palette.cut_of(point.method)
         other_problem = cut is not None and cut.family == "simulation-dt" and metric in OWN_STEP
-        if point.method != palette.REFERENCE and point.time > 0.0 and not other_problem:
+        if point.method not in REFERENCES and point.time > 0.0 and not other_problem:
             found.append(point)
     return found
 
