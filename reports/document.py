@@ -29,10 +29,10 @@ CAPTIONS = {
     "energies": "Energy by term on unseen motions, J per frame: mean over frames, then over test scenes.",
     "curvature": "Mean-curvature error against the simulation, and the mean curvature itself.",
     "cost": "What each method costs; run time is measured one frame at a time.",
-    "penetration": "Vertices below the skin, those deeper than 5 mm, 99.9 % depth below a vertex's own part of "
-    "the body, drift of the hem; distance to the simulation, RMS and 95 %, and its floor.",
-    "shape": "Shape of the cloth: mean change of edges and areas against rest, mean angle of folds, triangles "
-    "that cut others, distance of the curvature histogram from the simulation's.",
+    "penetration": "Vertices below the skin, those deeper than 5 mm, 99.9 % depth below a vertex's own part "
+    "of the body, drift of the hem; distance to the simulation, RMS and 95 %, and its floor.",
+    "shape": "Shape of the cloth: mean change of edges and areas against rest, mean angle of folds, "
+    "triangles that cut others, distance of the curvature histogram from the simulation's.",
     "dynamics": "Dynamics of the hem beside the simulation's, networks less their own output with each pose "
     "held, solvers less the static minimum: A is the ratio of amplitudes; distance from that output (held).",
     "energies_by_scene": "Energy by term, scene by scene, J per frame.",
