@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from meshes import patch
 
 from benchmarks.presets import find_preset
 from benchmarks.scenes import SMALL_SCENES
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Inertia, StretchStVK
-from tests.meshes import patch
 
 ROOT = Path(__file__).resolve().parent.parent
 CELL = """

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from dressing import swaying, tube_dress
 
 from snug.baselines.supervised import TargetError
 from snug.loss import PhysicsLoss
@@ -19,7 +20,6 @@ from snug.swing import BLIND, REACH, SwingTeacher, unposed
 from snug.train import train
 from snug.trained_model import TrainedModel, make_network
 from snug.training_set import TrainingSet
-from tests.dressing import swaying, tube_dress
 
 SMALL = replace(DYNAMIC, window=BLIND + 8, batch=2, swing_components=6, rehearsal=0)
 
