@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 REFERENCE = "simulation"
+MOVED = "simulation-moved"  # the same from a start moved by a nanometre: the floor of distances
 NETWORKS = ("snug", "pbns", "supervised")
 STATUS_COLOURS = {
     "ok": "#0072B2",
@@ -35,7 +36,7 @@ class Style:
 
 _KNOWN = {
     "simulation": Style("Simulation", "#000000", "*"),
-    "simulation-moved": Style("Simulation, start moved", "#444444", "x", "--"),
+    MOVED: Style("Simulation, start moved", "#444444", "x", "--"),
     "skinning": Style("Skinning alone", "#8C8C8C", "D", "--"),
     "untrained": Style("SNUG, untrained", "#56B4E9", "v", "--"),
     "pbns": Style("PBNS", "#009E73", "^"),

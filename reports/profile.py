@@ -58,7 +58,7 @@ def times_to_reach(
         families: dict[str, list[Point]] = {}
         for point in points_of(measured, [scene], METRIC):
             cut = palette.cut_of(point.method)
-            if cut is None or cut.family != "simulation-dt":
+            if point.method != palette.MOVED and (cut is None or cut.family != "simulation-dt"):
                 families.setdefault(cut.family if cut else point.method, []).append(point)
         times = {name: best.time for name, points in families.items() if (best := fastest(points, target))}
         if times:

@@ -29,7 +29,7 @@ OWN_STEP = ("gap/relative", "gradient/norm")  # of the step's own potential, whi
 DECADES = 9  # below the largest error; what is smaller is drawn on the lower edge
 FLOOR = "distance/floor"  # [mm] between two references that began a nanometre apart
 GREY = "#B4B4B4"
-REFERENCES = (palette.REFERENCE, "simulation-moved")  # whose distance is the floor, not an error
+REFERENCES = (palette.REFERENCE, palette.MOVED)  # whose distance is the floor, not an error
 
 
 def error_against_time(folder: Path, rows: Sequence[Row]) -> list[Picture]:
