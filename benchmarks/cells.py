@@ -14,6 +14,7 @@ from typing import Any
 
 from .agenda import REFERENCE, Agenda, flat, name_of
 from .cell import Outcome, Task, failed, perform, perform_again
+from .clock import one_thread
 from .guarded import Broken, Guarded
 from .methods import find_method
 from .plan import Cell, Plan
@@ -30,6 +31,7 @@ class Cells:
     """Runs or reuses cells, and remembers which it reused and which of those are out of date."""
 
     def __init__(self, plan: Plan, agenda: Agenda, records: Records, wardrobe: Wardrobe | None) -> None:
+        one_thread()  # the processes of cells inherit it, whoever starts them
         self.plan, self.agenda, self.records, self.wardrobe = plan, agenda, records, wardrobe
         self.reused: list[str] = []
         self.outdated: dict[str, str] = {}  # label -> what has changed since
