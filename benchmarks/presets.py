@@ -44,7 +44,7 @@ class Preset:
 PRESETS = (
     Preset(
         name="smoke",
-        description="everything once, tiny: under 2 minutes on 2 cores; its numbers mean nothing",
+        description="everything once, tiny: about 2 minutes on 2 cores; its numbers mean nothing",
         garment_vertices=350,
         train_motions=1,
         test_motions=1,

@@ -34,7 +34,7 @@ from .workers import worker_count
 PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:
   python -m benchmarks.run                                    the quick run: every suite's quick subset
-  python -m benchmarks.run --preset smoke                     everything once, tiny, under 2 minutes
+  python -m benchmarks.run --preset smoke                     everything once, tiny, about 2 minutes
   python -m benchmarks.run --suite garments -o reports/runs/mine
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
   python -m benchmarks.run --scenes 'dressed/*' --methods snug,skinning,simulation --seeds 0,1,2
