@@ -80,5 +80,16 @@ def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
     points: (..., V, 3) [m] in the rest pose. weights: (V, J), rows sum to one. transforms: (..., J, 3, 4).
     Returns (..., V, 3) [m].
     """
-    blended = (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))
+    blended = _blended(weights, transforms)
     return (blended[..., :3] @ points[..., None])[..., 0] + blended[..., 3]
+
+
+def unposed(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
+    """The inverse of `skin`: the points (..., V, 3) [m] in the rest pose that it takes to `posed`."""
+    blended = _blended(weights, transforms)
+    return torch.linalg.solve(blended[..., :3], (posed - blended[..., 3])[..., None])[..., 0]
+
+
+def _blended(weights: Tensor, transforms: Tensor) -> Tensor:
+    """The transform (..., V, 3, 4) of each vertex."""
+    return (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))

@@ -31,6 +31,7 @@ from torch.nn.utils.rnn import pad_sequence
 from snug.baselines.supervised import TargetError, matched_targets
 from snug.recipe import Recipe
 from snug.regressor import Regressor
+from snug.skinning import unposed
 from snug.training_set import Batch, TrainingSet
 
 REHEARSAL_RATE = 2e-3  # of Adam
@@ -119,12 +120,3 @@ class SwingTeacher:
         place = torch.arange(rows.shape[1], device=rows.device)
         knows = (place >= BLIND) | torch.isin(rows[:, :1], self.first)
         return 0.5 * self.stiffness * apart.square().sum(-1) * knows
-
-
-def unposed(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-    """The inverse of skinning: posed (F, V, 3) about the pelvis -> unposed (F, V, 3) [m]."""
-    frames = []
-    for x, joints in zip(posed, transforms):
-        blend = torch.einsum("vj,jab->vab", weights, joints)  # (V, 3, 4)
-        frames.append(torch.linalg.solve(blend[..., :3], (x - blend[..., 3])[..., None])[..., 0])
-    return torch.stack(frames)

@@ -11,11 +11,11 @@ from dressing import swaying, tube_dress
 
 from reference_sim.energies.energy import Energy
 from snug.baselines.springs import SquaredContact, spring_terms
-from snug.baselines.tailornet import DROPOUT, FrequencyMixture, smoothed, unposed
+from snug.baselines.tailornet import DROPOUT, FrequencyMixture, smoothed
 from snug.loss import PhysicsLoss
 from snug.recipe import ABLATIONS, DEFAULT, TRAININGS
 from snug.rollout import roll_out
-from snug.skinning import skin
+from snug.skinning import skin, unposed
 from snug.train import train
 from snug.trained_model import TrainedModel, make_network
 

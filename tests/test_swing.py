@@ -16,7 +16,8 @@ from snug.motion_inputs import RATED, motion_rates
 from snug.recipe import DEFAULT, DYNAMIC, TRAININGS
 from snug.rollout import roll_out
 from snug.skeleton import axis_angles, rotation_matrices
-from snug.swing import BLIND, REACH, SwingTeacher, unposed
+from snug.skinning import unposed
+from snug.swing import BLIND, REACH, SwingTeacher
 from snug.train import train
 from snug.trained_model import TrainedModel, make_network
 from snug.training_set import TrainingSet

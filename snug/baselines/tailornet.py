@@ -23,6 +23,7 @@ from torch import Tensor, nn
 
 from snug.baselines.supervised import CM2_PER_M2, VertexTargets
 from snug.regressor import Regressor
+from snug.skinning import unposed
 
 if TYPE_CHECKING:
     from snug.training_set import Batch
@@ -136,12 +137,6 @@ def smoothed(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
     for _ in range(max(1, round(SWEEPS * count / 1000))):
         flat = (1 - SMOOTHING) * flat + SMOOTHING * (mean @ flat)
     return flat.reshape(count, len(offsets), 3).transpose(1, 0, 2)
-
-
-def unposed(x: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-    """The points that skinning takes to x (T, V, 3) [m]; weights (V, J), transforms (T, J, 3, 4)."""
-    blended = (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))
-    return torch.linalg.solve(blended[..., :3], (x - blended[..., 3])[..., None])[..., 0]
 
 
 def band_loss(predicted: Tensor, target: Tensor) -> Tensor:
