@@ -19,7 +19,7 @@ from reference_sim import Potential
 from reference_sim.minimise import Result
 from reference_sim.minimise.descent import Descent
 
-from .elements import contacts, hinges, membrane, runaway, terms_of, weights
+from .elements import contacts, hinges, membrane, swept, terms_of, weights
 from .kernels import sweep_vertices
 
 
@@ -51,15 +51,11 @@ class VertexBlockDescent:
         run, terms = Descent(self.potential, x0), self._terms
         inertia = terms.inertia.masses / terms.inertia.dt**2, terms.inertia.x_hat, weights(terms)
         touching = contacts(terms.contact)
-        x = run.x.copy()
-        while run.iterations < self.max_iterations:
+
+        def sweep(x: np.ndarray) -> None:
             sweep_vertices(x, self._free, inertia, self._membrane, self._hinges, touching, self._around)
-            run.iterations += 1
-            if runaway(x, x0):
-                return run.result("diverged", f"sweep {run.iterations} threw a vertex far away")
-        run.x = x
-        run.value, run.g = run.evaluate(x)
-        return run.result("max_iterations", f"{run.iterations} sweeps done")
+
+        return swept(run, run.x.copy(), x0, self.max_iterations, sweep)
 
 
 def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,8 @@
-"""The terms of a potential as arrays for sweeps over its elements."""
+"""The terms of a potential as arrays for sweeps over its elements, and the loop of sweeps."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,8 @@ import numpy as np
 if TYPE_CHECKING:
     from reference_sim import Potential
     from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Inertia, StretchStVK
+    from reference_sim.minimise import Result
+    from reference_sim.minimise.descent import Descent
 
 
 # By the names of the classes: a term that the potential does not have is not even imported.
@@ -79,3 +82,17 @@ def _whole(stencils: np.ndarray) -> np.ndarray:
 def runaway(x: np.ndarray, x0: np.ndarray) -> bool:
     """Whether a vertex is nowhere, or FAR from where it began."""
     return not (np.isfinite(x).all() and np.abs(x - x0).max(initial=0.0) < FAR)
+
+
+def swept(
+    run: Descent, x: np.ndarray, x0: np.ndarray, most: int, sweep: Callable[[np.ndarray], object]
+) -> Result:
+    """Sweep x (V, 3) [m] in place so many times; "diverged" where that runs away from x0."""
+    while run.iterations < most:
+        sweep(x)
+        run.iterations += 1
+        if runaway(x, x0):
+            return run.result("diverged", f"sweep {run.iterations} threw a vertex far away")
+    run.x = x
+    run.value, run.g = run.evaluate(x)
+    return run.result("max_iterations", f"{run.iterations} sweeps done")

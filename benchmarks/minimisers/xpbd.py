@@ -25,7 +25,7 @@ from reference_sim import Potential
 from reference_sim.minimise import Result
 from reference_sim.minimise.descent import Descent
 
-from .elements import contacts, hinges, membrane, runaway, terms_of, weights
+from .elements import contacts, hinges, membrane, swept, terms_of, weights
 from .kernels import sweep_constraints
 
 
@@ -59,11 +59,8 @@ class XPBD:
         pulls = tuple(np.zeros(shape) for shape in (
             (len(self._membrane[0]), 3), len(self._hinges[0]), len(touching[0])
         ))  # fmt: skip
-        while run.iterations < self.max_iterations:
+
+        def sweep(x: np.ndarray) -> None:
             sweep_constraints(x, self._inverse, self._membrane, self._hinges, touching, *pulls)
-            run.iterations += 1
-            if runaway(x, x0):
-                return run.result("diverged", f"sweep {run.iterations} threw a vertex far away")
-        run.x = x
-        run.value, run.g = run.evaluate(x)
-        return run.result("max_iterations", f"{run.iterations} sweeps done")
+
+        return swept(run, x, x0, self.max_iterations, sweep)
