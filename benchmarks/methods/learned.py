@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from snug.recipe import ABLATIONS
 
 from ..method import MethodEntry
@@ -23,16 +25,9 @@ def _network(name: str, description: str) -> MethodEntry:
 
 
 def _cleaned(kind: str) -> MethodEntry:
-    return MethodEntry(
-        name=f"{kind}+cleanup",
-        description=f"{kind}, then vertices within 2 mm of the skin pushed out; both are timed",
-        module="benchmarks.methods.clean_up",
-        options={"kind": kind},
-        needs_body=True,
-        dtype="float32",
-        trained=kind,
-        seeded=True,
-    )
+    """The entry of that network with the collision clean-up behind it."""
+    words = f"{kind}, then vertices within 2 mm of the skin pushed out; both are timed"
+    return replace(_network(kind, words), name=f"{kind}+cleanup", module="benchmarks.methods.clean_up")
 
 
 LEARNED = (
