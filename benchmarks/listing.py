@@ -20,7 +20,7 @@ def listing() -> str:
     dressed = [
         (wear.prefix + name, f"a body in {wear.words}; unseen in training")
         for wear in WORN
-        for name in (SWING_TEST if wear.swings else TEST)
+        for name in (SWING_TEST if wear.swings else (*TEST, *SWING_TEST))
     ]
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),

@@ -15,7 +15,7 @@ from snug.recipe import learns_from_simulation
 from .methods import METHODS, find_method
 from .presets import Preset
 from .scene import Scene
-from .scenes import SMALL_SCENES, TSHIRT, WORN, all_scenes
+from .scenes import SMALL_SCENES, TSHIRT, WORN, all_scenes, motion_of
 from .studies import METHOD as STUDIES_METHOD
 from .studies import STUDIES, Study
 from .suites import SUITE_NAMES
@@ -114,8 +114,10 @@ class Plan:
         return self.swing_train if swings(garment) else self.train
 
     def test_of(self, garment: str) -> tuple[str, ...]:
-        """Names of the motions of a garment's scenes."""
-        return self.swing_test if swings(garment) else self.test
+        """Names of a garment's test motions, and of what it does besides in the plan's scenes."""
+        own = self.swing_test if swings(garment) else self.test
+        done = (motion_of(scene.name) for scene in self.scenes if scene.dressed and scene.garment == garment)
+        return tuple(dict.fromkeys((*own, *done)))
 
     @property
     def simulated(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks import agenda
 from benchmarks.agenda import Agenda
+from benchmarks.clips import clip, joint_speeds
 from benchmarks.methods import find_method
 from benchmarks.plan import choose_suites
 from benchmarks.presets import PRESETS, find_preset
@@ -19,6 +20,8 @@ from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
 from benchmarks.wardrobe import embedded_motions, open_wardrobe
+from snug.body import Body
+from snug.motion import make_motion
 
 SMOKE = find_preset("smoke")
 TINY = dataclasses.replace(SMOKE, garment_vertices=300, frames=8)
@@ -43,7 +46,7 @@ def test_the_terms_are_those_of_the_descriptions():
 
 def test_scene_names_are_unique_and_a_dressed_scene_needs_a_wardrobe():
     scenes = all_scenes(["walk", "run"], ["twist_stop"])
-    assert len(scenes) == len(SMALL_SCENES) + 2 * 2 + 2  # each motion whole and as a clip
+    assert len(scenes) == len(SMALL_SCENES) + 2 * 3 + 2  # each motion whole and as a clip
     assert scenes["dressed/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
     assert scenes["dressed/walk"].dressed and not scenes["flag"].dressed
     with pytest.raises(ValueError, match="needs a wardrobe"):
@@ -139,6 +142,21 @@ def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_tunic_without_ne
     tunics = [cell for cell in speed.cells if cell.scene.garment == "tunic"]
     assert len({cell.method for cell in tunics}) >= 10
     assert not any(find_method(cell.method).trained for cell in tunics)
+
+
+def test_suite_speed_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
+    plan = plan_of("--suite", "speed")
+    cells = [cell for cell in plan.cells if cell.scene.name == "dressed/turning_stop@clip"]
+    assert {"simulation", "snug", "lbfgs-5"} <= {cell.method for cell in cells}
+    assert "turning_stop" in plan.test_of("tshirt") and "turning_stop" not in plan.train_of("tshirt")
+    body = Body.load()
+    walk = clip(body, make_motion("turning_stop"), plan.preset.clip_frames)
+    assert joint_speeds(body, walk).min() > 0.5  # [m/s] it is over before the stop
+    pace = np.linalg.norm(np.ptp(walk.translations[:, [0, 2]], axis=0)) / walk.duration
+    assert 0.6 < pace < 1.6
+    for name in plan.train_of("tshirt"):  # its strides are those of `walk`, its heading is nobody's
+        nearest = np.abs(walk.poses[:, None] - make_motion(name).poses).max(axis=(2, 3)).min(axis=1)
+        assert nearest.mean() > np.radians(10), name
 
 
 def plan_of(*words):

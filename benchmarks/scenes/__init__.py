@@ -63,6 +63,11 @@ def worn_in(scene: str) -> Wear:
     return {wear.prefix: wear for wear in WORN}[scene.partition("/")[0] + "/"]
 
 
+def motion_of(scene: str) -> str:
+    """The motion, whole, of the dressed scene of that name."""
+    return scene.partition("/")[2].removesuffix(SUFFIX)
+
+
 def dressed_scene(motion: str, garment: str = TSHIRT) -> Scene:
     """The scene of a body in that garment doing the motion of that name."""
     wear = next(wear for wear in WORN if wear.garment == garment)
@@ -77,9 +82,10 @@ def dressed_scene(motion: str, garment: str = TSHIRT) -> Scene:
 def all_scenes(motions: Iterable[str], swings: Iterable[str]) -> dict[str, Scene]:
     """Every scene by name: the small ones, then dressed bodies in each test motion and in its clip.
 
-    motions: those of the T-shirt; swings: those of garments that swing.
+    motions: those of the T-shirt, which can do the others too; swings: those of garments that swing.
     """
-    chosen = {False: list(motions), True: list(swings)}
+    swings = list(swings)
+    chosen = {False: [*motions, *swings], True: swings}
     dressed = [
         dressed_scene(name, wear.garment)
         for wear in WORN
