@@ -20,6 +20,12 @@ STUDIES = (
         module="benchmarks.studies.long_roll_outs",
     ),
     Study(
+        name="training_windows",
+        description="every network on its training motions: windows as it was trained beside whole roll-outs",
+        suite="garments",
+        module="benchmarks.studies.training_windows",
+    ),
+    Study(
         name="dependence",
         description="every headline number of the T-shirt on other meshes and at other time steps",
         suite="validation",

@@ -1,0 +1,106 @@
+"""Does a network do in a whole roll-out what it was trained to do in windows of three frames?
+
+A window starts from a random state; a roll-out carries one state from the first frame of a motion on. Frames of
+every training motion are predicted both ways, and the training's own loss judges both: the same windows, the
+same terms (a window of three has one inertia), contact searched anew for every frame.
+
+    train/window, train/roll_out   mean J per frame
+    train/high_windows             windows above the recipe's limit once the training had settled
+    train/step                     ms of one training step
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from ..methods.networks import model_path
+from ..results import Row, RunFolder
+from .long_roll_outs import SUITE
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from snug.dresser import DressedBody
+    from snug.trained_model import TrainedModel
+    from snug.training_set import Batch
+
+    from ..plan import Plan
+    from ..wardrobe import Wardrobe
+
+SCENE = "training"
+STRIDE = 18  # frames from one window that is looked at to the next: the searches for contact take the time
+
+
+def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
+    """Those of every network of the run that has a past and learned from the energies alone."""
+    from snug.dresser import DressedBody
+    from snug.trained_model import TrainedModel, find_kind
+
+    if wardrobe is None:
+        return []
+    dressed, motions = DressedBody(wardrobe.body, wardrobe.garment), wardrobe.named(plan.train)
+    found: list[Row] = []
+    for name, seed in plan.models:
+        path = model_path(folder.models, name, seed)
+        if not path.is_file():
+            continue  # its training has failed, and the run says so
+        model = TrainedModel.load(path)
+        how = find_kind(model.kind)
+        if model.steps and how.physics and how.sequences and how.teacher is None:
+            found += _judged(name, seed, model, dressed, motions)
+    return found
+
+
+def _judged(
+    name: str, seed: int, model: TrainedModel, dressed: DressedBody, motions: Sequence[Any]
+) -> Iterator[Row]:
+    window, roll_out = both_losses(model, dressed, motions)
+    numbers = {
+        "train/window": (window, "J"),
+        "train/roll_out": (roll_out, "J"),
+        "train/high_windows": (float(model.summary["high_windows"]), "1"),
+        "train/step": (1e3 * model.seconds / model.steps, "ms"),
+    }
+    for metric, (value, unit) in numbers.items():
+        yield Row(SUITE, SCENE, name, seed, metric, unit, value, dtype="float32")
+
+
+def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any]) -> tuple[float, float]:
+    """Mean loss of windows from random states, and of the same frames of whole roll-outs [J per frame]."""
+    import numpy as np
+    import torch
+
+    from snug.skinning import skin
+    from snug.trainer import Trainer
+
+    # Mixed motions, and bodies of other shapes, are no motions that were given.
+    recipe = replace(model.recipe, mixed=0.0, window_stride=STRIDE, shape_range=0.0)
+    trainer = Trainer(model.kind, dressed, motions, steps=1, seed=model.seed, recipe=recipe)
+    trainer.network = model.network
+    data = trainer.data
+    with torch.no_grad():
+        batch = data.batch(np.arange(len(data.starts)), None)
+        offsets, _ = model.network(batch.features, trainer.start_state(len(batch.frames), slice(None)))
+        windows = skin(batch.rest + offsets, trainer.weights, batch.transforms)
+        whole = []
+        for first, end in zip(data.first[:-1], data.first[1:]):
+            offsets, _ = model.network(data.features[None, first:end], None)
+            whole.append(skin(data.rest + offsets[0], trainer.weights, data.transforms[first:end]))
+        roll_outs = torch.cat(whole)[torch.as_tensor(batch.frames)]
+        return _loss(trainer, batch, windows), _loss(trainer, batch, roll_outs)
+
+
+def _loss(trainer: Any, batch: Batch, x: Tensor) -> float:
+    """Mean of the loss over windows x (N, T, V, 3) [m], with contact searched at x [J per frame]."""
+    import numpy as np
+    import torch
+
+    planes = None
+    if trainer.contact:
+        posed = trainer.contact.posed(batch)
+        trainer.contact.search(np.arange(batch.frames.size), batch.frames, posed, x)
+        planes = trainer.contact.planes(batch, posed)
+    terms = trainer.loss(x, batch.ahead, planes)
+    return float(torch.stack(list(terms.values())).sum(0).mean())
