@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.fast_network import FastLinear, run_gru
+from snug.fast_network import FastLinear, run_gru, run_linear
 
 HIDDEN, LAYERS = 256, 4
 
@@ -59,7 +59,7 @@ class Regressor(nn.Module):
             flat = FastLinear.apply(hidden, self.offsets.weight, self.offsets.bias) * self.output_scale
         else:
             hidden, state = self.gru(normalised, state)  # (N, T, 256), (4, N, 256)
-            flat = self.offsets(hidden) * self.output_scale  # (N, T, 3V)
+            flat = run_linear(self.offsets, hidden) * self.output_scale  # (N, T, 3V)
         return flat.unflatten(-1, (self.vertices, 3)), state
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:

@@ -182,6 +182,18 @@ def test_closed_forms_train_as_the_modules_do(frames, state):
         assert (a_gradients[name] - gradient).norm() < 1e-5 * gradient.norm(), name
 
 
+def test_without_gradients_a_network_gives_what_it_trains_with():
+    torch.manual_seed(0)
+    network = Regressor(12, 40, hidden=32, layers=3)
+    features, start = torch.randn(4, 3, 12), 0.3 * torch.randn(3, 4, 32)
+    expected, state = network(features, start)
+    with torch.no_grad():
+        found, last = network(features, start)
+        assert network.double()(features.double(), start.double())[0].dtype == torch.float64
+    assert expected.abs().max() > 0.1 and torch.allclose(found, expected, atol=1e-6)
+    assert torch.allclose(last, state, atol=1e-6)
+
+
 def test_product_without_onednn_is_the_same(monkeypatch):
     a, b, bias = torch.randn(5, 8), torch.randn(6, 8), torch.randn(6)
     fast = fast_network.product(a, b, bias)
