@@ -1,8 +1,8 @@
 """Does a network do in a whole roll-out what it was trained to do in windows of three frames?
 
-A window starts from a random state; a roll-out carries one state from the first frame of a motion on. Frames of
-every training motion are predicted both ways, and the training's own loss judges both: the same windows, the
-same terms (a window of three has one inertia), contact searched anew for every frame.
+A window starts from a random state; a roll-out carries one state from the first frame of a motion on. Windows
+of every training motion are predicted both ways, and the training's own loss judges both: the same frames and
+terms (a window of three has one inertia), contact searched anew for every frame.
 
     train/window, train/roll_out   mean J per frame
     train/high_windows             windows above the recipe's limit once the training had settled
