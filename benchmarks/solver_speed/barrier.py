@@ -9,9 +9,9 @@ import numpy as np
 from reference_sim import Obstacle, simulate
 from reference_sim.energies import ContactBarrier, Energy
 
+from ..parts import Row
 from ..presets import find_preset
 from ..scene import BuiltScene
-from .child import Row
 
 CASES = ("sheet on ball, 20 x 20", "sheet on ball, 40 x 40")
 FRAMES = 30

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from reference_sim.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
 
-from .child import Row
+from ..parts import Row
 from .tshirt import dressed
 
 CASES = ("walk, 1000", "walk, 4400")

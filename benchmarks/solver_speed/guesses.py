@@ -8,7 +8,7 @@ from reference_sim import Potential
 from reference_sim.energies import Inertia, Step
 from reference_sim.minimise import Newton
 
-from .child import Row
+from ..parts import Row
 from .tshirt import dressed, walk
 
 CASES = ("walk, 1000", "run, 1000")

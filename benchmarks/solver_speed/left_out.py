@@ -17,8 +17,8 @@ from reference_sim import Cloth, Material, Potential, simulate
 from reference_sim.energies import Energy, Gravity, StretchStVK
 from reference_sim.minimise import minimise
 
+from ..parts import Row
 from ..scenes.sheet import square_sheet
-from .child import Row
 
 CASES = ("no body", "no bending", "no inertia", "no network")
 CELLS, FRAMES = 14, 20

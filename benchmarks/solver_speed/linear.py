@@ -37,7 +37,7 @@ from reference_sim import Cloth, Potential
 from reference_sim.energies import BendHinge, Gravity, Inertia, StretchStVK
 from reference_sim.hessian_pattern import HessianPattern
 
-from .child import Row
+from ..parts import Row
 from .cholesky_packages import PACKAGES, Build
 from .sheet import DT, regular_sheet
 

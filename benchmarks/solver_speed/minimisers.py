@@ -15,8 +15,8 @@ from reference_sim.energies import Inertia, Step
 from reference_sim.minimise import LBFGS, Newton
 
 from ..metrics.curvature import curvature_series
+from ..parts import Row
 from ..scene import BuiltScene
-from .child import Row
 from .tshirt import dressed, walk
 
 CASES = ("walk, 1000",)

@@ -39,7 +39,7 @@ from reference_sim import Potential
 from reference_sim.energies import BendHinge, Gravity, Inertia, Step
 from reference_sim.minimise import LBFGS, Newton
 
-from .child import Row
+from ..parts import Row
 from .newton_peer import Advance, Peer
 from .peer_energies import StableNeoHookean, UnequalSprings
 from .sheet import DT, FRAMES, Fall, regular_sheet

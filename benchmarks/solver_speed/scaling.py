@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .child import Row
+from ..parts import Row
 from .sheet import Fall, regular_sheet
 
 CASES = ("32 x 32", "64 x 64", "128 x 128", "256 x 256")

@@ -11,7 +11,7 @@ from reference_sim import Cloth, Material, Potential, Result
 from reference_sim.energies import BendHinge, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import Minimiser, make_minimiser
 
-from .child import Row
+from ..parts import Row
 
 CASES = ("64 x 64",)
 FRAMES = 30

@@ -10,10 +10,10 @@ import numpy as np
 from reference_sim import Trajectory, simulate
 
 from ..metrics.geometry import penetration
+from ..parts import Row
 from ..presets import find_preset
 from ..scene import BuiltScene
 from ..wardrobe import Wardrobe, embedded_motions, open_wardrobe
-from .child import Row
 
 CASES = ("walk, 1000", "run, 1000", "jump, 1000", "walk, 4400")
 FRAMES = 60
