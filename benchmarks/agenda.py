@@ -27,10 +27,14 @@ DATA_FILES = "snug/data/*.npz"  # what the modules of snug read
 
 
 class Agenda:
-    """Works of a plan by kind; equal questions get equal answers."""
+    """Works of a plan by kind; equal questions get equal answers.
+
+    lost: names of training motions' simulations that have failed. Who learns without them is another.
+    """
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
+        self.lost: frozenset[str] = frozenset()
 
     @cached_property
     def machine(self) -> dict[str, Any]:
@@ -58,10 +62,13 @@ class Agenda:
             "garment": network.garment,
             "steps": plan.preset.steps_of(kind),
             "recipe": dataclasses.asdict(training.recipe if training else DEFAULT),
-            "motions": {name: self._motion(name) for name in motions},
+            "motions": {name: self.motion(name) for name in motions},
         }
         if training and training.simulated:
-            inputs["targets"] = [self.data(name, network.garment).key for name in motions]
+            data = [self.data(name, network.garment) for name in motions]
+            inputs["targets"] = [work.key for work in data]
+            if lost := sorted(work.name for work in data if work.name in self.lost):
+                inputs["without"] = lost
         return Work("network", f"{flat(network.garment)}/{kind}-seed{network.seed}", inputs, code)
 
     def cell(self, cell: Cell) -> Work:
@@ -107,7 +114,7 @@ class Agenda:
     def _scene(self, scene: Scene, code: Mapping[str, str]) -> dict[str, Any]:
         inputs = self.inputs(code) | {"scene": declared(scene)}
         if scene.dressed:
-            inputs["motion"] = self._motion(scene.name.split("/", 1)[1])
+            inputs["motion"] = self.motion(scene.name.split("/", 1)[1])
         return inputs
 
     def inputs(self, code: Mapping[str, str]) -> dict[str, Any]:
@@ -117,7 +124,7 @@ class Agenda:
             inputs["files"] = _data_files()
         return inputs
 
-    def _motion(self, name: str) -> str:
+    def motion(self, name: str) -> str:
         """Of a file its content; an embedded one, or part of one, is made by code, looked at by itself."""
         whole = name.partition(SUFFIX)[0]
         return f"{name} {digest(self.plan.files[whole])}" if whole in self.plan.files else name

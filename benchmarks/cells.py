@@ -18,12 +18,13 @@ from .clock import one_thread
 from .guarded import Broken, Guarded
 from .methods import find_method
 from .plan import Cell, Plan
-from .records import Records, Work
+from .records import Found, Records, Work
 from .results import RunFolder
 from .wardrobe import Wardrobe
 
 AT_ONCE = 8  # idle processes at most: each holds some hundred megabytes
 KEPT = tuple(field.name for field in dataclasses.fields(Outcome) if field.name not in ("cell", "commit"))
+BLOCKED = "cannot be run: "  # what the cell needs is not there
 LEFT_OUT = "not asked for: --only names other states"
 
 
@@ -43,12 +44,11 @@ class Cells:
             return Outcome(cell, "skipped", reason)
         work = self.agenda.cell(cell)
         found = self.records.find(work)
-        if found.wanted:
+        freed = found.why.startswith(f"failed: {BLOCKED}") and not obstacle
+        if found.wanted or freed:
             self._clear(cell)
-        if found.wanted and obstacle:
-            return Outcome(cell, "failed", obstacle)
-        if found.wanted:
-            outcome = self._guarded(perform, cell)
+            blocked = Outcome(cell, "failed", f"{BLOCKED}{obstacle}")
+            outcome = blocked if obstacle else self._guarded(perform, cell)
             self._keep(work, outcome)
             return outcome
         if found.result is None:
@@ -56,7 +56,7 @@ class Cells:
         self.reused.append(cell.label)
         if found.state == "stale":
             self.outdated[cell.label] = found.why
-        return _outcome(cell, found.result, found.commit)
+        return outcome_of_record(cell, found)
 
     def all(self, *, obstacle: Callable[[Cell], str | None], bar: Callable[..., Any]) -> list[Outcome]:
         """Every cell of the plan; `obstacle` says why one cannot be run, or None."""
@@ -84,12 +84,7 @@ class Cells:
         for number in range(1, rounds):
             turn = number * len(cells) // rounds
             for cell in (*cells[turn:], *cells[:turn]):
-                before, again = outcomes[cell], self._once_more(cell, number)
-                if again.status == "ok":
-                    outcomes[cell] = dataclasses.replace(before, seconds=(*before.seconds, *again.seconds))
-                else:  # what the first run left stands, but not without a word
-                    reason = before.reason or f"repeat {number}: {again.status}: {again.reason}"
-                    outcomes[cell] = dataclasses.replace(before, reason=reason)
+                outcomes[cell] = with_repeat(outcomes[cell], self._once_more(cell, number), number)
         for cell in cells:
             if cell in self._idle:
                 self._idle.pop(cell).close()
@@ -98,7 +93,7 @@ class Cells:
         work = self.agenda.repeat(cell, number)
         found = self.records.find(work)
         if found.state == "finished" and found.result is not None:
-            return _outcome(cell, found.result, found.commit)
+            return outcome_of_record(cell, found)
         outcome = self._guarded(perform_again, cell)
         self._keep(work, outcome)
         return outcome
@@ -160,9 +155,18 @@ def trajectory(folder: RunFolder, cell: Cell) -> Path:
     return folder.trajectory_path(cell.scene.name, cell.method, cell.seed)
 
 
-def _outcome(cell: Cell, result: dict[str, Any], commit: str) -> Outcome:
+def outcome_of_record(cell: Cell, found: Found) -> Outcome:
+    """The outcome that the record of a cell, or of its repeat, holds."""
     values: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value
-        for name, value in result.items() if name in KEPT
+        for name, value in (found.result or {}).items() if name in KEPT
     }  # fmt: skip
-    return Outcome(cell, **values, commit=commit)
+    return Outcome(cell, **values, commit=found.commit)
+
+
+def with_repeat(before: Outcome, again: Outcome, number: int) -> Outcome:
+    """The outcome with the time of one repeat more. What the first run left stands in any case."""
+    if again.status == "ok":
+        return dataclasses.replace(before, seconds=(*before.seconds, *again.seconds))
+    reason = before.reason or f"repeat {number}: {again.status}: {again.reason}"
+    return dataclasses.replace(before, reason=reason)

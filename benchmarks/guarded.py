@@ -34,22 +34,24 @@ class Broken(RuntimeError):
 class Guarded:
     """One worker process, started when first needed, and again after it had to be ended.
 
-    Use it in a `with` block, or call `close`.
+    begin(*arguments) is called first in each new process. Use it in a `with` block, or call `close`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
+        self._begin = (begin, arguments)
         self._context = multiprocessing.get_context("spawn")
         self._process: Any = None
         self._pipe: Any = None
 
-    def call(self, function: Callable[..., Any], *arguments: Any, seconds: float) -> Any:
+    def call(self, function: Callable[..., Any], *arguments: Any, seconds: float | None) -> Any:
         """function(*arguments) in the worker; both sides must be picklable.
 
-        Raises what the function raises, and Broken after `seconds` or where the process ended.
+        Raises what the function raises, and Broken after `seconds` (None: no deadline) or where the process
+        ended.
         """
         if self._process is None:
             self._pipe, far = self._context.Pipe()
-            self._process = self._context.Process(target=_serve, args=(far,), daemon=True)
+            self._process = self._context.Process(target=_serve, args=(far, *self._begin), daemon=True)
             self._process.start()
             far.close()
         try:
@@ -133,8 +135,10 @@ def _follow(parent: int) -> None:
     os._exit(1)
 
 
-def _serve(pipe: Any) -> None:
+def _serve(pipe: Any, begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
     lead_a_group()
+    if begin is not None:
+        begin(*arguments)
     while True:
         try:
             function, arguments = pipe.recv()

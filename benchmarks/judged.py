@@ -1,4 +1,4 @@
-"""Checks and extreme cases: each row is computed, or taken from its record while its code is the same."""
+"""Checks, cases, studies: rows are computed, or taken from the record while inputs and code are the same."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ from typing import Any
 from .agenda import Agenda, declared
 from .check import Check
 from .fingerprint import code_of
-from .records import Records, Work
-from .results import Row
+from .plan import Network, runs
+from .records import Found, Records, Work
+from .results import Row, cells_to_row, row_to_cells
+from .study import Study
 from .suites.extremes import Case
+from .wardrobe import Wardrobe
 
 
 def work_of(item: Check | Case, agenda: Agenda) -> Work:
@@ -42,3 +45,38 @@ def rows_of(
         elif found.result is not None:
             rows.append(Row(**found.result | {"commit": found.commit}))
     return rows
+
+
+def work_of_study(study: Study, agenda: Agenda, records: Records) -> Work:
+    """What the rows of a study depend on: also whether what it reads has been finished or has failed."""
+    plan, code = agenda.plan, code_of(study.module, "benchmarks.study")
+    read: list[Work] = []
+    if "roll-outs" in study.reads:
+        read += [agenda.cell(cell) for cell in plan.cells if cell.scene.dressed and runs(cell)]
+    if "networks" in study.reads:
+        read += [agenda.network(Network(name, seed)) for name, seed in plan.models]
+    inputs = agenda.inputs(code) | {"declared": declared(study)}
+    inputs["read"] = {f"{work.kind} {work.name}": [work.key, records.find(work).state] for work in read}
+    if "motions" in study.reads:
+        inputs["motions"] = [agenda.motion(name) for name in plan.test]
+    return Work("study", study.name, inputs, code)
+
+
+def rows_of_study(study: Study, agenda: Agenda, records: Records, wardrobe: Wardrobe | None) -> list[Row]:
+    """The rows of a study; none where it is left out by --only."""
+    work = work_of_study(study, agenda, records)
+    found = records.find(work)
+    if not found.wanted:
+        return kept_rows(found)
+    clock = time.perf_counter()
+    rows = study.run(agenda.plan, records.folder, wardrobe)
+    failed = next((f"{row.scene}: {row.reason}" for row in rows if row.status == "failed"), "")
+    result = {"rows": [row_to_cells(row) for row in rows]}
+    records.keep(work, result, seconds=time.perf_counter() - clock, failed=failed)
+    return rows
+
+
+def kept_rows(found: Found) -> list[Row]:
+    """The rows in the record of a study."""
+    rows = [cells_to_row(cells) for cells in found.result["rows"]] if found.result else []
+    return [dataclasses.replace(row, commit=found.commit) for row in rows]

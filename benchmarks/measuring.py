@@ -3,35 +3,40 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .agenda import REFERENCE, Agenda
 from .cell import Outcome, Task, built
 from .methods import find_method
-from .plan import Cell, Plan
+from .plan import Cell, Plan, network_of
 from .presets import Preset
 from .records import Records, Work
 from .results import Row, RunFolder
-from .rows import clock_costs, rows_of
+from .rows import clock_costs, model_costs, rows_of
+from .training import Trained
 from .wardrobe import Wardrobe
 from .workers import Failure, Job, Tell, run_jobs
 
 
 def rows_of_cells(
     outcomes: Sequence[Outcome],
-    plan: Plan,
+    agenda: Agenda,
     records: Records,
     wardrobe: Wardrobe | None,
-    costs: Callable[[Cell], Mapping[str, float]],
 ) -> list[Row]:
     """The rows of all cells; metrics of those that have none yet are computed, scene by scene.
 
-    costs: cell -> metrics that are no measurement of its trajectory.
+    A cell that is kept though it is out of date has the metrics that it had: nothing is measured of it, nor
+    compared with it.
     """
-    agenda = Agenda(plan)
-    recorded = [outcome for outcome in outcomes if outcome.recorded]
-    works = {outcome.cell: agenda.metrics(outcome.cell) for outcome in recorded}
+    plan, kept = agenda.plan, dict[Cell, str]()
+    for cell in (outcome.cell for outcome in outcomes if outcome.recorded):
+        trajectory = records.find(agenda.cell(cell))
+        if trajectory.state == "stale":
+            kept[cell] = f"kept though {trajectory.why} changed"
+    recorded = [outcome for outcome in outcomes if outcome.recorded and outcome.cell not in kept]
+    works = {outcome.cell: agenda.metrics(outcome.cell) for outcome in outcomes if outcome.recorded}
     jobs = jobs_of_scenes(recorded, works, plan, records)
     ended = run_jobs(jobs, wardrobe, title="metrics", unit="cell", workers=plan.workers)
     reasons = {job.label: end.reason for job, end in zip(jobs, ended) if isinstance(end, Failure)}
@@ -39,13 +44,30 @@ def rows_of_cells(
     for outcome in outcomes:
         found = records.find(works[outcome.cell]) if outcome.recorded else None
         metrics: dict[str, float] = {}
-        if found is not None and found.state == "finished" and found.result is not None:
-            metrics = {**found.result, **clock_costs(outcome), **costs(outcome.cell)}
+        remark = kept.get(outcome.cell, "")
+        usable = found is not None and (found.state == "finished" or remark)
+        if found is not None and usable and found.result is not None:
+            outcome = dataclasses.replace(outcome, reason=outcome.reason or remark)
+            metrics = {**found.result, **clock_costs(outcome), **costs_of(outcome.cell, agenda, records)}
+        elif remark:
+            reason = f"{remark}, and never measured"
+            outcome = dataclasses.replace(outcome, status="skipped", reason=reason)
         elif found is not None:
             reason = f"metrics: {reasons.get(outcome.cell.scene.name, 'the worker ended')}"
             outcome = dataclasses.replace(outcome, status="failed", reason=reason)
         rows += rows_of(outcome, metrics)
     return rows
+
+
+def costs_of(cell: Cell, agenda: Agenda, records: Records) -> dict[str, float]:
+    """What the cell's network has cost by its records, where it has one: no measurement of its trajectory."""
+    network, plan = network_of(cell), agenda.plan
+    result = records.find(agenda.network(network)).result if network else None
+    if network is None or not result:
+        return {}
+    motions = plan.train_of(network.garment) if network.garment in plan.simulated else ()
+    data = [records.find(agenda.data(motion, network.garment)).result or {} for motion in motions]
+    return model_costs(Trained(**result), sum(simulated.get("seconds", 0.0) for simulated in data))
 
 
 def jobs_of_scenes(

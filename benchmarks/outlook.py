@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from .agenda import Agenda
-from .judged import work_of
+from .judged import work_of, work_of_study
 from .plan import Plan, runs
 from .records import Found, Records, Work
 from .results import RunFolder
+from .study import Study
 
 
 def describe(plan: Plan) -> str:
@@ -27,7 +28,7 @@ def describe(plan: Plan) -> str:
     ]
     for suite, items in (("validation", plan.checks), ("extremes", plan.cases)):
         lines += [f"  {i.name} [{suite}]: {outlook.verdict(work_of(i, outlook.agenda))}" for i in items]
-    lines += [f"  {study.name} [{study.suite}]" for study in plan.studies]
+    lines += [f"  {study.name} [{study.suite}]: {outlook.of_study(study)}" for study in plan.studies]
     return "\n".join([*lines, outlook.total()])
 
 
@@ -55,7 +56,11 @@ class Outlook:
             targets = "simulated for networks that learn from it" if simulated else "not simulated"
             yield f"training motions {', '.join(plan.train_of(garment))} ({targets})"
             for motion in plan.train_of(garment) if simulated else ():
-                yield f"  simulate {motion}: {self.verdict(agenda.data(motion, garment))}"
+                work = agenda.data(motion, garment)
+                found = self.records.find(work)
+                if found.state == "failed" and not found.wanted:
+                    agenda.lost |= {work.name}
+                yield f"  simulate {motion}: {self.verdict(work)}"
         for network in plan.networks:
             steps = plan.preset.steps_of(network.name)
             yield f"  train {network.label}: {steps} steps, {self.verdict(agenda.network(network))}"
@@ -71,6 +76,11 @@ class Outlook:
             if verdict == "cached" and self.records.find(self.agenda.metrics(cell)).state != "finished":
                 verdict += ", metrics to be computed"
             yield line + verdict
+
+    def of_study(self, study: Study) -> str:
+        """What happens to a study, which may read what is still to be done."""
+        work = work_of_study(study, self.agenda, self.records)
+        return self.verdict(work)
 
     def verdict(self, work: Work) -> str:
         """What happens to a piece of work, counted."""

@@ -232,7 +232,7 @@ def choose_cells(
                     continue
                 if plain and find_method(method).trained:
                     continue
-                for seed in seeds if find_method(method).seeded else seeds[:1]:
+                for seed in seeds if find_method(method).seeded else (0,):
                     key = (scene, method, seed)
                     before = found[key].suites if key in found else ()
                     found[key] = Cell(declared[scene], method, seed, (*before, suite))

@@ -53,8 +53,9 @@ a folder that holds a run is gone on with: what is finished there for the same i
   failed, --fresh everything.
 
 exit status: 0 when every cell ended as ok or as an explained skip (in extremes an honest failure with
-  its reason is an accepted outcome); 1 when a cell failed: its row says why and the rest went on;
-  2 when the request cannot be met: one line says why and nothing is left behind."""
+  its reason is an accepted outcome); 1 when a cell, a training or a simulation failed: a line says why
+  and the rest went on; 2 when the request cannot be met, also where another run is going on in the
+  folder: one line says why and nothing is left behind."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -120,10 +121,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         print(describe(plan))
         return 0
-    from .stages import execute
+    from .lock import HeldError, held
 
     try:
-        return execute(plan)
+        with held(plan.folder):
+            from .stages import execute
+
+            return execute(plan)
+    except HeldError as error:
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
         return 130

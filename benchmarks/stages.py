@@ -22,25 +22,25 @@ from .curves import remarked
 from .measuring import rows_of_cells
 from .plan import Cell, Network, Plan, network_of, runs
 from .record import Record, now
-from .records import Work
+from .records import Found, Work
 from .results import Row
-from .rows import model_costs
+from .salvage import with_finished
 from .scenes import TSHIRT, dressed_scene, worn_in
 from .workers import Failure, Job, run_jobs
 
 if TYPE_CHECKING:
-    from .training import Trained
     from .wardrobe import Wardrobe
 
 
 def execute(plan: Plan) -> int:
-    """Run the plan. Returns 0 when every cell ended well, 1 when one failed or there is no report."""
+    """Run the plan. Returns 0 when all ended well, 1 when something failed or there is no report."""
     record = Record(plan)
     stages = Stages(record)
     try:
         stages.run()
     except KeyboardInterrupt:
         record.note("interrupted", True)
+        record.rows = with_finished(record.rows, stages.agenda, record.records)
         record.write_rows()
         raise
     made = stages.make_report()
@@ -50,11 +50,13 @@ def execute(plan: Plan) -> int:
     failed = [row for row in record.rows if not accepted(row)]
     for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
         print(line, file=sys.stderr)
+    for label, reason in stages.broken.items():
+        print(f"{label}: {reason}", file=sys.stderr)
     for line in remarks(record.rows, len(record.reused), record.config.get("outdated", {})):
         print(line, file=sys.stderr)
     if made:
         print(record.folder.report_path.resolve(), flush=True)
-    return 0 if made and not failed else 1
+    return 0 if made and not (failed or stages.broken) else 1
 
 
 def accepted(row: Row) -> bool:
@@ -69,10 +71,9 @@ class Stages:
         self.record = record
         self.plan, self.folder, self.records = record.plan, record.folder, record.records
         self.agenda = Agenda(self.plan)
-        self.trained: dict[Network, Trained] = {}
         self.untrained: dict[Network, str] = {}  # why a network could not be trained
         self.unsettled: dict[str, str] = {}  # scene -> why its garment has no start
-        self.data_seconds: dict[str, float] = {}  # by garment
+        self.broken: dict[str, str] = {}  # ground truth or network -> how it failed
         self.targets: dict[str, dict[str, Path]] = {}  # garment, training motion -> its whole simulation
         self.wardrobe: Wardrobe | None = None
         self.naked = ""  # why there is no wardrobe
@@ -108,7 +109,7 @@ class Stages:
                 self.record.rows += judged.rows_of(cases, run_case, self.agenda, self.records)
         for study in plan.studies:
             with self.record.stage(f"{study.suite}: {study.name}"):
-                self.record.rows += study.run(plan, self.folder, self.wardrobe)
+                self.record.rows += judged.rows_of_study(study, self.agenda, self.records, self.wardrobe)
         self.record.write_rows()
 
     def open_wardrobe(self) -> None:
@@ -153,17 +154,18 @@ class Stages:
             work, arguments = self.agenda.data(motion, garment), (scene, preset, plan.folder)
             todo[work] = Job(scene.name, ground_truth.simulate_motion, arguments, units)
         results = self.finished(todo, title="simulating", unit="frame")
-        unused, rough, frames = {}, {}, 0
+        unused, rough, frames, seconds = {}, {}, 0, 0.0
         for work, job in todo.items():
             result = results[work]
             if isinstance(result, Failure) and work.kind == "start":
                 self.unsettled[job.label] = result.reason
             elif isinstance(result, Failure):
                 unused[job.label] = result.reason
+                self.agenda.lost |= {work.name}
             elif work.kind == "data":
                 simulated = ground_truth.Simulated(**result)
                 worn = worn_in(job.label).garment
-                self.data_seconds[worn] = self.data_seconds.get(worn, 0.0) + simulated.seconds
+                seconds += simulated.seconds
                 frames += simulated.frames
                 ending = f"{simulated.status}: {simulated.reason}"
                 if simulated.status != "converged":
@@ -175,7 +177,7 @@ class Stages:
                     unused[job.label] = ending
         self.record.note("data", {
             "workers": plan.workers,
-            "seconds": sum(self.data_seconds.values()),
+            "seconds": seconds,
             "frames": frames,
             "not_converged": rough,
             "unused": unused,
@@ -207,7 +209,7 @@ class Stages:
                 self.untrained[networks[work]] = result.reason
                 summary[job.label] = {"failed": result.reason}
             else:
-                trained = self.trained[networks[work]] = training.Trained(**result)
+                trained = training.Trained(**result)
                 summary[job.label] = {
                     "recipe": trained.recipe,
                     "seconds": trained.seconds,
@@ -223,16 +225,29 @@ class Stages:
         wanted = [work for work in todo if found[work].wanted]
         jobs = [dataclasses.replace(todo[work], work=work, records=self.records) for work in wanted]
         ended = run_jobs(jobs, self.wardrobe, title=title, unit=unit, workers=self.plan.workers)
-        results: dict[Work, Any] = {
-            work: end if isinstance(end, Failure) else dataclasses.asdict(end)
-            for work, end in zip(wanted, ended)
-        }
+        results: dict[Work, Any] = {}
+        for work, end in zip(wanted, ended):
+            failed = isinstance(end, Failure)
+            results[work] = end if failed else dataclasses.asdict(end)
+            if failed:
+                self.records.keep(work, {}, seconds=0.0, failed=end.reason)
+                self.broken[end.label] = end.reason
         for work, job in todo.items():
             if work not in results:
-                result = found[work].result
-                results[work] = Failure(job.label, LEFT_OUT) if result is None else result
-                self.record.reused += [job.label] * (result is not None)
+                results[work] = self.kept(found[work], job.label)
         return results
+
+    def kept(self, found: Found, label: str) -> Any:
+        """What is used of work that is not done now: its result, or a Failure."""
+        if found.state == "failed":
+            self.broken[label] = found.why
+            return Failure(label, found.why)
+        if found.state == "stale":
+            return Failure(label, f"out of date ({found.why} changed), and --only names other states")
+        if found.state == "missing" or found.result is None:
+            return Failure(label, LEFT_OUT)
+        self.record.reused.append(label)
+        return found.result
 
     def cells_and_metrics(self) -> list[Outcome]:
         """Cells one after another, alone; then metrics from their files, scenes side by side."""
@@ -242,7 +257,7 @@ class Stages:
         self.record.reused += self.cells.reused
         self.record.note("outdated", self.cells.outdated)
         with self.record.stage("metrics"):
-            rows = rows_of_cells(outcomes, self.plan, self.records, self.wardrobe, self.costs)
+            rows = rows_of_cells(outcomes, self.agenda, self.records, self.wardrobe)
             self.record.rows += remarked(rows)
             self.record.write_rows()
         return outcomes
@@ -257,12 +272,6 @@ class Stages:
         if network and (reason := self.untrained.get(network)):
             return f"its network could not be trained: {reason}"
         return None
-
-    def costs(self, cell: Cell) -> dict[str, float]:
-        """What the cell's network has cost, where it has one."""
-        network = network_of(cell)
-        data = self.data_seconds.get(cell.scene.garment or "", 0.0)
-        return model_costs(self.trained.get(network) if network else None, data)
 
     def make_report(self) -> bool:
         """tables/, figures/ and report.pdf from the files; a failure is said and leaves the results."""

@@ -21,12 +21,17 @@ METHOD = "simulation"  # naming methods without it leaves studies out, as checks
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """The declaration of a study: cheap to list. `rows` of its module does it."""
+    """The declaration of a study: cheap to list. `rows` of its module does it.
+
+    reads: what of the run it looks at: "roll-outs" on bodies, the T-shirt's "networks", test "motions". When
+    that is another, or its code, the study is done again.
+    """
 
     name: str
     description: str
     suite: str
     module: str
+    reads: tuple[str, ...] = ()
 
     def run(self, plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
         """Its rows. What it raises becomes a failed row with the reason."""

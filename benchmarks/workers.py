@@ -1,9 +1,9 @@
 """Single-threaded worker processes for work that is not timed against other work: data and training.
 
 Each worker holds the wardrobe; a job is a module-level function of (wardrobe, tell, *arguments), where
-tell(n) reports n units of progress. A job that raises is a value here, not an end of the run. A job that is
-a piece of recorded work returns a dataclass with the names of its `files`; its worker writes the record, so
-that a run that is killed keeps every job that had ended.
+tell(n) reports n units of progress. A job that raises, or whose worker is killed, is a value here, not an
+end of the run. A job that is a piece of recorded work returns a dataclass with the names of its `files`; its
+worker writes the record, so that a run that is killed keeps every job that had ended.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import multiprocessing
 import queue
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any
 
-from .guarded import lead_a_group
+from .guarded import Broken, Guarded
 from .provenance import usable_cores
 from .records import Records, Work
 from .wardrobe import Wardrobe
@@ -47,7 +47,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Failure:
-    """What a job raised, in one line."""
+    """What a job raised, or how its worker ended, in one line."""
 
     label: str
     reason: str
@@ -72,51 +72,74 @@ def run_jobs(
         return []
     from tqdm import tqdm
 
-    context = multiprocessing.get_context("spawn")
-    progress = context.Queue()
+    count = min(workers or worker_count(), len(jobs))
+    crew = [Worker(wardrobe) for _ in range(count)]
+    idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
+    for worker in crew:
+        idle.put(worker)
+
+    def done(job: Job) -> Any:
+        worker = idle.get()
+        try:
+            return worker.do(job)
+        finally:
+            idle.put(worker)
+
     with (
         tqdm(total=sum(job.units for job in jobs), desc=title, unit=unit, smoothing=0.05) as bar,
-        ProcessPoolExecutor(
-            workers or worker_count(), mp_context=context, initializer=_begin, initargs=(wardrobe, progress)
-        ) as pool,
+        ThreadPoolExecutor(count) as threads,  # one waits for each worker
     ):
-        futures = [pool.submit(_call, job) for job in jobs]
+        futures = [threads.submit(done, job) for job in jobs]
         try:
-            _watch(futures, progress, bar)
+            _watch(futures, crew, bar)
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in multiprocessing.active_children():
-                child.terminate()
+            _end(futures)
             raise
         bar.update(bar.total - bar.n)
-    return [_result(job, future) for job, future in zip(jobs, futures)]
+        for worker in crew:
+            worker.process.close()
+    return [future.result() for future in futures]
 
 
-def _watch(futures: Sequence[Future[Any]], progress: Any, bar: Any) -> None:
+class Worker:
+    """A process that does one job after another, another process after one that was killed."""
+
+    def __init__(self, wardrobe: Wardrobe | None) -> None:
+        # Of its own: one that is killed while it reports leaves no lock that others wait for.
+        self.progress = multiprocessing.get_context("spawn").SimpleQueue()
+        self.process = Guarded(_begin, wardrobe, self.progress)
+
+    def do(self, job: Job) -> Any:
+        """The result of a job, or a Failure."""
+        try:
+            return self.process.call(_call, job, seconds=None)
+        except Broken as broken:
+            return Failure(job.label, f"{broken.status}: {broken}")
+        except Exception as error:
+            return Failure(job.label, " ".join(f"{type(error).__name__}: {error}".split()))
+
+
+def _watch(futures: Sequence[Future[Any]], crew: Sequence[Worker], bar: Any) -> None:
     left = set(futures)
     while left:
         _, left = wait(left, timeout=POLL, return_when=FIRST_COMPLETED)
-        try:
-            while True:
-                bar.update(min(progress.get_nowait(), bar.total - bar.n))
-        except queue.Empty:
-            pass
+        for worker in crew:
+            while not worker.progress.empty():
+                bar.update(min(worker.progress.get(), bar.total - bar.n))
 
 
-def _result(job: Job, future: Future[Any]) -> Any:
-    error = future.exception()
-    if error is None:
-        return future.result()
-    return Failure(job.label, " ".join(f"{type(error).__name__}: {error}".split()))
+def _end(futures: Sequence[Future[Any]]) -> None:
+    """Begin no other job, and end the workers until none is left that a thread waits for."""
+    left = {future for future in futures if not future.cancel()}
+    while left:
+        for child in multiprocessing.active_children():
+            child.kill()
+        _, left = wait(left, timeout=POLL)
 
 
 def _begin(wardrobe: Wardrobe | None, progress: Any) -> None:
-    """Set up a worker, which ends when its parent does."""
     global _wardrobe, _progress
-    lead_a_group()
     _wardrobe, _progress = wardrobe, progress
-    # A report that nobody reads any more must not keep a worker alive.
-    progress.cancel_join_thread()
 
 
 def _call(job: Job) -> Any:

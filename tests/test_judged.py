@@ -1,4 +1,4 @@
-"""Checks and cases are computed once for the same code, and said to be failed where they are."""
+"""Checks, cases and studies are computed once for the same code, and said to be failed where they are."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from pathlib import Path
 from benchmarks import judged
 from benchmarks.agenda import Agenda
 from benchmarks.check import run_check
-from benchmarks.plan import Plan
+from benchmarks.outlook import describe
+from benchmarks.plan import Cell, Plan
 from benchmarks.presets import find_preset
 from benchmarks.records import Records
-from benchmarks.results import RunFolder
+from benchmarks.results import Row, RunFolder
+from benchmarks.scenes import dressed_scene
+from benchmarks.studies import STUDIES
+from benchmarks.study import Study
 from benchmarks.suites.extremes import CASES
 from benchmarks.suites.validation import CHECKS
 
@@ -59,3 +63,46 @@ def test_a_case_depends_on_how_it_is_judged_and_on_the_body_that_it_reads_but_no
         assert "benchmarks/suites/extreme_cases.py" not in work.code
     assert "snug/data/body.npz" in works["shirt_step"].inputs["files"]
     assert "files" not in works["twisted"].inputs
+
+
+# --- studies ---------------------------------------------------------------------------------------------
+
+done: list[str] = []
+
+
+def rows(plan, folder, wardrobe) -> list[Row]:
+    """Of the study below: a number, and one that failed honestly."""
+    done.append(plan.preset.name)
+    lost = Row("validation", "counting", "simulation", 0, "x", "1", None, "diverged", "far away")
+    return [Row("validation", "counting", "simulation", 0, "n", "1", 0.1 + 0.2), lost]
+
+
+def test_a_study_is_done_once_and_again_when_what_it_reads_is_another(tmp_path):
+    study = Study(
+        name="counting", description="", suite="validation", module="test_judged", reads=("roll-outs",)
+    )
+    cell = Cell(dressed_scene("kick", "tshirt"), "simulation", 0, ("garments",))
+    plan = Plan(
+        preset=find_preset("smoke"), suites=("validation",), cells=(cell,), checks=(), cases=(),
+        studies=(study,), train=(), test=("kick",), seeds=(0,), device="cpu", folder=tmp_path, command="",
+    )  # fmt: skip
+    agenda, records = Agenda(plan), Records(RunFolder(tmp_path))
+    assert "counting [validation]: run (missing)" in describe(plan)
+    done.clear()
+    first = judged.rows_of_study(study, agenda, records, None)
+    assert judged.rows_of_study(study, agenda, records, None) == first and len(done) == 1
+    assert "counting [validation]: cached" in describe(plan)
+    records.keep(agenda.cell(cell), {}, seconds=0.0)  # there is a roll-out now
+    assert "counting [validation]: run (stale: read)" in describe(plan)
+    assert judged.rows_of_study(study, agenda, records, None) == first and len(done) == 2
+    longer = dataclasses.replace(plan, preset=dataclasses.replace(plan.preset, frames=21))
+    judged.rows_of_study(study, Agenda(longer), records, None)
+    assert len(done) == 3
+    left_out = Records(RunFolder(tmp_path / "new"), only=("failed",))
+    assert judged.rows_of_study(study, agenda, left_out, None) == [] and len(done) == 3
+
+
+def test_every_study_says_what_it_reads():
+    reads = {study.name: set(study.reads) for study in STUDIES}
+    assert reads["laws"] == {"roll-outs"} and reads["hard_motions"] == {"networks"}
+    assert reads["long_roll_outs"] == {"networks", "motions"} and reads["dependence"] == set()

@@ -12,12 +12,14 @@ STUDIES = (
         description="momentum, energy and residual of every roll-out on unseen motions, frame by frame",
         suite="validation",
         module="benchmarks.studies.laws",
+        reads=("roll-outs",),
     ),
     Study(
         name="long_roll_outs",
         description="every network for a thousand frames there and back: energy at both ends, and drift",
         suite="garments",
         module="benchmarks.studies.long_roll_outs",
+        reads=("networks", "motions"),
     ),
     Study(
         name="training_windows",
@@ -36,5 +38,6 @@ STUDIES = (
         description="networks and simulator: too fast, too far, too large, with glitches, for 10,000 frames",
         suite="extremes",
         module="benchmarks.studies.hard_motions",
+        reads=("networks",),
     ),
 )

@@ -1,0 +1,43 @@
+"""One run at a time in a folder: two would write over each other's files."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+class HeldError(ValueError):
+    """The folder is another run's at this moment; the message names it."""
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Hold a folder, made where it is not there. Raises HeldError where another run has it.
+
+    The lock lies on the folder itself and leaves no file. The system releases it with the process, however
+    that ended. Where the system or its file system has no such locks nothing is held, and that is said.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        import fcntl
+
+        hold = os.open(folder, os.O_RDONLY)
+    except (ImportError, OSError):
+        print(f"{folder}: cannot be locked here; let no other run use it", file=sys.stderr)
+        yield
+        return
+    try:
+        try:
+            fcntl.flock(hold, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise HeldError(
+                f"--out {folder}: another run is going on there; wait for its end or name another folder"
+            ) from None
+        except OSError:
+            print(f"{folder}: cannot be locked here; let no other run use it", file=sys.stderr)
+        yield
+    finally:
+        os.close(hold)
