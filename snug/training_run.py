@@ -75,6 +75,7 @@ class TrainingRun:
         self.recent: list[dict[str, float]] = []
         self.best: dict[str, Tensor] = {}
         self.best_value, self.best_step, self.last_value = float("inf"), 0, float("nan")
+        self._validating = 0.0
         self._started = self._saved = time.perf_counter()
 
     def go(self) -> TrainedModel:
@@ -120,11 +121,15 @@ class TrainingRun:
         if not np.isnan(self.last_value):
             row["validation"], self.last_value = self.last_value, float("nan")
         row |= {f"seconds/{part}": taken for part, taken in self.trainer.clock.taken().items()}
-        self.recent = []
+        if self._validating:
+            row["seconds/validation"] = self._validating / len(self.recent)
+        self.recent, self._validating = [], 0.0
         return row
 
     def _validate(self, validator: Validator) -> None:
+        clock = time.perf_counter()
         self.last_value = validator.value()
+        self._validating += time.perf_counter() - clock
         if self.last_value < self.best_value:
             self.best_value, self.best_step = self.last_value, self.done
             weights = self.trainer.network.state_dict()

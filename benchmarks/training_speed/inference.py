@@ -1,0 +1,43 @@
+"""A frame at a time on one CPU core, network and skinning, as in an application; and what a network weighs.
+
+Weights are random: neither time nor size depends on them. The supervised network is SNUG's.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from ..parts import Row
+from .settings import Settings, dressed_body, kind_and_vertices, training_motions
+
+KINDS = ("snug", "pbns", "tailornet", "santesteban2019")
+CASES = tuple(f"{kind}, {vertices}" for kind in KINDS for vertices in (1000, 4400))
+
+
+def measure(case: str, settings: Settings) -> list[Row]:
+    """Median, 95 % and least time over all frames of roll-outs; memory and file of the network."""
+    from snug.recipe import TRAININGS
+    from snug.rollout import roll_out
+    from snug.train import untrained_model
+
+    kind, vertices = kind_and_vertices(case)
+    dressed, motions = dressed_body(vertices), training_motions()
+    model = untrained_model(TRAININGS[kind].kind, dressed, motions, seed=0, recipe=TRAININGS[kind].recipe)
+    roll_out(model, dressed, motions[0])
+    runs = [roll_out(model, dressed, motions[0]).frame_seconds for _ in range(settings.repeats)]
+    frames = 1e3 * np.concatenate(runs)
+    with tempfile.TemporaryDirectory() as folder:
+        size = model.save(Path(folder) / "model.safetensors").stat().st_size
+    return [
+        ("vertices", dressed.vertices, ""),
+        ("frames timed", len(frames), ""),
+        ("frame, median", float(np.median(frames)), "ms"),
+        ("frame, 95 %", float(np.quantile(frames, 0.95)), "ms"),
+        ("frame, least", float(frames.min()), "ms"),
+        ("parameters", sum(p.numel() for p in model.network.parameters()), ""),
+        ("memory of the network", model.megabytes, "MB"),
+        ("model file", size / 1e6, "MB"),
+    ]

@@ -1,0 +1,82 @@
+"""python -m reports.convergence DIR: the curve of a training at the paper's size, over its time.
+
+Reads convergence.csv, which part convergence of `python -m benchmarks.training_speed` writes into DIR; writes
+convergence.png there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.results import ResultsError
+from reports import palette
+from reports.canvas import PAGE_WIDTH, Picture, grid, log_axis, new_figure, save
+
+PAPER_SECONDS = 2 * 3600.0  # the paper's training: 4424 vertices, 6500 frames, a GPU
+CURVES = {"validation": ("rolled out on a held-out motion", "-"), "loss": ("windows of training", ":")}
+
+
+def read_curve(path: Path) -> dict[str, np.ndarray]:
+    """Seconds of training, and for each name in CURVES joules a frame. Raises ResultsError."""
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.DictReader(stream))
+        columns = {name: np.array([float(row[name]) for row in rows]) for name in ("seconds", *CURVES)}
+    except FileNotFoundError:
+        raise ResultsError(f"{path}: no such file; run part convergence of training_speed first") from None
+    except (KeyError, TypeError, ValueError) as error:
+        raise ResultsError(f"{path}: not a curve of training_speed ({error})") from None
+    if not rows:
+        raise ResultsError(f"{path}: holds no rows")
+    return columns
+
+
+def convergence_curve(folder: Path) -> Picture:
+    """Loss and held-out roll-out against the time of training, beside the paper's two hours."""
+    curve = read_curve(folder / "convergence.csv")
+    figure = new_figure(PAGE_WIDTH * 0.7, 2.6)
+    axes = figure.subplots()
+    for name, (label, line) in CURVES.items():
+        colour = palette.style("snug").colour
+        axes.plot(curve["seconds"], curve[name], color=colour, linestyle=line, label=label)
+    axes.axvline(PAPER_SECONDS, color="#444444", linestyle="--", linewidth=0.9)
+    axes.annotate("the paper's 2 h", (PAPER_SECONDS, 0.97), xycoords=axes.get_xaxis_transform(),
+        xytext=(-4, 0), textcoords="offset points", ha="right", va="top", fontsize=8)  # fmt: skip
+    axes.set(xlabel="time of training [s]", ylabel="energy [J per frame]")
+    seconds = curve["seconds"]
+    axes.set_xlim(0.8 * float(seconds[0]), 1.3 * max(PAPER_SECONDS, float(seconds[-1])))
+    log_axis(axes, "x")
+    log_axis(axes, "y")
+    grid(axes)
+    axes.legend(frameon=False, loc="center right")
+    caption = "SNUG trained at the paper's size: energy of a frame against the time of training."
+    return save(
+        figure, folder, "convergence", caption=caption, section="garments", kind="training", vector=False
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exit status: 0 drawn, 2 no such curve."""
+    parser = argparse.ArgumentParser(
+        prog="python -m reports.convergence",
+        description="Draw the curve of a training: convergence.png beside its convergence.csv.",
+        epilog="example: python -m reports.convergence reports/runs/training_speed",
+    )
+    parser.add_argument("folder", metavar="DIR", help="where benchmarks.training_speed has written")
+    options = parser.parse_args(arguments)
+    try:
+        print(convergence_curve(Path(options.folder)).path)
+    except ResultsError as error:
+        print(f"reports.convergence: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
