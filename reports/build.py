@@ -47,7 +47,17 @@ def build_report(run_dir: str | Path, *, opengl: bool = True) -> tuple[Path, lis
 
 def draw(run: RunFolder, rows: Sequence[Row], problems: list[str], *, opengl: bool) -> list[Picture]:
     """Every figure that the run holds something for."""
-    from reports import break_even, figures, hem, profile, render, stability, training, work_precision
+    from reports import (
+        break_even,
+        figures,
+        hem,
+        profile,
+        render,
+        stability,
+        throughput,
+        training,
+        work_precision,
+    )
 
     dressed = dressed_trajectories(run, rows, problems)
     pictures = render.side_by_side(run.figures, dressed, opengl=opengl)
@@ -57,6 +67,7 @@ def draw(run: RunFolder, rows: Sequence[Row], problems: list[str], *, opengl: bo
     pictures += work_precision.error_against_time(run.figures, rows)
     pictures += profile.performance_profile(run.figures, rows)
     pictures += break_even.break_even(run.figures, rows)
+    pictures += throughput.throughput_bars(run.figures, rows)
     pictures += training.training_curves(run.figures, run.models, problems)
     pictures += figures.validation_dots(run.figures, rows)
     pictures += stability.stability_maps(run.figures, rows)

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from benchmarks.results import Row
+from reports import ablations, bars, study_tables
 from reports import findings as paper_findings
-from reports import study_tables
 from reports.canvas import Picture
 from reports.configuration import configuration
 from reports.layout import Block, figure_block, list_block, table_block
 from reports.numbers import DASH
-from reports.summary import Measurements
+from reports.summary import Mean, Measurements
 from reports.table import Cell, Table
 from reports.words import findings
 
@@ -42,6 +42,8 @@ CAPTIONS = {
     "extremes": "Every extreme case and how it ended.",
     "refusals": "Inputs that have to be refused before anything is solved, and what each was told.",
     "unfinished": "Cells that failed or were skipped, with the reason each gave.",
+    "bars": bars.CAPTION,
+    **ablations.CAPTIONS,
     **paper_findings.CAPTIONS,
     **study_tables.CAPTIONS,
 }
@@ -70,7 +72,15 @@ PAPER = {
     },
 }  # fmt: skip
 
-GROUPED = {"energies_by_scene": ("scene",), "speed": ("scene",), **study_tables.GROUPED}
+BY_GARMENT = (
+    "energies", "curvature", "dynamics", "penetration", "shape", "cost", "ablations", "ablations_judged",
+)  # fmt: skip
+GROUPED = {
+    "energies_by_scene": ("scene",),
+    "speed": ("scene",),
+    **dict.fromkeys(BY_GARMENT, ("garment",)),
+    **study_tables.GROUPED,
+}
 NOTES = {
     "energies": "In grey the values printed by the paper, for its own garment, motions, contact and zero of "
     "gravity: for orientation only, they enter no mean of ours.",
@@ -157,10 +167,13 @@ def _with_paper(tables: dict[str, Table], name: str) -> list[Block]:
         return []
     table = tables[name]
     references = [
-        (label, [values.get(column.name, DASH) for column in table.columns[1:]])
+        (label, [values.get(column.name, DASH) for column in table.columns[2:]])
         for label, values in PAPER[name].items()
     ]
-    return [table_block(table, CAPTIONS[name], references=references, note=NOTES[name])]
+    block = table_block(
+        table, CAPTIONS[name], references=references, note=NOTES[name], grouped_by=GROUPED[name]
+    )
+    return [block]
 
 
 def _garments(tables: dict[str, Table], pictures: Sequence[Picture]) -> list[Block]:
@@ -172,8 +185,9 @@ def _garments(tables: dict[str, Table], pictures: Sequence[Picture]) -> list[Blo
         *_with_paper(tables, "curvature"),
         *_tables(tables, "dependence", "dynamics", "penetration", "shape"),
         *_with_paper(tables, "cost"),
+        *_figures(pictures, "garments", "throughput"),
         *_judged(tables),
-        *_tables(tables, "recipes"),
+        *_tables(tables, "ablations", "ablations_judged", "bars", "recipes"),
         *_figures(pictures, "garments", "speed"),
         *_figures(pictures, "garments", "training"),
         *_tables(tables, "energies_by_scene"),
@@ -188,6 +202,8 @@ def _judged(tables: dict[str, Table]) -> list[Block]:
     kept = tuple(row for row in table.rows if row[-1] is not None)
     left = len(table.rows) - len(kept)
     note = f"{left} more need methods that this run left out: see tables/findings.csv." if left else ""
+    if not any(isinstance(cell, Mean) and cell.spread is not None for row in kept for cell in row):
+        note = f"With one seed, 5 % count as the scatter of seeds. {note}"
     return (
         [table_block(Table(table.name, table.columns, kept), CAPTIONS["findings"], note=note)] if kept else []
     )

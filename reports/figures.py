@@ -39,7 +39,8 @@ LEAST = 1e-6  # tolerances; what is closer is drawn on the edge
 def energy_series(folder: Path, scene: str, series: dict[str, MeshSeries]) -> Picture | None:
     """Strain, bending and inertia per frame, one panel each, one curve per method (the paper's figure)."""
     terms = [t for t in SERIES_TERMS if any(f"energy/{t}" in mesh.fields for mesh in series.values())]
-    methods = [m for m in palette.ordered(series) if any(f"energy/{t}" in series[m].fields for t in terms)]
+    methods = [m for m in series if any(f"energy/{t}" in series[m].fields for t in terms)]
+    methods = palette.leading(methods)
     if not terms or not methods:
         return None
     figure = new_figure(PAGE_WIDTH, 2.35)

@@ -5,26 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from benchmarks.results import Row
-from reports.summary import EXTRA_TERMS, TERMS, Measurements, benchmark_cells, dressed_scenes, suite_rows
+from reports.ablations import ABLATIONS
+from reports.summary import (
+    EXTRA_TERMS,
+    TERMS,
+    Measurements,
+    benchmark_cells,
+    suite_rows,
+    wardrobe,
+    worn_scenes,
+)
 from reports.table import Cell, Column, Table
 
 # Columns that stand in a table only where the run measured them; any other one is kept, as dashes.
 OPTIONAL = ("distance/p95", "distance/floor", "cost/batch", "cost/peak", "intersections/triangles")
 
 
-def _by_method(
-    name: str, measurements: Measurements, scenes: Sequence[str] | None, columns: Iterable[tuple[str, Column]]
-) -> Table | None:
-    """One row per method with any of the metrics; columns nobody has are dashes, or left out if OPTIONAL."""
-    pairs = [p for p in columns if p[0] not in OPTIONAL or p[0] in measurements.metrics]
-    rows: list[tuple[Cell, ...]] = []
-    for method in measurements.methods:
-        means = [measurements.mean(method, metric, scenes) for metric, _ in pairs]
-        if any(mean is not None for mean in means):
-            rows.append((method, *means))
-    if not rows:
+def _by_garment(name: str, rows: Sequence[Row], columns: Iterable[tuple[str, Column]]) -> Table | None:
+    """One row per garment and method with any of the metrics, as means over the garment's scenes.
+
+    Ablations have a table of their own. Columns nobody has are dashes, or left out if OPTIONAL.
+    """
+    measured = Measurements(suite_rows(rows, "garments"))
+    pairs = [p for p in columns if p[0] not in OPTIONAL or p[0] in measured.metrics]
+    lines: list[tuple[Cell, ...]] = []
+    for garment, scenes in wardrobe(measured).items():
+        for method in measured.methods:
+            means = [measured.mean(method, metric, scenes) for metric, _ in pairs]
+            if method not in ABLATIONS and any(mean is not None for mean in means):
+                lines.append((garment, method, *means))
+    if not lines:
         return None
-    return Table(name, (Column("method", "Method"), *(column for _, column in pairs)), tuple(rows))
+    head = (Column("garment", "Garment"), Column("method", "Method"))
+    return Table(name, (*head, *(column for _, column in pairs)), tuple(lines))
 
 
 def energy_columns(measurements: Measurements) -> list[tuple[str, Column]]:
@@ -35,11 +48,9 @@ def energy_columns(measurements: Measurements) -> list[tuple[str, Column]]:
 
 
 def energies(rows: Sequence[Row]) -> Table | None:
-    """Table 1 of the paper: energy per term, J per frame, mean over the dressed scenes."""
+    """Table 1 of the paper: energy per term, J per frame, mean over the scenes of each garment."""
     measured = Measurements(suite_rows(rows, "garments"))
-    scenes = dressed_scenes(measured)
-    kept = measured.only(scenes)
-    return _by_method("energies", kept, scenes, energy_columns(kept))
+    return _by_garment("energies", rows, energy_columns(measured.only(worn_scenes(measured))))
 
 
 def energies_by_scene(rows: Sequence[Row]) -> Table | None:
@@ -58,15 +69,9 @@ def energies_by_scene(rows: Sequence[Row]) -> Table | None:
     return Table("energies_by_scene", (*head, *(column for _, column in columns)), tuple(lines))
 
 
-def _dressed_table(name: str, rows: Sequence[Row], columns: list[tuple[str, Column]]) -> Table | None:
-    measured = Measurements(suite_rows(rows, "garments"))
-    scenes = dressed_scenes(measured)
-    return _by_method(name, measured.only(scenes), scenes, columns)
-
-
 def curvature(rows: Sequence[Row]) -> Table | None:
     """Table 2 of the paper, with the mean curvature itself beside its error."""
-    return _dressed_table(
+    return _by_garment(
         "curvature",
         rows,
         [
@@ -79,7 +84,7 @@ def curvature(rows: Sequence[Row]) -> Table | None:
 
 def geometry(rows: Sequence[Row]) -> Table | None:
     """Distance to the simulation, response to motion and penetration into the body."""
-    return _dressed_table(
+    return _by_garment(
         "penetration",
         rows,
         [
@@ -96,7 +101,7 @@ def geometry(rows: Sequence[Row]) -> Table | None:
 
 def shape(rows: Sequence[Row]) -> Table | None:
     """How far the cloth is from its rest shape and through itself, and how its curvature is spread."""
-    return _dressed_table(
+    return _by_garment(
         "shape",
         rows,
         [
@@ -111,7 +116,7 @@ def shape(rows: Sequence[Row]) -> Table | None:
 
 def dynamics(rows: Sequence[Row]) -> Table | None:
     """How the hem answers to the body's motion, beside the simulation's answer."""
-    return _dressed_table(
+    return _by_garment(
         "dynamics",
         rows,
         [
@@ -128,11 +133,9 @@ def dynamics(rows: Sequence[Row]) -> Table | None:
 
 def cost(rows: Sequence[Row]) -> Table | None:
     """Table 3 of the paper: data generation, training, run time of one frame, memory."""
-    measured = Measurements(suite_rows(rows, "garments"))
-    return _by_method(
+    return _by_garment(
         "cost",
-        measured,
-        None,
+        rows,
         [
             ("cost/data", Column("data_generation", "Data generation", "s")),
             ("cost/train", Column("training", "Training", "s")),

@@ -15,10 +15,14 @@ Block = dict[str, Any]
 LONG = 24  # rows from which a table may run over pages
 
 # Texts that need room get a share of the page's width; every other column is as wide as its content.
-WIDTHS = {"reason": "2fr", "check": "1fr", "finding": "2fr", "case": "1fr", "scene": "1fr"}
+WIDTHS = {
+    "reason": "2fr", "check": "1fr", "finding": "2fr", "case": "1fr", "scene": "1fr", "worse": "1fr",
+    "better": "1fr",
+}  # fmt: skip
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
 TEXTS = (
     "method", "finding", "recipe", "scene", "suite", "check", "case", "outcome", "status", "reason", "unit",
+    "worse", "better", "bound",
 )  # fmt: skip
 COSTS = ("data_generation", "training", "run_time", "memory")
 REMARKS = {
@@ -30,8 +34,11 @@ _WORDS: dict[str, Callable[[str], str]] = {
     "outcome": lambda text: "converged" if text == "ok" else text,
     "status": lambda text: "pass" if text == "ok" else text,
 }
-_DIGITS = {"measured": 7, "expected": 7, "tolerance": 2, "gradient": 2}
+_DIGITS = {
+    "measured": 7, "expected": 7, "tolerance": 2, "gradient": 2, "apart": 2, "scatter": 2, "gain": 2,
+}  # fmt: skip
 _NOISE = 1e-3  # what is measured below it is an error, of which two digits say enough
+_ZERO = {"lag": 5e-3}  # lags are looked for in hundredths of a frame: less is none
 _TIMES = ("data_generation", "training")
 
 
@@ -64,8 +71,11 @@ def table_block(
         groups.setdefault(" · ".join(str(row[place]) for place in heads), []).append(line)
     remarks = [note]
     if any(cell["spread"] for line in cells for cell in line):
-        seeds = max(cell.seeds for row in table.rows for cell in row if isinstance(cell, Mean))
-        remarks.append(f"±: standard deviation over {seeds} seeds.")
+        means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
+        seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
+        number_of = " or ".join(str(count) for count in seeds)
+        lone = " Without it: one seed, or nothing random." if any(m.spread is None for m in means) else ""
+        remarks.append(f"±: standard deviation over {number_of} seeds.{lone}")
     marks = {mark for line in cells for cell in line for mark in cell["mark"]}
     remarks += [REMARKS[mark] for mark in sorted(marks)]
     return {
@@ -101,7 +111,7 @@ def _column_texts(name: str, cells: Sequence[Cell], references: Sequence[str]) -
     found = []
     for text, cell in zip(texts, [*cells, *[None] * len(references)]):
         mean = cell if isinstance(cell, Mean) else None
-        spread = f"± {number(mean.spread, 1)}" if mean and mean.spread else ""
+        spread = _spread(name, mean.spread) if mean and mean.spread else ""
         # A cost is measured where it arises: a training has no scene, so none is missing from its mean.
         mark = "*" if mean and not mean.complete and name not in COSTS else ""
         mark += "†" if mean and mean.stalled else ""
@@ -109,8 +119,14 @@ def _column_texts(name: str, cells: Sequence[Cell], references: Sequence[str]) -
     return found
 
 
+def _spread(name: str, spread: float) -> str:
+    return f"± {duration(spread) if name in _TIMES else number(spread, 1)}"
+
+
 def _text(name: str, cell: Cell) -> str:
     value = cell.value if isinstance(cell, Mean) else cell
+    if isinstance(value, float) and abs(value) < _ZERO.get(name, 0.0):
+        value = 0.0
     if isinstance(value, str):
         return _WORDS.get(name, str)(value) or DASH
     if name in _TIMES:

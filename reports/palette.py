@@ -37,16 +37,24 @@ class Style:
 _KNOWN = {
     "simulation": Style("Simulation", "#000000", "*"),
     MOVED: Style("Simulation, start moved", "#444444", "x", "--"),
+    "free-bound": Style("Free lower bound", "#5D3A9B", "_", "--"),
     "skinning": Style("Skinning alone", "#8C8C8C", "D", "--"),
     "untrained": Style("SNUG, untrained", "#56B4E9", "v", "--"),
     "pbns": Style("PBNS", "#009E73", "^"),
+    "pbns-springs": Style("PBNS, springs", "#117733", "^", ":"),
+    "tailornet": Style("TailorNet", "#661100", "H"),
+    "santesteban2019": Style("Santesteban 2019", "#AA4499", "d"),
     "supervised": Style("Supervised", "#E69F00", "s"),
     "snug": Style("SNUG", "#0072B2", "o"),
-    "pbns-springs": Style("PBNS, springs", "#117733", "^", ":"),
-    "santesteban2019": Style("Santesteban 2019", "#AA4499", "d"),
-    "tailornet": Style("TailorNet", "#661100", "H"),
-    "free-bound": Style("Free lower bound", "#5D3A9B", "_", "--"),
+    "snug-paper": Style("SNUG, paper's text", "#94A000", "o", "-."),
+    "snug-dynamic": Style("SNUG, dynamic", "#CC3311", "o"),
 }
+# What a figure shows that has no room for all: the rest is in the tables.
+LEADING = (
+    "simulation", "skinning", "pbns", "tailornet", "santesteban2019", "supervised", "snug", "snug-paper",
+    "snug-dynamic",
+)  # fmt: skip
+ROOM = 8  # methods that a figure shows whatever they are
 _VARIANT = "snug-"  # of SNUG: a recipe of its own, drawn in a spare colour with SNUG's marker
 _FAMILIES = {
     "newton": Style("Newton", "#D55E00", "P"),
@@ -106,7 +114,8 @@ def style(method: str) -> Style:
         return Style(f"{base.label}, cleaned up", base.colour, base.marker, ":")
     if method.startswith(_VARIANT) and "+" not in method:
         base = family_style(method)
-        return Style(f"SNUG, {method.removeprefix(_VARIANT).replace('-', ' ')}", base.colour, "o", ":")
+        words = re.sub(r"^window(\d+)$", r"windows of \1", method.removeprefix(_VARIANT)).replace("-", " ")
+        return Style(f"SNUG, {words}", base.colour, "o", ":")
     cut = cut_of(method)
     if cut is None:
         return family_style(method)
@@ -137,3 +146,9 @@ def ordered(methods: Iterable[str]) -> list[str]:
         return (2 + ("+" not in family), 0, family, place)
 
     return sorted(set(methods), key=rank)
+
+
+def leading(methods: Iterable[str]) -> list[str]:
+    """In order; those of `LEADING` alone where there are more than a figure has room for."""
+    found = ordered(methods)
+    return found if len(found) <= ROOM else [method for method in found if method in LEADING]

@@ -27,7 +27,7 @@ SIZE = (420, 520)  # pixels of one view
 BODY_COLOUR = "#D9CFC6"
 CLOTH_COLOUR = "#7FA8C9"
 GL_SECONDS = 20.0, 1.5  # to start pyvista, and for each view; some drivers hang rather than crash
-PER_ROW = 6
+PER_ROW = 6  # of up to so many views; more share as few rows as there have to be evenly
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ def side_by_side(folder: Path, dressed: Sequence[Dressed], *, opengl: bool = Tru
 
 def _views_of(dressed: Dressed, scratch: Path) -> list[View]:
     scratch.mkdir()
-    methods = palette.ordered(dressed.series)
+    methods = palette.leading(dressed.series)
     body = {"": dressed.body} if dressed.body else {}
     frame = chosen_frame(dressed.series | body)
     centre, height = look_at(dressed.series[methods[0]], frame)
@@ -173,14 +173,14 @@ def _compose(folder: Path, dressed: Dressed, views: Sequence[View], renderer: st
     """The views of one scene in rows, each under its method's name in its method's colour."""
     from matplotlib.image import imread
 
-    columns = min(len(views), PER_ROW)
-    lines = -(-len(views) // columns)
+    lines = -(-len(views) // PER_ROW)
+    columns = -(-len(views) // lines)
     width = min(PAGE_WIDTH, columns * 1.6)
     figure = new_figure(width, lines * (width / columns * SIZE[1] / SIZE[0] + 0.2))
     panels = np.atleast_1d(figure.subplots(lines, columns)).ravel()
     for axes in panels:
         axes.set_axis_off()
-    for axes, method, view in zip(panels, palette.ordered(dressed.series), views):
+    for axes, method, view in zip(panels, palette.leading(dressed.series), views):
         axes.imshow(imread(view.image))
         axes.set_title(palette.label(method), color=palette.style(method).colour, fontsize=9)
     frame = views[0].frame

@@ -8,6 +8,7 @@ deviation over seeds (n - 1), absent for a single seed.
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,9 @@ from reports.numbers import finite
 TERMS = ("strain", "bending", "gravity", "inertia", "collision", "total")
 USABLE = ("ok", "stalled")
 EXTRA_TERMS = ("spring", "area", "friction", "barrier")
+TIE = 0.05  # share of the larger of two values by which they may differ where no seeds tell their scatter
+TSHIRT = "T-shirt"
+_GARMENTS = {"dressed": TSHIRT}  # by the part of a scene's name before its motion, where that does not say
 
 
 @dataclass(frozen=True)
@@ -89,9 +93,29 @@ class Measurements:
         return None if mean is None else mean.value
 
 
+def wardrobe(measurements: Measurements) -> dict[str, tuple[str, ...]]:
+    """The scenes of each garment by its name, the T-shirt's first."""
+    found: dict[str, list[str]] = {}
+    for scene in sorted(worn_scenes(measurements), key=lambda scene: not scene.startswith("dressed/")):
+        prefix = scene.partition("/")[0]
+        found.setdefault(_GARMENTS.get(prefix, prefix.capitalize()), []).append(scene)
+    return {garment: tuple(scenes) for garment, scenes in found.items()}
+
+
 def dressed_scenes(measurements: Measurements) -> tuple[str, ...]:
-    """The scenes with a garment on a moving body, over which the paper's tables take their means."""
-    return tuple(scene for scene in measurements.scenes if scene.startswith("dressed/"))
+    """The scenes of the T-shirt, over which the paper's tables take their means; without one, of the first
+    other garment.
+    """
+    return next(iter(wardrobe(measurements).values()), ())
+
+
+def scatter(one: Mean, other: Mean) -> float:
+    """How far two such means differ by their seeds alone: the root of both variances over seeds; where
+    neither has more than one seed, `TIE` of the larger.
+    """
+    if one.spread is None and other.spread is None:
+        return TIE * max(abs(one.value), abs(other.value))
+    return math.hypot(one.spread or 0.0, other.spread or 0.0)
 
 
 def worn_scenes(measurements: Measurements) -> tuple[str, ...]:
@@ -114,7 +138,7 @@ def _cell(row: Row) -> tuple[str, str, int, str]:
     return (row.scene, row.method, row.seed, row.metric)
 
 
-def speed_measurements(rows: Sequence[Row]) -> Measurements:
+def speed_measurements(rows: Iterable[Row]) -> Measurements:
     """What an error-against-run-time plot may use: everything that has a scene and a method."""
     return Measurements(benchmark_cells(rows, "speed"))
 

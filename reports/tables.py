@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.results import Row
+from reports import bars
+from reports.ablations import ablations, ablations_judged
 from reports.findings import findings, recipes
 from reports.garment_tables import cost, curvature, dynamics, energies, energies_by_scene, geometry, shape
 from reports.stability import refusals
 from reports.study_tables import dependence, hard_aftermath, hard_motions, laws
 from reports.summary import Measurements, excess_energy, speed_measurements, suite_rows
 from reports.table import Cell, Column, Table
+from reports.throughput import throughput
 
 
 def speed(rows: Sequence[Row]) -> Table | None:
@@ -139,7 +142,11 @@ MAKERS = (
     shape,
     dynamics,
     cost,
+    throughput,
     findings,
+    ablations,
+    ablations_judged,
+    bars.table,
     recipes,
     speed,
     validation,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,9 +23,9 @@ class ModelHeaderError(ValueError):
 
 @dataclass(frozen=True)
 class History:
-    """How one model's loss fell: its kind and, for every few steps, step, seconds, loss and terms."""
+    """How one model's loss fell: its method and, for every few steps, step, seconds, loss and terms."""
 
-    kind: str
+    method: str
     rows: list[dict[str, float]]
 
     @property
@@ -51,7 +52,7 @@ def read_history(path: Path) -> History | None:
     except (OSError, ValueError, AttributeError) as error:
         raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
     rows = data.get("history") or []
-    return History(str(data.get("kind", path.stem)), rows) if len(rows) > 1 else None
+    return History(re.sub(r"-seed\d+$", "", path.stem), rows) if len(rows) > 1 else None
 
 
 def training_curves(folder: Path, models: Path, problems: list[str]) -> list[Picture]:
@@ -65,6 +66,8 @@ def training_curves(folder: Path, models: Path, problems: list[str]) -> list[Pic
             continue
         if history:
             histories.append(history)
+    shown = palette.leading({history.method for history in histories})
+    histories = [history for history in histories if history.method in shown]
     panels = [
         (title, kept)
         for title, kept in (
@@ -80,12 +83,12 @@ def _draw(folder: Path, panels: Sequence[tuple[str, list[History]]]) -> Picture:
     figure = new_figure(PAGE_WIDTH if len(panels) > 1 else PAGE_WIDTH * 0.6, 2.2)
     for axes, (title, histories) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels):
         for history in histories:
-            look = palette.style(history.kind)
+            look = palette.style(history.method)
             axes.plot(history.column("seconds"), history.column("loss"), color=look.colour, linewidth=1.1)
         axes.set(xlabel="training time [s]", title=title)
         log_axis(axes, "y")
         grid(axes)
-    kinds = palette.ordered(history.kind for _, histories in panels for history in histories)
-    legend_above(figure, kinds, lines=True)
+    methods = palette.ordered(history.method for _, histories in panels for history in histories)
+    legend_above(figure, methods, lines=True)
     caption = "Training loss against wall time; one curve per model and seed."
     return save(figure, folder, "training", caption=caption, section="garments", kind="training")

@@ -14,10 +14,10 @@ from reports.summary import (
     TERMS,
     Measurements,
     dressed_scenes,
+    scatter,
     suite_rows,
 )
 
-TIE = 0.05  # two values closer than this, relative to the larger, are called equal: so far do seeds scatter
 PAPER_TERMS = ("strain", "bending", "gravity", "inertia")
 _NAMES = {
     "simulation": "the converged simulation",
@@ -82,7 +82,7 @@ def against(measured: Measurements, rival: str) -> str:
         if own is None or other is None:
             continue
         a, b = own.value, other.value
-        if abs(a - b) <= max(TIE * max(abs(a), abs(b)), own.spread or 0.0, other.spread or 0.0):
+        if abs(a - b) <= scatter(own, other):
             groups["equal in"].append(term)
         else:
             groups["lower in" if a < b else "higher in"].append(f"{term} ({change(a, b)})")
@@ -101,7 +101,7 @@ def against(measured: Measurements, rival: str) -> str:
 def _equal_within(measured: Measurements, rival: str) -> str:
     means = (measured.mean("snug", "energy/total"), measured.mean(rival, "energy/total"))
     several = any(mean is not None and mean.spread is not None for mean in means)
-    return " within 5 % or the spread over seeds" if several else " within 5 %, the scatter of seeds"
+    return " within the scatter of seeds" if several else " within 5 %, the scatter of seeds"
 
 
 def change(value: float, other: float) -> str:
@@ -119,7 +119,7 @@ def curvature(measured: Measurements) -> str:
     """Who is closest to the simulation's wrinkles, and how wrinkled each is by itself."""
     errors = {
         method: error
-        for method in measured.methods
+        for method in palette.leading(measured.methods)
         if method != REFERENCE and (error := measured.value(method, "curvature/error")) is not None
     }
     if not errors:

@@ -1,0 +1,135 @@
+"""What was asked of this benchmark before it ran: each bar, the number that came out, whether it is met."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from benchmarks.results import Row
+from reports.ablations import ROLL_OUTS, TRAINING
+from reports.summary import TSHIRT, Mean, Measurements, suite_rows, wardrobe
+from reports.table import Cell, Column, Table
+
+CAPTION = "What was asked beforehand of SNUG at about 1000 vertices and 120 s of training, and what came out."
+SWINGING = ("tunic/twist_stop",)  # unseen, of a garment that swings
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A number that should be at most, or at least, `bound`; `value` finds it in (measured, roll-outs)."""
+
+    words: str
+    unit: str
+    bound: float
+    value: Callable[[Measurements, Measurements], Mean | None]
+    at_least: bool = False
+
+
+def bars() -> tuple[Bar, ...]:
+    """Every bar, in the order of the table."""
+    return (
+        Bar("Total above the free lower bound", "%", 8.0, _share("energy/total", "snug", "free-bound")),
+        Bar("Strain below skinning's, so many times", "1", 5.0, _times("energy/strain", "skinning", "snug"),
+            at_least=True),
+        Bar("Strain beside PBNS", "%", -20.0, _share("energy/strain", "snug", "pbns")),
+        Bar("Vertices below the skin", "%", 5.0, _of("penetration/vertices", "snug")),
+        Bar("Roll-outs on training motions, above windows", "%", 3.0, _roll_out_above_windows),
+        Bar("Windows above 2 J once training has settled", "1", 0.0, _trained("train/high_windows")),
+        Bar("One training step of 16 windows, on a core", "ms", 20.0, _trained("train/step")),
+        Bar("One frame", "ms", 0.5, _of("cost/frame", "snug")),
+        Bar("Tunic that stops: A of the dynamic recipe", "1", 0.5, _swing("dynamics/amplitude"),
+            at_least=True),
+        Bar("Its correlation", "1", 0.65, _swing("dynamics/correlation"), at_least=True),
+        Bar("Its strain, off the simulation's", "%", 25.0, _swing_strain),
+    )  # fmt: skip
+
+
+def table(rows: Sequence[Row]) -> Table | None:
+    """The bars that this run can judge; None where it has no SNUG network."""
+    measured, long = (Measurements(suite_rows(rows, suite)) for suite in ("garments", ROLL_OUTS))
+    lines: list[tuple[Cell, ...]] = []
+    for bar in bars():
+        found = bar.value(measured, long)
+        if found is not None:
+            bound = f"{'at least' if bar.at_least else 'at most'} {bar.bound:g}".replace("-", "−")
+            lines.append((bar.words, found, bound, bar.unit, met(bar, found)))
+    if not lines:
+        return None
+    columns = (
+        Column("finding", "Bar"),
+        Column("value", "Here"),
+        Column("bound", "Asked"),
+        Column("unit", "Unit"),
+        Column("status", "Result"),
+    )
+    return Table("bars", columns, tuple(lines))
+
+
+def met(bar: Bar, found: Mean) -> str:
+    """In words; a number nearer to its bound than seeds scatter is said to be."""
+    if found.spread and abs(found.value - bar.bound) <= found.spread:
+        return "within the scatter of seeds"
+    within = found.value >= bar.bound if bar.at_least else found.value <= bar.bound
+    return "met" if within else "missed"
+
+
+def ratio(one: Mean | None, other: Mean | None) -> Mean | None:
+    """one / other, with both their spreads."""
+    if one is None or other is None or not one.value or not other.value:
+        return None
+    value = one.value / other.value
+    known = [abs(mean.spread / mean.value) for mean in (one, other) if mean.spread is not None]
+    spread = abs(value) * math.hypot(*known) if known else None
+    complete = one.complete and other.complete
+    return Mean(value, spread, one.scenes, max(one.seeds, other.seeds), complete)
+
+
+def _percent(mean: Mean | None) -> Mean | None:
+    """A ratio as percent above 1."""
+    if mean is None:
+        return None
+    spread = None if mean.spread is None else 100.0 * mean.spread
+    return Mean(100.0 * (mean.value - 1.0), spread, mean.scenes, mean.seeds, mean.complete)
+
+
+def _shirt(measured: Measurements) -> Sequence[str]:
+    return wardrobe(measured).get(TSHIRT, ())
+
+
+def _of(metric: str, method: str) -> Callable[[Measurements, Measurements], Mean | None]:
+    return lambda measured, _: measured.mean(method, metric, _shirt(measured))
+
+
+def _times(metric: str, one: str, other: str) -> Callable[[Measurements, Measurements], Mean | None]:
+    def found(measured: Measurements, _: Measurements) -> Mean | None:
+        scenes = _shirt(measured)
+        return ratio(measured.mean(one, metric, scenes), measured.mean(other, metric, scenes))
+
+    return found
+
+
+def _share(metric: str, one: str, other: str) -> Callable[[Measurements, Measurements], Mean | None]:
+    times = _times(metric, one, other)
+    return lambda measured, long: _percent(times(measured, long))
+
+
+def _trained(metric: str) -> Callable[[Measurements, Measurements], Mean | None]:
+    return lambda _, long: long.mean("snug", metric, TRAINING)
+
+
+def _roll_out_above_windows(_: Measurements, long: Measurements) -> Mean | None:
+    ends = (long.mean("snug", f"train/{what}", TRAINING) for what in ("roll_out", "window"))
+    return _percent(ratio(*ends))
+
+
+def _swing(metric: str) -> Callable[[Measurements, Measurements], Mean | None]:
+    return lambda measured, _: measured.mean("snug-dynamic", metric, SWINGING)
+
+
+def _swing_strain(measured: Measurements, _: Measurements) -> Mean | None:
+    strains = (measured.mean(m, "energy/strain", SWINGING) for m in ("snug-dynamic", "simulation"))
+    above = _percent(ratio(*strains))
+    if above is None:
+        return None
+    return Mean(abs(above.value), above.spread, above.scenes, above.seeds, above.complete)

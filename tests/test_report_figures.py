@@ -1,0 +1,71 @@
+"""Figures of the report and what they are read from."""
+
+from __future__ import annotations
+
+import numpy as np
+from run_folder import FRAMES, row, sheet, write_mesh
+
+from reference_sim import Trajectory
+from reports import figures, hem, palette, vtkhdf, work_precision
+from reports.fronts import Point
+
+
+def test_the_reader_knows_the_simulators_files(tmp_path):
+    positions = np.random.default_rng(0).normal(size=(3, 4, 3))
+    fields = {"energy/strain": np.array([0.0, 1.0, 2.0])}
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    times = np.arange(3) / 30.0
+    Trajectory(positions, faces, times, np.zeros(3), frame_fields=fields).save(tmp_path / "t.vtkhdf")
+    series = vtkhdf.read_series(tmp_path / "t.vtkhdf")
+    assert np.array_equal(series.positions(1), positions[1]) and np.array_equal(series.faces, faces)
+    assert np.array_equal(series.positions(-1), positions[2]) and np.allclose(series.times, times)
+    assert np.array_equal(series.fields["energy/strain"], fields["energy/strain"])
+
+
+def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
+    from reports.canvas import new_figure
+
+    axes = new_figure(3, 3).subplots()
+    points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
+    hollow = work_precision._draw_points(axes, points, 20.0, floor=0.0)
+    assert hollow == {"newton-8"}
+    low, high = axes.get_ylim()
+    shown = [
+        y for line in axes.get_lines() for y in np.atleast_1d(line.get_ydata()) if len(line.get_xdata()) == 1
+    ]
+    assert len(shown) >= 2 and all(low < y < high for y in shown[:2])
+
+
+def test_a_check_that_must_be_exact_is_on_an_edge():
+    exact = row("modes", "simulation", "check", 6.0, suite="validation", expected=6.0, tolerance=0.0)
+    off = row("modes", "simulation", "check", 7.0, suite="validation", expected=6.0, tolerance=0.0)
+    assert figures._tolerances_away(exact) == 0.0 and figures._tolerances_away(off) == float("inf")
+
+
+def test_methods_keep_their_order_and_their_look():
+    names = ["zebra", "newton-8", "snug", "newton-2", "simulation", "newton-16", "skinning"]
+    known = ["simulation", "skinning", "snug", "newton-2", "newton-8", "newton-16", "zebra"]
+    assert palette.ordered(names) == known
+    assert palette.label("newton-1") == "Newton, 1 iteration"
+    assert palette.style("newton-2").colour == palette.style("newton-16").colour
+    colours = [palette.style(name).colour for name in palette._KNOWN]
+    assert len(set(colours)) == len(colours)
+
+
+def test_the_hem_is_drawn_where_it_swings(tmp_path):
+    turn = {
+        "hem/yaw": np.radians(np.linspace(0.0, 40.0, FRAMES)),
+        "hem/from_end": np.linspace(0.1, 0.0, FRAMES),
+    }
+    series = {}
+    for method in ("simulation", "snug"):
+        cloth, faces = sheet(0.1)
+        write_mesh(tmp_path / f"{method}.vtkhdf", cloth, faces, turn)
+        series[method] = vtkhdf.read_series(tmp_path / f"{method}.vtkhdf")
+    picture = hem.hem_curves(tmp_path, "tunic/twist", series)
+    assert picture is not None and picture.path.is_file()
+    write_mesh(tmp_path / "still.vtkhdf", cloth, faces, {name: 0.01 * curve for name, curve in turn.items()})
+    assert (
+        hem.hem_curves(tmp_path, "tunic/still", {"snug": vtkhdf.read_series(tmp_path / "still.vtkhdf")})
+        is None
+    )

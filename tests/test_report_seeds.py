@@ -1,0 +1,106 @@
+"""Several seeds in the report: ablations against the full recipe, bars, throughput. The rows are made up."""
+
+from __future__ import annotations
+
+import pytest
+from run_folder import row
+
+from reports import bars
+from reports.ablations import ABLATIONS, ablations, ablations_judged
+from reports.document import document
+from reports.summary import TIE, Mean, Measurements, dressed_scenes, scatter, wardrobe
+from reports.tables import make_tables
+from reports.throughput import throughput, throughput_bars
+
+
+def seeds_of(method, metric, values, **more):
+    return [row(method=method, metric=metric, value=value, seed=k, **more) for k, value in enumerate(values)]
+
+
+def test_the_scatter_is_that_of_both_or_a_share_where_no_seeds_tell_it():
+    assert scatter(Mean(1.0, 0.3, 1, 3, True), Mean(2.0, 0.4, 1, 3, True)) == pytest.approx(0.5)
+    assert scatter(Mean(1.0, 0.3, 1, 3, True), Mean(2.0, None, 1, 1, True)) == pytest.approx(0.3)
+    assert scatter(Mean(1.0, None, 1, 1, True), Mean(-2.0, None, 1, 1, True)) == pytest.approx(2.0 * TIE)
+
+
+def test_garments_have_their_own_means_and_the_shirt_comes_first():
+    rows = [row("tunic/stop", value=9.0), row("dressed/walk", value=1.0), row("dressed/kick", value=3.0)]
+    measured = Measurements(rows)
+    assert wardrobe(measured) == {"T-shirt": ("dressed/walk", "dressed/kick"), "Tunic": ("tunic/stop",)}
+    assert dressed_scenes(Measurements(rows[:1])) == ("tunic/stop",)
+    found = {line[0]: line[2].value for line in make_tables(rows)["energies"].rows}
+    assert found == {"T-shirt": 2.0, "Tunic": 9.0}
+
+
+def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
+    rows = seeds_of("snug-no-noise", "energy/total", (2.0, 2.2, 2.4))
+    rows += seeds_of("snug-window6", "energy/total", (1.0, 1.2, 1.4))
+    rows += seeds_of("snug", "energy/total", (1.0, 1.1, 1.2))
+    rows += seeds_of("snug", "roll_out/drift", (1.0, 1.1, 1.2), suite="roll-outs", scene="there_and_back")
+    rows += seeds_of("snug-no-noise", "roll_out/drift", (0.1,), suite="roll-outs", scene="there_and_back")
+    made = make_tables(rows)
+    assert [line[1] for line in made["energies"].rows] == ["snug"]
+    assert [line[1] for line in made["ablations"].rows] == ["snug", "snug-no-noise", "snug-window6"]
+    full = made["ablations"].rows[0]
+    assert full[-1] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, complete=True)
+    assert made["ablations_judged"].rows == (
+        ("T-shirt", "snug-no-noise", "total energy", "drift of long roll-outs"),
+        ("T-shirt", "snug-window6", "", ""),
+    )
+
+
+def test_without_the_full_recipe_nothing_is_compared():
+    rows = [row(method=name, metric="energy/total") for name in ABLATIONS]
+    assert ablations(rows) is None and ablations_judged(rows) is None
+    assert ablations([row(metric="energy/total")]) is None
+
+
+def met(rows):
+    table = bars.table(rows)
+    assert table is not None
+    return {line[0]: (line[1].value, line[-1]) for line in table.rows}
+
+
+def test_bars_are_met_missed_or_too_near_to_tell():
+    rows = seeds_of("snug", "energy/total", (1.04, 1.06)) + seeds_of("free-bound", "energy/total", (1.0,))
+    assert met(rows)["Total above the free lower bound"] == (pytest.approx(5.0), "met")
+    rows += seeds_of("snug", "energy/strain", (0.2, 0.4)) + seeds_of("skinning", "energy/strain", (1.2,))
+    times = met(rows)["Strain below skinning's, so many times"]
+    assert times == (pytest.approx(4.0), "within the scatter of seeds")
+    ends = [("train/roll_out", (1.04, 1.04)), ("train/window", (1.0, 1.0)), ("train/high_windows", (0.0,))]
+    rows += [r for name, v in ends for r in seeds_of("snug", name, v, suite="roll-outs", scene="training")]
+    found = met(rows)
+    assert found["Roll-outs on training motions, above windows"] == (pytest.approx(4.0), "missed")
+    assert found["Windows above 2 J once training has settled"] == (0.0, "met")
+
+
+def test_the_dynamic_recipe_is_judged_on_the_garment_that_swings():
+    scene = {"scene": "tunic/twist_stop"}
+    rows = [row(method="snug-dynamic", metric="dynamics/amplitude", value=0.6, **scene)]
+    rows += [row(method="snug-dynamic", value=0.7, **scene), row(method="simulation", value=1.0, **scene)]
+    found = met(rows)
+    assert found["Tunic that stops: A of the dynamic recipe"] == (0.6, "met")
+    assert found["Its strain, off the simulation's"] == (pytest.approx(30.0), "missed")
+    assert bars.table([row(method="simulation")]) is None
+
+
+def test_throughput_is_of_the_scenes_that_were_measured_both_ways(tmp_path):
+    cost = {"unit": "ms", "method": "snug"}
+    rows = [row(metric="cost/frame", value=0.5, **cost), row(metric="cost/batch", value=0.1, **cost)]
+    rows += [row("dressed/jump", metric="cost/frame", value=9.0, **cost)]
+    rows += [row(metric="cost/frame", value=70.0, unit="ms", method="simulation")]
+    table = throughput(rows)
+    assert table is not None
+    assert [line[1] for line in table.rows] == ["snug"]
+    assert table.rows[0][4:] == pytest.approx((2000.0, 10000.0, 5.0))
+    (picture,) = throughput_bars(tmp_path, rows)
+    assert picture.path.is_file() and throughput_bars(tmp_path, rows[-1:]) == []
+
+
+def test_the_page_says_how_many_seeds_there_were():
+    rows = seeds_of("snug", "energy/strain", (1.0, 1.1, 1.2)) + seeds_of("pbns", "energy/strain", (2.0, 2.1))
+    rows += seeds_of("simulation", "energy/strain", (1.0,))
+    sections = document({}, rows, make_tables(rows), [], [])["sections"]
+    notes = [block["note"] for section in sections for block in section["blocks"]]
+    assert any("±: standard deviation over 2 or 3 seeds. Without it: one seed" in note for note in notes)
+    assert not any("With one seed" in note for note in notes)

@@ -1,0 +1,123 @@
+"""Words, numbers and tables of the report: as the rows say, dashes where there are none."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from run_folder import SCENES, all_rows, row, skipped
+
+from reports import numbers, tables, words
+from reports.document import document, merged
+from reports.layout import table_block
+from reports.summary import Mean, Measurements
+
+
+def test_mean_and_spread_over_seeds():
+    rows = [row(scene, seed=s, value=v) for scene in SCENES for s, v in ((0, 1.0), (1, 3.0), (2, 8.0))]
+    mean = Measurements(rows).mean("snug", "energy/strain", SCENES)
+    assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), scenes=2, seeds=3, complete=True)
+    assert Measurements(rows[:1]).mean("snug", "energy/strain", SCENES[:1]).spread is None
+
+
+def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
+    rows = [
+        row("dressed/walk", value=1.0),
+        row("dressed/jump", value=100.0, status="failed", reason="x"),
+        row("dressed/walk", "simulation", value=4.0, status="stalled", reason="2 frames"),
+        row("dressed/jump", "simulation", value=6.0),
+    ]
+    table = tables.energies(rows)
+    assert table is not None
+    lines = {line[1]: line[2] for line in table.rows}
+    assert lines["snug"].value == 1.0 and not lines["snug"].complete
+    assert lines["simulation"].value == 5.0 and lines["simulation"].complete and lines["simulation"].stalled
+    block = table_block(table, "", grouped_by=("garment",))
+    assert [line[1]["mark"] for line in block["groups"][0]["rows"]] == ["†", "*"]
+    assert "fewer scenes" in block["note"] and "unconverged" in block["note"]
+
+
+def test_a_cell_of_two_suites_counts_once_in_its_own_table():
+    rows = [row(value=v, metric="cost/frame", suite=s) for v, s in ((1.0, "garments"), (2.0, "speed"))]
+    rows += [row(value=v, suite=s) for v, s in ((1.0, "garments"), (2.0, "speed"))]
+    by_scene, speed = tables.energies_by_scene(rows), tables.speed(rows)
+    assert by_scene is not None and speed is not None
+    assert [line[2].value for line in by_scene.rows] == [1.0] and speed.rows[0][2].value == 2.0
+
+
+def test_lines_that_differ_in_their_scene_alone_become_one():
+    table = tables.unfinished([skipped(scene="a"), skipped(scene="b"), skipped(scene="c", reason="other")])
+    assert table is not None
+    assert [line[1] for line in merged(table, "scene").rows] == ["a, b", "c"]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.064349, "0.0643"),
+        (12.34, "12.3"),
+        (1734.0, "1,734"),
+        (-0.5, "−0.500"),
+        (0.0, "0"),
+        (9.996, "10.0"),
+        (2.5e-7, "2.50×10⁻⁷"),
+        (3.2e9, "3.20×10⁹"),
+        (None, "–"),
+        (float("nan"), "–"),
+        (float("inf"), "–"),
+    ],
+)
+def test_numbers_as_text(value, text):
+    assert numbers.number(value) == text
+
+
+def test_other_texts():
+    assert numbers.number(0.2835, 7, trim=True) == "0.2835" and numbers.number(6.0, 7, trim=True) == "6"
+    assert numbers.with_spread(0.5, 0.012) == "0.500 ± 0.012" and numbers.with_spread(0.5, None) == "0.500"
+    assert [numbers.duration(s) for s in (0.0, 61.0, 402.0, 104400.0, None)] == [
+        "0 s", "61.0 s", "6.70 min", "29.0 h", "–",
+    ]  # fmt: skip
+    assert numbers.csv_number(None) == "-" and numbers.csv_number(0.0) == "0"
+
+
+def test_decimal_points_stand_in_a_column():
+    padded = numbers.aligned(["0.123", "18.2", "400", "–"])
+    assert len({len(text) - text.index(".") for text in padded[:2]}) == 1
+    assert len(padded[2]) - 3 == len(padded[0]) - 1 and padded[3] == "–"
+
+
+def test_the_answer_follows_the_numbers():
+    def said(snug: float, pbns: float) -> str:
+        values = (("snug", snug), ("pbns", pbns))
+        terms = ("strain", "bending", "gravity", "inertia", "total")
+        rows = [row(method=m, metric=f"energy/{t}", value=v) for m, v in values for t in terms]
+        return " ".join(text for _, text in words.findings(rows))
+
+    assert "SNUG has the lowest" in said(1.0, 2.5) and "inertia is reproduced." not in said(2.5, 1.0)
+    assert "PBNS has the lowest" in said(2.5, 1.0) and "2.5 times as much" in said(2.5, 1.0)
+    assert "SNUG is lower in strain" in said(1.0, 2.5) and "SNUG is higher in strain" in said(2.5, 1.0)
+    assert "gravity and inertia, is reproduced." in said(1.0, 1.2)
+    assert "equal in strain" in said(1.0, 1.001) and "reproduced in 0 of the 4" in said(1.0, 1.001)
+
+
+def test_a_difference_within_the_spread_of_the_seeds_is_no_difference():
+    rows = [row(seed=s, value=v) for s, v in ((0, 0.8), (1, 1.2))]
+    rows += [row(method="pbns", seed=s, value=v) for s, v in ((0, 0.9), (1, 1.3))]
+    measured = Measurements(rows)
+    assert words.against(measured, "pbns").startswith("SNUG is equal in strain")
+
+
+def test_sections_exist_only_for_what_ran():
+    check = row("free_fall", "simulation", "check", 0.0, suite="validation", expected=0.0, tolerance=1.0)
+    made_tables = tables.make_tables([check])
+    content = document({}, [check], made_tables, [], [])
+    assert [section["title"] for section in content["sections"]] == ["Validation: known answers"]
+    assert content["definitions"] == [] and content["lead"] is None
+    assert set(made_tables) == {"validation", "metrics"}
+
+
+def test_no_number_of_the_report_is_infinite_or_nan():
+    content = document({}, all_rows(), tables.make_tables(all_rows()), [], [])
+    assert not re.search(r"\b(nan|inf|NaN|None)\b", json.dumps(content, allow_nan=False))
