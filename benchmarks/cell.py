@@ -32,6 +32,7 @@ WORDS = {"converged": "ok", "ok": "ok", "stalled": "stalled", "diverged": "diver
 OURS = ("reference_sim", "snug", "benchmarks")
 HEAVY = ("torch", "igl", "numba", "scipy", "h5py")  # what a scene may do without
 _SCENES: dict[str, BuiltScene] = {}  # of this process, which has one
+_BATCHES: dict[str, Callable[[int], Callable[[], np.ndarray]]] = {}  # and of its cell, where it has one
 BATCH = 16  # bodies at once, where a method can
 
 
@@ -67,18 +68,26 @@ class Task:
     preset: Preset
     wardrobe: Wardrobe | None
     folder: Path
-    device: str
 
 
 def perform(task: Task) -> Outcome:
     """Build the scene and run the cell in this process, whose memory and modules are looked at afterwards."""
     try:
         scene = _SCENES[task.cell.scene.name] = built(task)
-        outcome = run_cell(task.cell, task.entry, scene, RunFolder(task.folder), device=task.device)
+        outcome = run_cell(task.cell, task.entry, scene, RunFolder(task.folder))
     except Exception as error:
         outcome = failed(task.cell, error)
     peak = outcome.peak if outcome.recorded else peak_memory()
     return dataclasses.replace(outcome, peak=peak, modules=loaded())
+
+
+def perform_many(task: Task) -> Outcome:
+    """Take the time of many bodies at once, where the method that this process has run can do them."""
+    ready = _BATCHES.pop(task.cell.label, None)
+    try:
+        return Outcome(task.cell, "ok", batch_seconds=throughput(ready(BATCH)) if ready else None)
+    except Exception as error:
+        return failed(task.cell, error)
 
 
 def perform_again(task: Task) -> Outcome:
@@ -86,7 +95,7 @@ def perform_again(task: Task) -> Outcome:
     try:
         scene = _SCENES.get(task.cell.scene.name) or built(task)
         models = RunFolder(task.folder).models_of(task.cell.scene.garment)
-        method = task.entry.make(models=models, seed=task.cell.seed, device=task.device)
+        method = task.entry.make(models=models, seed=task.cell.seed)
         method.prepare(scene)
         _, reading = clocked(method.run, of=lambda made: made.positions)
     except Exception as error:
@@ -109,32 +118,35 @@ def built(task: Task) -> BuiltScene:
     return dataclasses.replace(dressed, settle=lambda: start)
 
 
-def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder, *, device: str) -> Outcome:
-    """Prepare off the clock, run on it, write the trajectory. Whatever is raised becomes a failed outcome."""
+def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder) -> Outcome:
+    """Prepare off the clock, run on it, write the trajectory. Whatever is raised becomes a failed outcome.
+
+    What many bodies at once take is asked for afterwards, by perform_many.
+    """
     if reason := entry.skip(cell.scene):
         return Outcome(cell, "skipped", reason)
     path = run.trajectory_path(cell.scene.name, cell.method, cell.seed)
     try:
-        method = entry.make(models=run.models_of(cell.scene.garment), seed=cell.seed, device=device)
+        method = entry.make(models=run.models_of(cell.scene.garment), seed=cell.seed)
         method.prepare(scene)
         trajectory, reading = clocked(method.run, of=lambda made: made.positions)
         peak = peak_memory()  # many bodies at once, and poses held still, are not what others are compared by
         status, reason = judge(trajectory, reading, scene, cut_short=entry.cut_short)
         if status == "failed":
             return Outcome(cell, status, reason)
-        ready = getattr(method, "ready_batch", None)
-        at_once = throughput(ready(BATCH)) if ready is not None else None
         path.parent.mkdir(parents=True, exist_ok=True)
         provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
         dataclasses.replace(trajectory, provenance=trajectory.provenance | provenance).save(path)
         held = getattr(method, "held", None)
         if held is not None:
             held().save(run.held_path(cell.scene.name, cell.method, cell.seed))
+        if hasattr(method, "ready_batch"):
+            _BATCHES[cell.label] = method.ready_batch
     except Exception as error:
         return failed(cell, error)
     frames = frames_computed(trajectory)
     return Outcome(
-        cell, status, reason, (reading.seconds,), frames, at_once, peak, terms="+".join(scene.terms),
+        cell, status, reason, (reading.seconds,), frames, peak=peak, terms="+".join(scene.terms),
         recorded=True,
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from .agenda import REFERENCE, Agenda, flat, name_of
-from .cell import Outcome, Task, failed, perform, perform_again
+from .cell import Outcome, Task, failed, perform, perform_again, perform_many
 from .clock import one_thread
 from .guarded import Broken, Guarded
 from .methods import find_method
@@ -49,6 +49,8 @@ class Cells:
             self._clear(cell)
             blocked = Outcome(cell, "failed", f"{BLOCKED}{obstacle}")
             outcome = blocked if obstacle else self._guarded(perform, cell)
+            if outcome.recorded:
+                outcome = self._with_many(outcome)
             self._keep(work, outcome)
             return outcome
         if found.result is None:
@@ -98,6 +100,21 @@ class Cells:
         self._keep(work, outcome)
         return outcome
 
+    def _with_many(self, outcome: Outcome) -> Outcome:
+        """The outcome with the time of many bodies at once.
+
+        Where there is no room or time for so many, its run stands. A time that cannot be believed takes the
+        cell with it.
+        """
+        many = self._guarded(perform_many, outcome.cell)
+        if many.status == "ok":
+            return dataclasses.replace(outcome, batch_seconds=many.batch_seconds)
+        reason = f"many at once: {many.status}: {many.reason}"
+        if many.status in ("out-of-memory", "timeout"):
+            return dataclasses.replace(outcome, reason=outcome.reason or reason)
+        self._clear(outcome.cell)
+        return Outcome(outcome.cell, "failed", reason)
+
     def _is_repeated(self, outcome: Outcome) -> bool:
         """Cells of suite speed that ended well, and soon enough to be run again."""
         return (
@@ -118,7 +135,6 @@ class Cells:
             preset=plan.preset,
             wardrobe=wardrobe if cell.scene.dressed else None,
             folder=plan.folder,
-            device=plan.device,
         )
         process = self._idle.setdefault(cell, Guarded())
         try:

@@ -107,8 +107,7 @@ def measure(
     folder: Path = records.folder.path
     cell = outcomes[0].cell
     task = Task(
-        cell=cell, entry=find_method(cell.method), preset=preset, wardrobe=wardrobe, folder=folder,
-        device="cpu",
+        cell=cell, entry=find_method(cell.method), preset=preset, wardrobe=wardrobe, folder=folder
     )  # fmt: skip
     found = measure_scene(outcomes, built(task), RunFolder(folder), gap_samples=preset.gap_samples)
     for work, metrics in zip(wanted, found):

@@ -58,10 +58,10 @@ class MethodEntry:
             return f"{self.name} needs the package {self.package}, which is not installed"
         return None
 
-    def make(self, *, models: Path, seed: int, device: str = "cpu") -> Method:
+    def make(self, *, models: Path, seed: int) -> Method:
         """A fresh method for one cell; `models` is the folder of trained networks."""
         module = importlib.import_module(self.module)
-        return module.make(models=models, seed=seed, device=device, **self.options)
+        return module.make(models=models, seed=seed, **self.options)
 
 
 def installed(package: str) -> bool:

@@ -37,12 +37,17 @@ class Misbehaving:
         )  # fmt: skip
 
     def ready_batch(self, copies: int):
-        """Many at once: "greedy" takes a third of a gigabyte, "crowded" leaves the work to a thread."""
+        """Many at once: "greedy" takes a third of a gigabyte, "crowded" leaves the work to a thread.
+
+        "crammed" is killed for it.
+        """
 
         def compute() -> np.ndarray:
             still = np.zeros((self.scene.frames, copies, len(self.scene.start), 3))
             if self.how == "greedy":
                 np.ones(40_000_000).sum()
+            if self.how == "crammed":
+                self._killed(still)
             if self.how == "crowded":
                 self._early(still)
             return still
@@ -75,5 +80,5 @@ class Misbehaving:
         threading.Thread(target=work, daemon=True).start()
 
 
-def make(*, models: Path, seed: int, device: str, how: str) -> Misbehaving:
+def make(*, models: Path, seed: int, how: str) -> Misbehaving:
     return Misbehaving(how)

@@ -134,6 +134,17 @@ def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_pa
     misbehaving("crowded")
     crowded = outcome_of(plan)
     assert crowded.status == "failed" and "many at once" in crowded.reason
+    assert not crowded.recorded and not list(tmp_path.rglob("*.vtkhdf"))
+
+
+def test_what_a_cell_has_run_stands_where_there_is_no_room_for_many(tmp_path, misbehaving):
+    plan = plan_of(tmp_path, "newton-1")
+    misbehaving("crammed")
+    outcome = outcome_of(plan)
+    assert (outcome.status, outcome.recorded, outcome.batch_seconds) == ("ok", True, None)
+    assert "many at once: out-of-memory" in outcome.reason and "SIGKILL" in outcome.reason
+    assert RunFolder(tmp_path).trajectory_path("free_fall", "newton-1").is_file()
+    assert harness(plan).first(plan.cells[0], None) == outcome
 
 
 # --- reuse -----------------------------------------------------------------------------------------------

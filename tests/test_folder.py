@@ -168,25 +168,31 @@ def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path
 def test_killed_at_any_moment_a_run_ends_as_one_that_was_not(tmp_path):
     names = ("simulation", "newton-1", "newton-4", "lbfgs-5", "gradient-descent-10")
     assert run.main(words_of(tmp_path / "whole", *names)) == 0
-    words = words_of(tmp_path / "killed", *names)
-    for seconds in (2.0, 4.0, 7.0, 5.0, 9.0):
-        kept = {path: path.read_bytes() for path in (tmp_path / "killed").glob("records/cell/**/*.json")}
+    folder = tmp_path / "killed"
+    words, killed = words_of(folder, *names), []
+    for files in (1, 5, 9, 14, 19):  # in the folder when it is killed, a little later each time
+        kept = {path: path.read_bytes() for path in folder.glob("records/cell/**/*.json")}
         process = subprocess.Popen(
             [sys.executable, "-m", "benchmarks.run", *words],
             cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
-        time.sleep(seconds)
+        deadline = time.monotonic() + 120
+        while process.poll() is None and sum(path.is_file() for path in folder.rglob("*")) < files:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        time.sleep(0.03 * files)
         process.kill()
         process.wait()
-        deadline = time.monotonic() + 30
+        killed.append(process.returncode)
         while of_session(process.pid):
             assert time.monotonic() < deadline
             time.sleep(0.05)
         assert {path: path.read_bytes() for path in kept} == kept
+    assert killed.count(-signal.SIGKILL) >= 4  # in the midst of it
     assert run.main(words) == 0
-    assert measured(tmp_path / "killed") == measured(tmp_path / "whole")
-    assert not [path for path in (tmp_path / "killed").rglob("*") if "part" in path.name]
+    assert measured(folder) == measured(tmp_path / "whole")
+    assert not [path for path in folder.rglob("*") if "part" in path.name]
 
 
 def measured(folder: Path) -> dict[tuple[str, str], tuple[float | None, str]]:

@@ -69,7 +69,7 @@ def outcomes(run, wardrobe, trained):
         found[scene.name] = (
             built,
             [
-                run_cell(Cell(scene, m.name, 0, ("garments", "speed")), m, built, run, device="cpu")
+                run_cell(Cell(scene, m.name, 0, ("garments", "speed")), m, built, run)
                 for m in methods
             ],
         )

@@ -72,6 +72,6 @@ class CleanedNetwork:
         return replace(still, positions=np.stack(cleaned))
 
 
-def make(*, models: Path, seed: int, device: str, kind: str) -> CleanedNetwork:
+def make(*, models: Path, seed: int, kind: str) -> CleanedNetwork:
     """The network of that name and seed, cleaned up after."""
     return CleanedNetwork(model_path(models, kind, seed))

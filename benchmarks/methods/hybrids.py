@@ -80,7 +80,7 @@ class Hybrid:
         return lambda: predictions(model, dressed, motion)
 
 
-def make(*, models: Path, seed: int, device: str, guess: str, solver: str, iterations: int) -> Hybrid:
+def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> Hybrid:
     """`iterations` of "newton" or "lbfgs" from the network of kind `guess`, or from "skinning"."""
     options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
     if solver == "lbfgs":

@@ -23,7 +23,6 @@ class Network:
     """A model read from its file. Features are made and the network is warmed up before the clock runs."""
 
     path: Path
-    device: str
 
     def prepare(self, scene: BuiltScene) -> None:
         from snug.dresser import DressedBody
@@ -52,6 +51,6 @@ class Network:
         return roll_out(self.model, self.dressed, self.motion, held_pose=True)
 
 
-def make(*, models: Path, seed: int, device: str, kind: str) -> Network:
+def make(*, models: Path, seed: int, kind: str) -> Network:
     """The network of that kind ("snug", "supervised", "pbns" or "untrained") and seed."""
-    return Network(model_path(models, kind, seed), device)
+    return Network(model_path(models, kind, seed))

@@ -72,6 +72,6 @@ class NewtonPeer:
         }
 
 
-def make(*, models: Path, seed: int, device: str, solver: str, iterations: int, substeps: int) -> NewtonPeer:
+def make(*, models: Path, seed: int, solver: str, iterations: int, substeps: int) -> NewtonPeer:
     """The solver "VBD" or "XPBD" of newton."""
     return NewtonPeer(solver, iterations, substeps)

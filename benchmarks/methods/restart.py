@@ -28,6 +28,6 @@ class Moved(Simulation):
         super().prepare(dataclasses.replace(scene, settle=lambda: start))
 
 
-def make(*, models: Path, seed: int, device: str) -> Moved:
+def make(*, models: Path, seed: int) -> Moved:
     """The reference from a moved start."""
     return Moved(options={})

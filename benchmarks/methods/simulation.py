@@ -47,6 +47,6 @@ class Simulation:
         )
 
 
-def make(*, models: Path, seed: int, device: str, **options: Any) -> Simulation:
+def make(*, models: Path, seed: int, **options: Any) -> Simulation:
     """A simulation to the reference's own tolerance and time step, or to those in the options."""
     return Simulation(options=options)

@@ -66,6 +66,6 @@ class Skinning:
         return self.run()
 
 
-def make(*, models: Path, seed: int, device: str) -> Skinning:
+def make(*, models: Path, seed: int) -> Skinning:
     """Skinning alone; it has no seed and no model."""
     return Skinning()

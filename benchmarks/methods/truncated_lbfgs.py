@@ -16,7 +16,7 @@ MEMORY = 10  # remembered steps
 
 
 def make(
-    *, models: Path, seed: int, device: str, iterations: int, memory: int = MEMORY, tolerance: float = 1e-6
+    *, models: Path, seed: int, iterations: int, memory: int = MEMORY, tolerance: float = 1e-6
 ) -> Simulation:
     """A simulation that stops every step after `iterations` of L-BFGS with that many remembered steps."""
     return Simulation(

@@ -7,6 +7,6 @@ from pathlib import Path
 from .simulation import Simulation
 
 
-def make(*, models: Path, seed: int, device: str, iterations: int) -> Simulation:
+def make(*, models: Path, seed: int, iterations: int) -> Simulation:
     """A simulation that stops every step after `iterations` Newton iterations, converged or not."""
     return Simulation(options={"method": "newton", "max_iterations": iterations})

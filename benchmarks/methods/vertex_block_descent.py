@@ -7,7 +7,7 @@ from pathlib import Path
 from .simulation import Simulation
 
 
-def make(*, models: Path, seed: int, device: str, iterations: int) -> Simulation:
+def make(*, models: Path, seed: int, iterations: int) -> Simulation:
     """A simulation whose every step is `iterations` sweeps of vertex block descent."""
     from ..minimisers.block_descent import VertexBlockDescent
 
