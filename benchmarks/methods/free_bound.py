@@ -147,6 +147,6 @@ def _by_kind(values: np.ndarray, kinds: list[int]) -> np.ndarray:
     )
 
 
-def make(*, models: Path, seed: int, device: str) -> FreeBound:
+def make(*, models: Path, seed: int) -> FreeBound:
     """The bound; it has no seed and no model."""
     return FreeBound()
