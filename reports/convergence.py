@@ -52,9 +52,8 @@ def convergence_curve(folder: Path) -> Picture:
     seconds = curve["seconds"]
     axes.set_xlim(0.8 * float(seconds[0]), 1.3 * max(PAPER_SECONDS, float(seconds[-1])))
     log_axis(axes, "x")
-    log_axis(axes, "y")
     grid(axes)
-    axes.legend(frameon=False, loc="center right")
+    axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     caption = "SNUG trained at the paper's size: energy of a frame against the time of training."
     return save(
         figure, folder, "convergence", caption=caption, section="garments", kind="training", vector=False

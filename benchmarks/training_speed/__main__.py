@@ -21,7 +21,7 @@ PARTS = {
     "convergence": f"SNUG trained at 4400 vertices, rolled out on a training motion held out ({VALIDATION})",
 }
 EXAMPLES = """examples:
-  python -m benchmarks.training_speed                               everything (about half an hour on a CPU)
+  python -m benchmarks.training_speed                               everything (a quarter of an hour on a CPU)
   python -m benchmarks.training_speed --parts inference --repeats 20
   python -m benchmarks.training_speed --device cuda -o reports/runs/training_speed_gpu
   python -m benchmarks.training_speed --parts convergence --steps 60000      preset paper's length
