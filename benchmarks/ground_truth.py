@@ -86,8 +86,9 @@ def simulate_motion(wardrobe: Wardrobe, tell: Tell, scene: Scene, preset: Preset
     start = built.start
     tell(preset.settle_frames)
     trajectory = simulate(
-        built.cloth, built.energies, dt=built.dt, frames=built.frames, obstacle=built.obstacle, start=start
-    )
+        built.cloth, built.energies, dt=built.dt, frames=built.frames, obstacle=built.obstacle, start=start,
+        pin_positions=built.pin_positions,
+    )  # fmt: skip
     seconds = time.perf_counter() - clock
     run = RunFolder(folder)
     path = run.trajectory_path(scene.name, "simulation")

@@ -54,6 +54,7 @@ def held_simulation(scene: BuiltScene, path: Path) -> Trajectory:
         return simulate(
             scene.cloth, scene.energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,
             start=scene.start, quasi_static=True, tolerance=TOLERANCE, path=path, resume=resume,
+            pin_positions=scene.pin_positions,
         )  # fmt: skip
 
     try:

@@ -31,7 +31,7 @@ class DressedBody:
 
     def __init__(self, body: Any, garment: Any, *, material: Material | None = None) -> None:
         self.body, self.garment = body, garment
-        self.cloth = Cloth(garment.rest_positions, garment.faces, material or Material())
+        self.cloth = Cloth(garment.rest_positions, garment.faces, material or Material(), pins=garment.pins)
         self.vertices = len(garment.rest_positions)
         self.parents = [int(parent) for parent in body.parents]
         self._weights: dict[int, Tensor] = {}
@@ -46,12 +46,13 @@ class DressedBody:
         noise.
         """
         if smoothing not in self._weights:
-            weights = self.garment.skinning_weights
+            own = weights = np.asarray(self.garment.skinning_weights)
             if smoothing:
                 from snug.garments import smooth_weights
 
                 sweeps = max(1, round(smoothing * self.vertices / 1000))
                 weights = smooth_weights(weights, self.garment.faces, sweeps)
+                weights[self.garment.pins] = own[self.garment.pins]  # where the simulator's handles are
             self._weights[smoothing] = torch.as_tensor(np.asarray(weights), dtype=torch.float32)
         return self._weights[smoothing]
 

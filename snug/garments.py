@@ -3,7 +3,7 @@
 The T-pose shape of a garment is its rest shape: areas, Dm^-1, masses and hinges all come from it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,13 +13,16 @@ from scipy.spatial import cKDTree
 
 from snug.remeshing import boundary_loops
 from snug.sewing import sew
-from snug.tailoring import TORSO_BONES, Cut, build_form, dominated_by, joint
+from snug.tailoring import TORSO_BONES, Cut, Form, build_form, dominated_by, joint
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 # What a shirt may borrow weights from: never hands, head or shins, even where they come near.
 SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
+SKIRT_BONES = ("pelvis", "spine1", "left_hip", "right_hip")
+# Rounds over a skirt's weights at 1000 vertices: it spans both thighs, so between them it follows neither.
+SKIRT_SMOOTHING = 60
 SHAPE_SMOOTHING = 10  # rounds over a shape's displacement: nearest vertices jump from leg to leg
 
 
@@ -32,9 +35,11 @@ class Garment:
     """A garment on the unposed body. Arrays are not to be written to.
 
     rest_positions: (V,3) [m]. faces: (F,3), outward. body_vertices: (V,) nearest body vertex among those it
-    may follow. skinning_weights: (V,24), that vertex's own, unsmoothed; rows sum to one. loops: name ("neck",
-    "left_sleeve", "right_sleeve", "hem") -> boundary vertices in order along the faces' winding, from the
-    front-most vertex on. parameters: what it was tailored with.
+    may follow. skinning_weights: (V,24), that vertex's own, of a skirt alone smoothed; rows sum to one.
+    loops: name ("neck", "left_sleeve", "right_sleeve", "hem"; of a skirt "waist", "hem") -> boundary vertices
+    in order along the faces' winding, from the front-most vertex on. pins: (P,), ascending, what the body
+    carries: a skirt's waistband, since contact without friction does not hold it. parameters: what it was
+    tailored with.
     """
 
     name: str
@@ -43,12 +48,20 @@ class Garment:
     body_vertices: Index
     skinning_weights: Array
     loops: Mapping[str, Index] = field(default_factory=dict)
+    pins: Index = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def hem(self) -> Index:
         """Vertices (n,) of the hem, in order."""
         return self.loops["hem"]
+
+    def carried(self, body, poses: Array, translations: Array) -> Array:
+        """Where the pins are (T,P,3) [m] on the body in poses (T,24,3) [rad] at translations (T,3) [m]."""
+        transforms = body.transforms(poses, translations)
+        blended = np.einsum("pj,tjab->tpab", self.skinning_weights[self.pins], transforms)
+        turned = np.einsum("tpab,pb->tpa", blended[..., :3], self.rest_positions[self.pins])
+        return turned + blended[..., 3]
 
     def rest_for(self, body, betas: ArrayLike | None) -> Array:
         """Rest positions (V,3) [m] on the body of shape `betas`: each vertex moves as the skin below it does.
@@ -85,9 +98,9 @@ def _adjacency(faces: Index, count: int) -> csr_array:
     return coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count)).tocsr()
 
 
-def nearest_body_vertices(body, positions: Array) -> Index:
-    """Nearest vertex (V,) of the template's torso, upper arms and upper legs to each position (V,3) [m]."""
-    allowed = np.flatnonzero(dominated_by(body, SHIRT_BONES))
+def nearest_body_vertices(body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
+    """Nearest template vertex (V,), of those that follow one of `bones`, to each position (V,3) [m]."""
+    allowed = np.flatnonzero(dominated_by(body, bones))
     return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
 
 
@@ -108,7 +121,7 @@ def tailor_tshirt(
     Raises GarmentError for a parameter out of range, or a body on which no sound mesh comes out.
     """
     cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length}
-    return _tailored("tshirt", body, vertices, cut)
+    return _shirt("tshirt", body, vertices, cut)
 
 
 def tailor_tunic(
@@ -126,7 +139,37 @@ def tailor_tunic(
     flare: how much further [m] the hem stands off than the waist, all around. The rest: see tailor_tshirt.
     """
     cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length, "flare": flare}
-    return _tailored("tunic", body, vertices, cut)
+    return _shirt("tunic", body, vertices, cut)
+
+
+def tailor_skirt(
+    body,
+    *,
+    vertices: int = 1000,
+    ease: float = 0.04,
+    clearance: float = 0.006,
+    rise: float = 0.17,
+    length: float = 0.3,
+    flare: float = 0.1,
+) -> Garment:
+    """A flared skirt, mirror-symmetric, of `vertices` vertices within 1 %, whose waistband the body carries.
+
+    ease: girth [m] at the hips beyond a skirt that lies at `clearance` [m]. rise: waistband above the hip
+    joints [m]; length: hem below them [m]. flare: how much further [m] the hem stands off than the hips.
+    Raises GarmentError as tailor_tshirt does.
+    """
+    cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length, "flare": flare}
+    _demand_in_range("skirt", {"vertices": vertices, **cut})
+    hip = joint(body, "left_hip")[1]
+    hem, top = hip - length, hip + rise
+    cuts = [
+        Cut("seam", (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        Cut("hem", (0.0, -1.0, 0.0), (0.0, hem, 0.0)),
+        Cut("waist", (0.0, 1.0, 0.0), (0.0, top, 0.0)),
+    ]
+    form = build_form(body, hem=hem, top=top, ease=ease, clearance=clearance, flare=flare)
+    smoothing = round(SKIRT_SMOOTHING * vertices / 1000)
+    return _tailored("skirt", body, vertices, cut, form, cuts, SKIRT_BONES, smoothing)
 
 
 @dataclass(frozen=True)
@@ -141,6 +184,7 @@ class Pattern:
 PATTERNS = (
     Pattern("tshirt", "T-shirt", tailor_tshirt),
     Pattern("tunic", "flared tunic", tailor_tunic),
+    Pattern("skirt", "flared skirt", tailor_skirt),
 )
 
 
@@ -158,19 +202,24 @@ RANGES = {
     "ease": (0.0, 0.3, " m"),
     "clearance": (0.005, 0.05, " m"),
     "sleeve": (0.3, 0.9, " of the upper arm"),
-    "length": (-0.05, 0.25, " m"),
+    "rise": (0.14, 0.2, " m"),
+    "length": (-0.05, 0.35, " m"),
     "flare": (0.0, 0.15, " m"),
 }
 
 
-def _tailored(name: str, body, vertices: int, cut: Mapping[str, float]) -> Garment:
-    """A garment with two sleeves, a neck and a hem, from its checked parameters."""
-    for parameter, value in {"vertices": vertices, **cut}.items():
+def _demand_in_range(name: str, parameters: Mapping[str, float]) -> None:
+    for parameter, value in parameters.items():
         low, high, unit = RANGES[parameter]
         if not (np.isfinite(value) and low <= value <= high):
             raise GarmentError(
                 f"{parameter}={value}: a {name} can be tailored from {low:g} to {high:g}{unit}"
             )
+
+
+def _shirt(name: str, body, vertices: int, cut: Mapping[str, float]) -> Garment:
+    """A garment with two sleeves, a neck and a hem."""
+    _demand_in_range(name, {"vertices": vertices, **cut})
     shoulder, elbow = joint(body, "left_shoulder"), joint(body, "left_elbow")
     hem = joint(body, "left_hip")[1] - cut["length"]
     cuff = shoulder[0] + cut["sleeve"] * (elbow[0] - shoulder[0])
@@ -186,26 +235,38 @@ def _tailored(name: str, body, vertices: int, cut: Mapping[str, float]) -> Garme
         body, hem=hem, cuff=cuff, top=neck[1] + 0.04, ease=cut["ease"], clearance=cut["clearance"],
         flare=cut.get("flare", 0.0),
     )  # fmt: skip
+    return _tailored(name, body, vertices, cut, form, cuts, SHIRT_BONES)
+
+
+def _tailored(
+    name: str, body, vertices: int, cut: Mapping[str, float], form: Form, cuts: list[Cut],
+    bones: Sequence[str], smoothing: int = 0,
+) -> Garment:  # fmt: skip
+    """The garment sewn from a form and its cuts, whose weights come from those bones, smoothed."""
     try:
         positions, faces = sew(body, form, cuts, vertices, cut["clearance"])
     except ValueError as error:
         raise GarmentError(f"{name}: {error}") from error
-    nearest = nearest_body_vertices(body, positions)
+    loops = _named_loops(positions, faces)
+    nearest = nearest_body_vertices(body, positions, bones)
     return Garment(
         name=name,
         rest_positions=positions,
         faces=faces,
         body_vertices=nearest,
-        skinning_weights=np.asarray(body.skinning_weights)[nearest],
-        loops=_named_loops(positions, faces),
+        skinning_weights=smooth_weights(np.asarray(body.skinning_weights)[nearest], faces, smoothing),
+        loops=loops,
+        pins=np.sort(loops.get("waist", np.empty(0, dtype=np.int64))),
         parameters=dict(cut),
     )
 
 
 def _named_loops(points: Array, faces: Index) -> dict[str, Index]:
-    """The four openings by their place, each from its front-most vertex on."""
+    """A shirt's four openings or a skirt's two by their place, each from its front-most vertex on."""
     loops = [np.roll(loop, -int(np.argmax(points[loop, 2]))) for loop in boundary_loops(faces)]
     centres = np.stack([points[loop].mean(axis=0) for loop in loops])
-    found = {"left_sleeve": np.argmax(centres[:, 0]), "right_sleeve": np.argmin(centres[:, 0])}
-    found |= {"neck": np.argmax(centres[:, 1]), "hem": np.argmin(centres[:, 1])}
-    return {name: loops[int(found[name])] for name in ("neck", "left_sleeve", "right_sleeve", "hem")}
+    found = {"waist": np.argmax(centres[:, 1]), "hem": np.argmin(centres[:, 1])}
+    if len(loops) == 4:
+        found = {"neck": found["waist"], "left_sleeve": np.argmax(centres[:, 0]),
+                 "right_sleeve": np.argmin(centres[:, 0]), "hem": found["hem"]}  # fmt: skip
+    return {name: loops[int(index)] for name, index in found.items()}

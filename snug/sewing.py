@@ -24,9 +24,11 @@ def sew(body, form: Form, cuts: list[Cut], vertices: int, clearance: float) -> t
     except ValueError as error:
         raise ValueError(f"nothing fits this body: {error}") from error
     found = sorted(name for loop in curves for name, _ in loop)
-    if found != ["hem", "left_sleeve", "neck", "seam", "seam"]:
+    if found != sorted(["seam", *(cut.name for cut in cuts)]):  # the seam runs down the front and the back
         raise ValueError(f"nothing fits this body: the cuts of its form are {', '.join(found)}")
     rims = [[curve for _, curve in loop] for loop in curves]
+    # An opening that the seam does not meet has a twin on the other side.
+    openings = sum(2 if len(loop) == 1 else sum(name != "seam" for name, _ in loop) for loop in curves)
     # V = 2 half - seam, and only the mesh tells how many vertices its seam has; some sizes come out unsound.
     half, tried, problem = vertices // 2 + int(0.57 * np.sqrt(vertices)), set[int](), ""
     while len(tried) < 16:
@@ -40,7 +42,7 @@ def sew(body, form: Form, cuts: list[Cut], vertices: int, clearance: float) -> t
                 half += (vertices - count) // 2
                 raise ValueError(f"{count} vertices instead of {vertices}")
             whole, whole_faces = _mirrored(_kept_off(body, points, faces, cuts, clearance), faces)
-            _demand_even(whole, whole_faces)
+            _demand_even(whole, whole_faces, openings)
             return whole, whole_faces
         except ValueError as error:
             problem = str(error)
@@ -102,8 +104,8 @@ def _kept_off(body, points: Array, faces: Index, cuts: list[Cut], clearance: flo
     raise ValueError(f"{1000 * lack.max():.2f} mm of clearance missing")
 
 
-def _demand_even(points: Array, faces: Index) -> None:
-    """Errors: ValueError for a triangle too small, large or sharp, and for other than four openings."""
+def _demand_even(points: Array, faces: Index, wanted: int) -> None:
+    """Errors: ValueError for a triangle too small, large or sharp, and for more or fewer openings."""
     areas = triangle_areas(points, faces)
     ratio = areas / areas.mean()
     if ratio.min() < AREA_BOUNDS[0] or ratio.max() > AREA_BOUNDS[1]:
@@ -112,5 +114,5 @@ def _demand_even(points: Array, faces: Index) -> None:
     if smallest < SMALLEST_ANGLE:
         raise ValueError(f"an angle of {smallest:.1f} degrees")
     openings = len(boundary_loops(faces))
-    if openings != 4:
-        raise ValueError(f"{openings} openings instead of 4")
+    if openings != wanted:
+        raise ValueError(f"{openings} openings instead of {wanted}")

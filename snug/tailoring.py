@@ -8,6 +8,8 @@ So the form is a union of three solids, each grown by its own distance:
   cloth hangs from its widest support; a flare widens it further, from the waist to the hem;
 - the upper arm, one convex section per distance from the shoulder.
 
+A skirt is the same without sleeves, hanging from its waistband and widening from the hips on.
+
 Convex sections grown by d have 2 pi d more girth (Steiner's formula), so ease of girth e is a growth of
 e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. Only the half x >= 0 is built;
 the other half is its mirror image, so the garment is exactly symmetric.
@@ -118,21 +120,20 @@ def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
     return np.stack([(height - row).max(axis=1) - grown for row, grown in zip(support, growth, strict=True)])
 
 
-def _torso(body, edges, points, nodes, hem, ease, flare, clearance, normals) -> Array:
-    """Field (nx,ny,nz) of the torso's hanging sections."""
+def _torso(body, edges, points, nodes, levels, ease, flare, clearance, normals) -> Array:
+    """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m]."""
     x, y, z = nodes
     support = _filled(_section_support(points, edges, y, 1, normals))
     mirrored = (DIRECTIONS // 2 - np.arange(DIRECTIONS)) % DIRECTIONS
     support = np.maximum(
         support, support[:, mirrored]
     )  # a body that is not quite symmetric: both of its sides
-    armpit = points[dominated_by(body, ARM_BONES[:1]), 1].min()
-    below = np.flatnonzero(y <= armpit)
+    hang, waist, hem = levels
+    below = np.flatnonzero(y <= hang)
     support[below] = np.maximum.accumulate(support[below][::-1], axis=0)[::-1]
     smooth = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
     support[below] = np.maximum(smooth, support)[below]
-    waist = joint(body, "spine1")[1]
-    growth = clearance + ease / (2 * np.pi) * _ramp(y, armpit, waist)
+    growth = clearance + ease / (2 * np.pi) * _ramp(y, hang, waist)
     growth += flare * np.clip((waist - y) / (waist - hem), 0.0, None)  # a cone: its sides are straight
     plane = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     field = _tube(support, growth, plane, normals).reshape(len(y), len(x), len(z)).transpose(1, 0, 2)
@@ -152,12 +153,13 @@ def _sleeve(body, edges, points, nodes, cuff, ease, clearance, normals) -> Array
 
 
 def build_form(
-    body, *, hem: float, cuff: float, top: float, ease: float, clearance: float, flare: float = 0.0
-) -> Form:
-    """The form between the heights `hem` and `top` and out to x = `cuff` (all [m]).
+    body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
+    flare: float = 0.0,
+) -> Form:  # fmt: skip
+    """The form between the heights `hem` and `top`, of a shirt out to x = `cuff`, else of a skirt (all [m]).
 
-    `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin;
-    `flare` [m] is how much further the hem stands off than the waist, all around.
+    `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin, or
+    to the hips of a skirt; `flare` [m] is how much further the hem stands off than that place, all around.
     """
     import igl
 
@@ -167,11 +169,15 @@ def build_form(
     torso = dominated_by(body, TORSO_BONES)
     arm = dominated_by(body, ARM_BONES)
     torso_edges, arm_edges = edges[torso[edges].all(axis=1)], edges[arm[edges].all(axis=1)]
+    skirt = cuff is None
+    hang = top if skirt else points[dominated_by(body, ARM_BONES[:1]), 1].min()
+    levels = hang, joint(body, "pelvis" if skirt else "spine1")[1], hem
     margin = 0.04
     depth = points[torso | arm, 2]
     reach = clearance + ease + flare + 2 * margin
+    side = points[torso, 0].max() + reach if cuff is None else cuff + margin
     low = np.array([0.0, hem - margin, depth.min() - reach])
-    high = np.array([cuff + margin, top + margin, depth.max() + reach])
+    high = np.array([side, top + margin, depth.max() + reach])
     counts = np.ceil((high - low) / SPACING).astype(int) + 1
     nodes = [low[i] + SPACING * np.arange(counts[i]) for i in range(3)]
     angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
@@ -182,10 +188,10 @@ def build_form(
     # promises about clearance is enforced on the finished mesh.
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
-    hanging = _torso(body, torso_edges, points, nodes, hem, ease, flare, clearance, normals)
-    hanging = _smooth_minimum(
-        hanging, _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals), ARMPIT_FILLET
-    )
+    hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals)
+    if not skirt:
+        sleeve = _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals)
+        hanging = _smooth_minimum(hanging, sleeve, ARMPIT_FILLET)
     values = np.minimum(hanging, distance - clearance)  # a blend would add girth wherever both agree
     ghost = 3
     values = np.pad(values, ((ghost, 0), (0, 0), (0, 0)), mode="reflect")

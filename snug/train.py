@@ -94,7 +94,8 @@ def untrained_model(
     how = find_kind(model_kind)
     recipe = replace(recipe, zero_last_layer=False)
     data = TrainingSet(dressed, motions, recipe, features=how.features, sequences=how.sequences)
-    network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed)
+    pins = dressed.garment.pins
+    network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)
     network.normalise_by(*data.input_statistics())
     return TrainedModel(model_kind, network.eval(), recipe, seed=seed)
 

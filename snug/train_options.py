@@ -32,7 +32,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--recipe", choices=tuple(RECIPES), default="default", help="named options (default: %(default)s)")
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
     add("--garment", metavar="NAME", action="append", default=[],
-        help="tshirt or tunic; repeat for one model each (default: tshirt)")  # fmt: skip
+        help="tshirt, tunic or skirt; repeat for one model each (default: tshirt)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
     add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")

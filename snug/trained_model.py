@@ -4,12 +4,13 @@ file.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from snug.baselines.pbns import PoseSpaceDeformation
 from snug.baselines.santesteban2019 import FitAndWrinkles
@@ -94,6 +95,7 @@ class TrainedModel:
             "recipe": self.recipe.as_dict(),
             "inputs": int(self.network.input_mean.shape[0]),
             "vertices": self.vertices,
+            "pins": [int(pin) for pin in self.network.pins],
             "seed": self.seed,
             "steps": self.steps,
             "seconds": self.seconds,
@@ -115,7 +117,10 @@ class TrainedModel:
             if data["format"] != FORMAT:
                 raise ModelFileError(f"{path}: format {data['format']!r}, this version reads {FORMAT!r}")
             recipe = Recipe.from_dict(data["recipe"])
-            network = make_network(data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"])
+            pins = data.get("pins", ())
+            network = make_network(
+                data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=pins
+            )
             network.load_state_dict(tensors)
             rest = {name: data[name] for name in ("seed", "steps", "seconds", "history", "summary")}
             rest["setup_seconds"] = data.get("setup_seconds", 0.0)
@@ -131,10 +136,25 @@ def find_kind(name: str) -> Kind:
     return KINDS[name]
 
 
-def make_network(kind: str, inputs: int, vertices: int, recipe: Recipe, *, seed: int) -> Any:
-    """A network at its start. The same seed gives the same weights, whatever was drawn before."""
+def make_network(
+    kind: str, inputs: int, vertices: int, recipe: Recipe, *, seed: int, pins: Sequence[int] = ()
+) -> Any:
+    """A network at its start. The same seed gives the same weights, whatever was drawn before.
+
+    pins: vertices without offset, which the body carries.
+    """
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return find_kind(kind).network(
+        network: Any = find_kind(kind).network(
             inputs, vertices, output_scale=recipe.output_scale, zero_last_layer=recipe.zero_last_layer
         )
+    network.pins = tuple(pins)
+    if network.pins:
+        free = torch.ones(vertices, 1)
+        free[list(pins)] = 0.0
+
+        def hold(_network: Any, _features: Any, output: tuple[Tensor, Any]) -> tuple[Tensor, Any]:
+            return output[0] * free.to(output[0].device), output[1]
+
+        network.register_forward_hook(hold)
+    return network

@@ -64,7 +64,10 @@ class Trainer:
             dressed, motions, recipe, features=how.features, sequences=how.sequences, device=device
         )
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
-        network = make_network(kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed)
+        pins = dressed.garment.pins
+        network = make_network(
+            kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins
+        )
         network.normalise_by(*self.data.input_statistics())
         self.network = network.to(device)
         if isinstance(network, Regressor):

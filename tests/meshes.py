@@ -52,3 +52,24 @@ def sphere(subdivisions: int, radius: float = 1.0) -> tuple[np.ndarray, np.ndarr
         i, j, k = faces.T
         faces = np.concatenate([np.stack(f, 1) for f in ((i, a, c), (a, j, b), (c, b, k), (a, b, c))])
     return radius * points, faces
+
+
+def edge_counts(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directed edges (3F, 2), edges (E, 2) and in how many faces each is (E,)."""
+    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges, counts = np.unique(np.sort(halves, axis=1), axis=0, return_counts=True)
+    return halves, edges, counts
+
+
+def girth(points: np.ndarray, faces: np.ndarray, axis: int, level: float) -> float:
+    """Length [m] of a mesh's cut with the plane where coordinate `axis` is `level`, triangle by triangle."""
+    total = 0.0
+    for corners in points[faces]:
+        height = corners[:, axis] - level
+        ends = []
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            if height[i] * height[j] < 0:
+                ends.append(corners[i] + (corners[j] - corners[i]) * height[i] / (height[i] - height[j]))
+        if len(ends) == 2:
+            total += float(np.linalg.norm(ends[1] - ends[0]))
+    return total

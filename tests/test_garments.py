@@ -3,9 +3,17 @@
 import igl
 import numpy as np
 import pytest
+from meshes import edge_counts, girth
 
 from snug.body import Body
-from snug.garments import PATTERNS, GarmentError, find_pattern, smooth_weights, tailor_tshirt, tailor_tunic
+from snug.garments import (
+    PATTERNS,
+    GarmentError,
+    find_pattern,
+    smooth_weights,
+    tailor_tshirt,
+    tailor_tunic,
+)
 
 WAIST = "spine1"
 
@@ -20,37 +28,27 @@ def shirts(body):
     return {count: tailor_tshirt(body, vertices=count) for count in (300, 1000, 2000, 4400)}
 
 
-@pytest.fixture(scope="session", params=[pattern.name for pattern in PATTERNS])
-def shirt(request, body, shirts):
+@pytest.fixture(scope="session")
+def wardrobe(body, shirts):
     """Every sort of garment, at 1000 vertices."""
-    return (
-        shirts[1000] if request.param == "tshirt" else find_pattern(request.param).tailor(body, vertices=1000)
-    )
+    others = {p.name: p.tailor(body, vertices=1000) for p in PATTERNS if p.name != "tshirt"}
+    return {"tshirt": shirts[1000], **others}
 
 
-def edge_counts(faces):
-    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    edges, counts = np.unique(np.sort(halves, axis=1), axis=0, return_counts=True)
-    return halves, edges, counts
+@pytest.fixture(params=[pattern.name for pattern in PATTERNS])
+def garment(request, wardrobe):
+    return wardrobe[request.param]
+
+
+@pytest.fixture(params=["tshirt", "tunic"])
+def shirt(request, wardrobe):
+    """With sleeves, each vertex with the weights of one body vertex."""
+    return wardrobe[request.param]
 
 
 def face_normals(points, faces):
     a, b, c = (points[faces[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
-
-
-def girth(points, faces, axis, level):
-    """Length of the cut of a mesh with the plane where coordinate `axis` is `level`, triangle by triangle."""
-    total = 0.0
-    for corners in points[faces]:
-        height = corners[:, axis] - level
-        ends = []
-        for i, j in ((0, 1), (1, 2), (2, 0)):
-            if height[i] * height[j] < 0:
-                ends.append(corners[i] + (corners[j] - corners[i]) * height[i] / (height[i] - height[j]))
-        if len(ends) == 2:
-            total += float(np.linalg.norm(ends[1] - ends[0]))
-    return total
 
 
 def waist(body):
@@ -81,12 +79,12 @@ def test_topology_and_triangles_at_every_resolution(shirts, count):
     assert np.degrees(np.arccos(cosine)).min() > 15
 
 
-def test_one_piece(shirt):
-    component = np.arange(len(shirt.rest_positions))
+def test_one_piece(garment):
+    component = np.arange(len(garment.rest_positions))
     for _ in range(len(component)):
-        least = component[shirt.faces].min(axis=1)
+        least = component[garment.faces].min(axis=1)
         new = component.copy()
-        np.minimum.at(new, shirt.faces.ravel(), np.repeat(least, 3))
+        np.minimum.at(new, garment.faces.ravel(), np.repeat(least, 3))
         if np.array_equal(new, component):
             break
         component = new
@@ -105,8 +103,8 @@ def test_clear_of_the_body_at_vertices_and_within_triangles(body, shirts, count)
     assert within.min() >= 0.0145  # random points are not the samples that tailoring looks at
 
 
-def test_faces_point_away_from_the_body(body, shirt):
-    points, faces = shirt.rest_positions, shirt.faces
+def test_faces_point_away_from_the_body(body, garment):
+    points, faces = garment.rest_positions, garment.faces
     normals = face_normals(points, faces)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     centroids = points[faces].mean(axis=1)
@@ -129,8 +127,8 @@ def test_cut_lines_are_plane_and_even(body, shirt):
         assert np.sum(turns[1:] * turns[:-1], axis=1).min() > np.cos(np.radians(75))  # no saw teeth
 
 
-def test_the_left_half_mirrors_the_right(shirt):
-    points = shirt.rest_positions
+def test_the_left_half_mirrors_the_right(garment):
+    points = garment.rest_positions
     mirrored = {tuple(p) for p in np.round(points * [-1, 1, 1] + 0.0, 9).tolist()}
     assert mirrored == {tuple(p) for p in np.round(points + 0.0, 9).tolist()}
 
@@ -150,7 +148,7 @@ def test_the_tunic_is_longer_and_flares_by_what_is_asked(body, shirts):
 
 def test_patterns_are_found_by_name(body):
     assert find_pattern("tunic").tailor is tailor_tunic
-    with pytest.raises(GarmentError, match=r"'gown'.*tshirt, tunic"):
+    with pytest.raises(GarmentError, match=r"'gown'.*tshirt, tunic, skirt"):
         find_pattern("gown")
     with pytest.raises(GarmentError, match=r"flare=0\.5: a tunic"):
         tailor_tunic(body, flare=0.5)

@@ -73,7 +73,8 @@ class FreeBound:
         # Side by side: a rest state is only sound where no two vertices coincide.
         apart = 2 * np.ptp(one.rest_positions[:, 0]) * np.arange(frames)[:, None, None] * [1.0, 0.0, 0.0]
         rest = (one.rest_positions + apart).reshape(-1, 3)
-        self.cloth = Cloth(rest, faces.reshape(-1, 3), one.material)
+        pins = np.asarray(one.pins, dtype=np.int64) + one.vertex_count * np.arange(frames)[:, None]
+        self.cloth = Cloth(rest, faces.reshape(-1, 3), one.material, pins=pins.ravel())
         self.terms = [
             *declared_energies(self.cloth),
             ClipInertia(self.cloth, scene.dt, frames),

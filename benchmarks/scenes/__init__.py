@@ -55,6 +55,7 @@ TSHIRT = "tshirt"
 WORN = (
     Wear("dressed/", TSHIRT, "a T-shirt"),
     Wear("tunic/", "tunic", "a flared tunic", swings=True),
+    Wear("skirt/", "skirt", "a flared skirt", swings=True),
 )
 
 

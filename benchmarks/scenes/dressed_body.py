@@ -10,6 +10,7 @@ import numpy as np
 
 from reference_sim import Cloth, Material, Obstacle, Trajectory, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
+from snug.garments import Garment
 
 from ..presets import Preset
 from ..scene import BuiltScene, Dressed
@@ -23,7 +24,8 @@ def build(name: str, preset: Preset, wardrobe: Wardrobe) -> BuiltScene:
     """The built scene of "<what is worn>/<motion>"."""
     body, garment = wardrobe.body, wardrobe.garments[worn_in(name).garment]
     motion = wardrobe.motions[name.split("/", 1)[1]]
-    cloth = Cloth(garment.rest_positions, garment.faces, Material())
+    cloth = Cloth(garment.rest_positions, garment.faces, Material(), pins=garment.pins)
+    handles = garment.carried(body, motion.poses, motion.translations)
     energies = declared_energies(cloth)
     obstacle = Obstacle(wardrobe.posed_body(motion.name), body.faces, rest_positions=body.shaped())
     return BuiltScene(
@@ -32,10 +34,11 @@ def build(name: str, preset: Preset, wardrobe: Wardrobe) -> BuiltScene:
         energies=energies,
         dt=1.0 / motion.fps,
         frames=motion.frames,
-        settle=lambda: settled(cloth, energies, wardrobe, motion, preset.settle_frames),
+        settle=lambda: settled(cloth, energies, wardrobe, garment, motion, preset.settle_frames),
         obstacle=obstacle,
         origin_heights=body.joints()[0, 1] + motion.translations[:, 1],
         dressed=Dressed(body, garment, motion),
+        pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )
 
 
@@ -45,7 +48,7 @@ def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
 
 
 def settled(
-    cloth: Cloth, energies: tuple[Energy, ...], wardrobe: Wardrobe, motion, frames: int
+    cloth: Cloth, energies: tuple[Energy, ...], wardrobe: Wardrobe, garment: Garment, motion, frames: int
 ) -> np.ndarray:
     """Positions (V,3) [m] of the cloth at rest on the body in the motion's first pose.
 
@@ -64,9 +67,11 @@ def settled(
     # The garment, still in its rest shape, goes where the root takes a body in T-pose: a rigid motion.
     root = body.transforms(t_pose[None], translations[:1])[0, 0]
     start = cloth.rest_positions @ root[:, :3].T + root[:, 3]
+    handles = garment.carried(body, poses, translations)
     trajectory: Trajectory = simulate(
-        cloth, energies, dt=1.0 / motion.fps, frames=len(poses), obstacle=obstacle, start=start
-    )
+        cloth, energies, dt=1.0 / motion.fps, frames=len(poses), obstacle=obstacle, start=start,
+        pin_positions=handles.__getitem__ if len(garment.pins) else None,
+    )  # fmt: skip
     # A step that diverges ends a simulation: what it leaves is a garment half-way, on a body that moved on.
     if trajectory.frames < len(poses):
         raise RuntimeError(

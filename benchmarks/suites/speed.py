@@ -44,7 +44,7 @@ def scenes(
         return [SMALL[0], *(f"dressed/{name}{SUFFIX}" for name in lively[:1])]
     swinging = [name for name in swing_motions if name in SWINGING]
     shirts = [f"dressed/{name}{SUFFIX}" for name in (*lively, *swinging)]
-    return [*SMALL, *shirts, *(f"tunic/{name}{SUFFIX}" for name in swinging)]
+    return [*SMALL, *shirts, *(f"skirt/{name}{SUFFIX}" for name in swinging)]
 
 
 def methods(newton_cuts: Sequence[int]) -> list[str]:
