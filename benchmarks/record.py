@@ -48,6 +48,7 @@ class Record:
             "earlier": self._earlier(),
         }
         plan.folder.mkdir(parents=True, exist_ok=True)
+        self.folder.remove_parts()
         if plan.fresh:
             self.records.forget_all()
         self.folder.write_config(self.config)

@@ -176,6 +176,11 @@ class RunFolder:
         """The posed body (T,B,3) [m] of a dressed scene: a process that simulates then needs no torch."""
         return self.trajectory_path(scene, "body").with_suffix(".npy")
 
+    def remove_parts(self) -> None:
+        """Remove what a run that was killed was just writing: the folder is one run's at a time."""
+        for path in [*self.path.rglob(".*.part*"), *self.path.rglob("*.vtkhdf.part")]:
+            path.unlink(missing_ok=True)
+
     def write_config(self, config: dict[str, Any]) -> None:
         """Write run.json whole or not at all."""
         with replacing(self.config_path) as temporary:

@@ -11,10 +11,12 @@ import time
 from pathlib import Path
 
 import pytest
-from test_cells import TINY, misbehaving, of_session, plan_of  # noqa: F401
+from test_cells import TINY, harness, of_session, outcome_of, plan_of
 
 from benchmarks import run, stages
+from benchmarks.agenda import Agenda
 from benchmarks.guarded import Guarded
+from benchmarks.plan import Network
 from benchmarks.record import Record
 from benchmarks.records import Work
 from benchmarks.results import RunFolder
@@ -75,6 +77,15 @@ def test_a_killed_run_holds_its_folder_no_longer(tmp_path, monkeypatch):
     assert run.main(words_of(tmp_path, "simulation")) == 0
 
 
+def test_what_a_killed_run_was_writing_is_removed(tmp_path):
+    scene = tmp_path / "trajectories" / "free_fall"
+    scene.mkdir(parents=True)
+    for name in ("simulation.vtkhdf", "newton-1.vtkhdf.part", ".body.77.part.npy"):
+        (scene / name).write_bytes(b"half")
+    Record(plan_of(tmp_path))
+    assert [path.name for path in scene.iterdir()] == ["simulation.vtkhdf"]
+
+
 # --- a worker that is killed -----------------------------------------------------------------------------
 
 
@@ -108,6 +119,24 @@ def test_a_piece_whose_worker_is_killed_is_recorded_as_failed_and_done_again_whe
     assert again[1] == ended[1] and each.broken == {"two": found.why}
     again, each = finished(die, write, die, only=frozenset({"failed"}))
     assert not isinstance(again[1], Failure) and each.broken == {}
+
+
+def test_a_network_that_learned_without_a_failed_simulation_is_another(tmp_path):
+    plan = plan_of(tmp_path, train=("walk", "run"))
+    whole, lacking = Agenda(plan), Agenda(plan)
+    lacking.lost = frozenset({whole.data("run", "tshirt").name})
+    for name, same in (("supervised", False), ("snug", True)):
+        network = Network(name, 0)
+        assert (whole.network(network).key == lacking.network(network).key) is same
+
+
+def test_a_cell_that_was_blocked_is_run_once_nothing_blocks_it(tmp_path):
+    plan = plan_of(tmp_path, "simulation")
+    blocked = harness(plan).first(plan.cells[0], "its network could not be trained: killed")
+    assert blocked.status == "failed" and "could not be trained" in blocked.reason
+    only = dataclasses.replace(plan, only=frozenset({"failed"}))
+    assert harness(only).first(plan.cells[0], "killed").status == "failed"
+    assert outcome_of(plan).status == "ok"
 
 
 def test_a_failed_piece_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, monkeypatch, capsys):
