@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from benchmarks.results import Row
 from reports import palette
 from reports.break_even import Cost, compared_scenes, cost_of, crossing, frames_text, rivals
 from reports.fronts import TIME, Point, fastest, front, hybrids, points_of, solvers
 from reports.numbers import duration, number
-from reports.summary import Measurements, dressed_scenes, speed_measurements
+from reports.summary import Measurements, dressed_scenes, speed_measurements, wardrobe
+from reports.table import Cell, Column, Table
 
 NETWORK = "snug"
 ERRORS = (("gap/relative", "energy gap", ""), ("curvature/error", "mean-curvature error", " 1/m"))
@@ -18,14 +19,63 @@ ERRORS = (("gap/relative", "energy gap", ""), ("curvature/error", "mean-curvatur
 def answers(rows: Sequence[Row]) -> list[tuple[str, str]]:
     """(question, sentences): where SNUG wins, what beats it, whether hybrids do, when training pays."""
     measured = speed_measurements(rows)
-    scenes = compared_scenes(measured)
+    garments = wardrobe(measured.only(compared_scenes(measured)))
+
+    def told(say: Callable[[Sequence[str]], str]) -> str:
+        """Of each garment by itself; named where there are several."""
+        said = {garment: words for garment, scenes in garments.items() if (words := say(scenes))}
+        return " ".join(f"{garment}: {words}" if len(said) > 1 else words for garment, words in said.items())
+
     return [
         ("Run time", run_time(measured)),
-        ("Where SNUG wins", _per_error(measured, scenes, _unbeaten)),
-        ("A few iterations", _per_error(measured, scenes, _cut_solver)),
-        ("Network plus solver", _per_error(measured, scenes, _hybrid)),
-        ("When training pays", training_pays(measured, scenes)),
+        ("Where SNUG wins", told(lambda scenes: _per_error(measured, scenes, _unbeaten))),
+        ("A few iterations", told(lambda scenes: _per_error(measured, scenes, _cut_solver))),
+        ("Network plus solver", told(lambda scenes: _per_error(measured, scenes, _hybrid))),
+        ("When training pays", told(lambda scenes: training_pays(measured, scenes))),
     ]
+
+
+def by_scene(rows: Sequence[Row]) -> Table | None:
+    """The same questions on each scene by itself and for each measure of error, as names and numbers."""
+    measured = speed_measurements(rows)
+    lines: list[tuple[Cell, ...]] = []
+    for scene in compared_scenes(measured):
+        for metric, words, _ in ERRORS:
+            points = points_of(measured, [scene], metric)
+            own = next((p for p in points if p.method == NETWORK), None)
+            if own is not None:
+                lines.append((scene, words, own.error, own.time, *_names(measured, scene, points, own)))
+    if not lines:
+        return None
+    columns = (
+        Column("scene", "Scene"),
+        Column("measure", "Error"),
+        Column("own", "SNUG's"),
+        Column("run_time", "Frame", "ms"),
+        Column("beaten", "Beaten by"),
+        Column("solver", "Fastest solver as good"),
+        Column("hybrid", "Fastest hybrid better"),
+        Column("pays_reference", "Pays", "frames"),
+        Column("pays_solver", "Against solver", "frames"),
+    )
+    return Table("answers", columns, tuple(lines))
+
+
+def _names(measured: Measurements, scene: str, points: Sequence[Point], own: Point) -> tuple[Cell, ...]:
+    better, solver = beaten_by(points, own), fastest(cut_solvers(points), own.error)
+    mixed = [p for p in hybrids(points) if p.error < own.error and not overtaken(p, solvers(points))]
+    hybrid = min(mixed, key=lambda p: p.time) if mixed else None
+    network = cost_of(measured, NETWORK, [scene])
+    pays: list[Cell] = []
+    for rival in (palette.REFERENCE, solver.method if solver else ""):
+        cost = cost_of(measured, rival, [scene])
+        frames = crossing(network, cost) if network and network.before and cost else None
+        pays.append(None if frames is None else float(f"{frames:.1e}"))
+    return (*(_named(point) for point in (better, solver, hybrid)), *pays)
+
+
+def _named(point: Point | None) -> str:
+    return f"{palette.label(point.method)}, {number(point.time)} ms" if point else "none"
 
 
 def run_time(measured: Measurements) -> str:
@@ -54,11 +104,25 @@ def _per_error(measured: Measurements, scenes: Sequence[str], say) -> str:
     return f"{' '.join(sentences)} ({where}.)"
 
 
+def beaten_by(points: Sequence[Point], own: Point) -> Point | None:
+    """The most accurate of those that are no slower and no less accurate, None where there is none."""
+    faster = [p for p in points if overtaken(own, [p]) and p is not own]
+    return min(faster, key=lambda p: p.error) if faster else None
+
+
+def overtaken(point: Point, others: Sequence[Point]) -> bool:
+    """Whether one of the others is no slower and no less accurate."""
+    return any(p.time <= point.time and p.error <= point.error for p in others)
+
+
+def cut_solvers(points: Sequence[Point]) -> list[Point]:
+    return [p for p in solvers(points) if palette.cut_of(p.method)]
+
+
 def _unbeaten(points: Sequence[Point], own: Point, words: str, unit: str) -> str:
     """Whether anything as fast is more accurate than SNUG, and what the next faster and slower ones are."""
-    faster = [p for p in points if p.time <= own.time and p.error <= own.error and p is not own]
-    if faster:
-        best = min(faster, key=lambda p: p.error)
+    best = beaten_by(points, own)
+    if best is not None:
         text = f"By {words} SNUG ({number(own.error)}{unit} in {number(own.time)} ms) is not on the front: "
         return text + f"{palette.label(best.method)} has {number(best.error)} in {number(best.time)} ms."
     following = [p for p in front(points) if p.time > own.time]
@@ -76,7 +140,7 @@ def _unbeaten(points: Sequence[Point], own: Point, words: str, unit: str) -> str
 
 def _cut_solver(points: Sequence[Point], own: Point, words: str, unit: str) -> str:
     """The fastest solver with no larger an error than SNUG's."""
-    cuts = [p for p in solvers(points) if palette.cut_of(p.method)]
+    cuts = cut_solvers(points)
     best = fastest(cuts, own.error)
     if not cuts:
         return ""
@@ -97,7 +161,7 @@ def _hybrid(points: Sequence[Point], own: Point, words: str, unit: str) -> str:
     alone = [*solvers(points), own]
     if not mixed:
         return ""
-    winning = [p for p in mixed if not any(q.time <= p.time and q.error <= p.error for q in alone)]
+    winning = [p for p in mixed if not overtaken(p, alone)]
     if not winning:
         return f"By {words} every SNUG-started solver is beaten by a solver alone that is no slower."
     first = min(winning, key=lambda p: p.time)

@@ -14,7 +14,7 @@ from reports import palette
 from reports.canvas import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
 from reports.fronts import TIME, fastest, points_of, solvers
 from reports.numbers import duration, number
-from reports.summary import Measurements, dressed_scenes, speed_measurements
+from reports.summary import Measurements, dressed_scenes, speed_measurements, worn_scenes
 
 ACCURACIES = (("gap/relative", "energy gap"), ("curvature/error", "curvature error"))
 MOST_FRAMES = 1e7
@@ -66,10 +66,10 @@ def rivals(measured: Measurements, scenes: Sequence[str], network: str = "snug")
 
 
 def compared_scenes(measured: Measurements, network: str = "snug") -> list[str]:
-    """The dressed scenes on which the network was timed beside a cut solver."""
+    """The scenes of any garment on which the network was timed beside a cut solver."""
     return [
         scene
-        for scene in dressed_scenes(measured)
+        for scene in worn_scenes(measured)
         if measured.seeds(scene, network, TIME)
         and any(palette.cut_of(m) and measured.seeds(scene, m, TIME) for m in measured.methods)
     ]
@@ -78,13 +78,13 @@ def compared_scenes(measured: Measurements, network: str = "snug") -> list[str]:
 def break_even(folder: Path, rows: Sequence[Row]) -> list[Picture]:
     """One figure: total time of N frames for each trained network and for the solvers it competes with."""
     measured = speed_measurements(rows)
-    scenes = compared_scenes(measured)
+    scenes = dressed_scenes(measured.only(compared_scenes(measured)))
     if not scenes:
         return []
     against = rivals(measured, scenes)
     trained = [
         m
-        for m in measured.methods
+        for m in palette.leading(measured.methods)
         if not palette.cut_of(m) and (measured.value(m, "cost/train", scenes) or 0.0) > 0.0
     ]
     costs = [c for m in (*against, *trained) if (c := cost_of(measured, m, scenes))]

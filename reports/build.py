@@ -62,7 +62,7 @@ def draw(run: RunFolder, rows: Sequence[Row], problems: list[str], *, opengl: bo
     dressed = dressed_trajectories(run, rows, problems)
     pictures = render.side_by_side(run.figures, dressed, opengl=opengl)
     series = [figures.energy_series(run.figures, kept.scene, kept.series) for kept in dressed]
-    series += [hem.hem_curves(run.figures, kept.scene, kept.series) for kept in dressed]
+    series += [hem.hem_curves(run.figures, kept.scene, kept.series, kept.body) for kept in dressed]
     pictures += [picture for picture in series if picture is not None]
     pictures += work_precision.error_against_time(run.figures, rows)
     pictures += profile.performance_profile(run.figures, rows)

@@ -2,39 +2,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from reports import palette
 from reports.canvas import PAGE_WIDTH, Picture, file_name, grid, legend_above, new_figure, save
+from reports.numbers import number
 from reports.vtkhdf import MeshSeries
 
-CURVES = (
-    ("hem/yaw", "yaw of the hem [degrees]", np.degrees(1.0)),
-    ("hem/from_end", "from its end [mm]", 1e3),
-)
+YAW, FROM_END = "hem/yaw", "hem/from_end"
 LEAST = np.radians(5.0)  # of yaw: with less there is no swing to see
+HELD = 24  # frames a body holds still at the end to count as stopped, as for the ringing
+BEFORE = 4  # frames before the stop that are shown with what follows it
+STOPPED = "#F3F3F3"
+# What is compared where there are more methods than room: solver, its twin, paper, dynamic recipe, hybrid.
+SWINGING = (
+    palette.REFERENCE, palette.MOVED, "skinning", "snug", "snug-paper", "snug-dynamic",
+    "snug-dynamic+lbfgs-4",
+)  # fmt: skip
 
 
-def hem_curves(folder: Path, scene: str, series: Mapping[str, MeshSeries]) -> Picture | None:
+def hem_curves(
+    folder: Path, scene: str, series: Mapping[str, MeshSeries], body: MeshSeries | None = None
+) -> Picture | None:
     """Yaw of the hem in the root's axes and its distance from where it ends, a curve per method.
 
-    None for a scene without these curves, or whose hem hardly turns.
+    Where the body stops, that is marked, and what follows is drawn again, larger. None for a scene without
+    these curves, or whose hem hardly turns.
     """
-    methods = [m for m in palette.ordered(series) if all(name in series[m].fields for name, _, _ in CURVES)]
-    if not methods or max(float(np.nanmax(np.abs(series[m].fields["hem/yaw"]))) for m in methods) < LEAST:
+    methods = shown(m for m in series if all(name in series[m].fields for name in (YAW, FROM_END)))
+    if not methods or max(float(np.nanmax(np.abs(series[m].fields[YAW]))) for m in methods) < LEAST:
         return None
+    stop = None if body is None else stop_frame(body)
+    yaw = {m: np.degrees(series[m].fields[YAW]) for m in methods}
+    from_end = {m: 1e3 * series[m].fields[FROM_END] for m in methods}
+    panels = [("yaw of the hem [degrees]", yaw, 0), ("from its end [mm]", from_end, 0)]
+    if stop is not None:
+        first = max(stop - BEFORE, 0)
+        turned = {m: curve - curve[-1] for m, curve in yaw.items()}
+        panels[1:] = [
+            ("after the stop: yaw from its end", turned, first),
+            ("after the stop: hem from its end [mm]", from_end, first),
+        ]
     figure = new_figure(PAGE_WIDTH, 2.6)
-    for axes, (name, title, scale) in zip(figure.subplots(1, len(CURVES)), CURVES):
+    for axes, (title, curves, first) in zip(figure.subplots(1, len(panels)), panels):
         for method in reversed(methods):  # the reference last, on top
-            look, mesh = palette.style(method), series[method]
-            axes.plot(mesh.times, scale * mesh.fields[name], color=look.colour, linestyle=look.line)
+            look, times = palette.style(method), series[method].times
+            axes.plot(times[first:], curves[method][first:], color=look.colour, linestyle=look.line)
+        if stop is not None and body is not None:
+            axes.axvline(body.times[stop], color="#666666", linewidth=0.9, linestyle=":")
+            axes.axvspan(body.times[stop], body.times[-1], color=STOPPED, zorder=0)
+            axes.set_xlim(body.times[first], body.times[-1])
         axes.set(title=title, xlabel="time [s]")
         grid(axes)
     legend_above(figure, methods, lines=True)
-    caption = f"{scene}: the hem in the axes of the root. What goes past the end after the body has stopped "
-    caption += "is swing; a curve that ends with the body has none."
+    caption = f"{scene}: the hem in the axes of the root."
+    if stop is not None and body is not None:
+        caption += f" Grey: the body has stopped, at {number(float(body.times[stop]))} s. "
+        caption += _overshoots(yaw, stop)
+    else:
+        caption += " Each curve is one method; what the simulation does beyond the others is swing."
     name = f"hem_{file_name(scene)}"
     return save(figure, folder, name, caption=caption, section="garments", kind="hem")
+
+
+def shown(methods: Iterable[str]) -> list[str]:
+    """In order; those worth comparing alone, where there are more than a figure has room for."""
+    found = palette.ordered(methods)
+    return found if len(found) <= palette.ROOM else [method for method in found if method in SWINGING]
+
+
+def stop_frame(body: MeshSeries) -> int | None:
+    """The frame from which the body stays where it is, None where it does not hold still at the end."""
+    last, frame = body.positions(-1), body.frames - 1
+    while frame > 0 and np.array_equal(body.positions(frame - 1), last):
+        frame -= 1
+    return frame if 0 < frame < body.frames - HELD else None
+
+
+def overshoot(yaw: Sequence[float] | np.ndarray, stop: int) -> float:
+    """How far past its end a hem swings once the body has stopped: the lesser of its farthest on either side.
+
+    A hem that comes to its end from one side has none.
+    """
+    away = np.asarray(yaw)[stop:] - yaw[-1]
+    return float(min(away.max(), -away.min()))
+
+
+def _overshoots(yaw: Mapping[str, np.ndarray], stop: int) -> str:
+    parts = [f"{palette.label(method)} {number(overshoot(curve, stop), 2)}" for method, curve in yaw.items()]
+    return f"Farthest past its end after the stop, in degrees: {', '.join(parts)}."

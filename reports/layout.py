@@ -17,12 +17,12 @@ LONG = 24  # rows from which a table may run over pages
 # Texts that need room get a share of the page's width; every other column is as wide as its content.
 WIDTHS = {
     "reason": "2fr", "check": "1fr", "finding": "2fr", "case": "1fr", "scene": "1fr", "worse": "1fr",
-    "better": "1fr",
+    "better": "1fr", "beaten": "1fr", "solver": "1.3fr", "hybrid": "1.3fr",
 }  # fmt: skip
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
 TEXTS = (
     "method", "finding", "recipe", "scene", "suite", "check", "case", "outcome", "status", "reason", "unit",
-    "worse", "better", "bound",
+    "worse", "better", "bound", "measure", "beaten", "solver", "hybrid",
 )  # fmt: skip
 COSTS = ("data_generation", "training", "run_time", "memory")
 REMARKS = {

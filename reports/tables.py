@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from benchmarks.results import Row
 from reports import bars
 from reports.ablations import ablations, ablations_judged
+from reports.answers import by_scene
 from reports.findings import findings, recipes
 from reports.garment_tables import cost, curvature, dynamics, energies, energies_by_scene, geometry, shape
 from reports.stability import refusals
@@ -148,6 +149,7 @@ MAKERS = (
     ablations_judged,
     bars.table,
     recipes,
+    by_scene,
     speed,
     validation,
     laws,

@@ -69,3 +69,30 @@ def test_the_hem_is_drawn_where_it_swings(tmp_path):
         hem.hem_curves(tmp_path, "tunic/still", {"snug": vtkhdf.read_series(tmp_path / "still.vtkhdf")})
         is None
     )
+
+
+def test_a_stop_is_where_the_body_no_longer_moves(tmp_path):
+    cloth, faces = sheet(0.1)
+    frames = 40
+    moving = np.repeat(cloth[:1], frames, axis=0)
+    moving[:12] += 0.01 * np.arange(12, 0, -1)[:, None, None]
+    write_mesh(tmp_path / "body.vtkhdf", moving, faces, {})
+    body = vtkhdf.read_series(tmp_path / "body.vtkhdf")
+    assert hem.stop_frame(body) == 12
+    short = moving[: 12 + hem.HELD]
+    write_mesh(tmp_path / "short.vtkhdf", short, faces, {})
+    assert hem.stop_frame(vtkhdf.read_series(tmp_path / "short.vtkhdf")) is None
+    after = np.arange(frames) - 12.0
+    curves = {
+        "swings": np.radians(30.0 * np.exp(-0.1 * np.maximum(after, 0)) * np.cos(0.4 * after)),
+        "creeps": np.radians(30.0 * np.exp(-0.3 * np.maximum(after, 0))),
+    }
+    series = {}
+    for method, yaw in curves.items():
+        path = tmp_path / f"{method}.vtkhdf"
+        write_mesh(path, moving, faces, {"hem/yaw": yaw, "hem/from_end": np.abs(yaw - yaw[-1])})
+        series[method] = vtkhdf.read_series(path)
+    picture = hem.hem_curves(tmp_path, "tunic/stop", series, body)
+    assert picture is not None and "the body has stopped, at 0.400 s" in picture.caption
+    assert hem.overshoot(curves["swings"], 12) > np.radians(10.0)
+    assert hem.overshoot(curves["creeps"], 12) == 0.0

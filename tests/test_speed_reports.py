@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from benchmarks.results import Row, RunFolder
 from reports import build, palette
-from reports.answers import answers
+from reports.answers import answers, by_scene
 from reports.break_even import Cost, break_even, crossing, rivals
 from reports.canvas import _columns
 from reports.fronts import Point, fastest, front, hybrids, points_of, solvers
@@ -126,8 +128,29 @@ def test_the_answers_follow_the_numbers():
     assert "after 13,000 frames" in said["When training pays"]
 
 
+def test_the_same_scene_by_scene():
+    table = by_scene(all_rows())
+    assert table is not None and [line[:2] for line in table.rows[:2]] == [
+        ("dressed/walk", "energy gap"),
+        ("dressed/walk", "mean-curvature error"),
+    ]
+    gap, curvature = table.rows[:2]
+    assert gap[4:6] == ("none", "L-BFGS, 20 iterations, 16.0 ms") and gap[7:] == (2000.0, 13000.0)
+    assert gap[6] == "SNUG + L-BFGS, 1 iteration, 1.00 ms"
+    assert curvature[4:6] == ("Skinning alone, 0.100 ms", "L-BFGS, 5 iterations, 4.00 ms")
+
+
+def test_garments_are_answered_for_by_themselves():
+    rows = all_rows()
+    rows += [dataclasses.replace(r, scene="tunic/stop") for r in rows if r.scene == SCENES[0]]
+    said = dict(answers(rows))["When training pays"]
+    assert said.startswith("T-shirt: ") and said.count("Tunic: ") == 1
+    assert said.count("after 2,000 frames") == 2
+
+
 def test_without_networks_nothing_is_said():
     rows = [r for r in all_rows() if "snug" not in r.method]
+    assert by_scene(rows) is None
     assert not any(words for _, words in answers(rows))
 
 
