@@ -93,7 +93,9 @@ def test_a_killed_convergence_goes_on_to_the_same_curve(small, monkeypatch):
     whole = lines(small.folder / "convergence.csv")
     assert [row["step"] for row in whole] == ["2", "4", "6"] and found["steps"] == 6
     assert 20 < found["frames to learn from"] <= 20 * 5  # mixed motions too, the held-out one not
-    assert TrainedModel.load(small.folder / "models" / "snug.safetensors").steps == 6
+    model = TrainedModel.load(small.folder / "models" / "snug.safetensors")
+    assert model.steps == 6 and all(row["seconds/validation"] > 0 for row in model.history)
+    assert 0 < float(whole[-1]["seconds"]) < model.history[-1]["seconds"]
 
     (small.folder / "convergence.csv").unlink()
     asked = iter([False, False, False, True])
