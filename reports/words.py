@@ -6,7 +6,9 @@ import re
 from collections.abc import Iterable, Sequence
 
 from benchmarks.results import Row
+from reports import findings as paper_findings
 from reports import palette
+from reports.ablations import FULL, JUDGED, compared, measured_ablations
 from reports.answers import answers
 from reports.numbers import number, with_spread
 from reports.palette import NETWORKS, REFERENCE
@@ -37,6 +39,8 @@ def findings(rows: Sequence[Row]) -> list[tuple[str, str]]:
         ("Against PBNS", against(dressed, "pbns")),
         ("Against supervised", against(dressed, "supervised")),
         ("Wrinkles", curvature(dressed)),
+        ("Ablations", left_out(rows)),
+        ("The paper's findings", judged(rows)),
         *answers(rows),
         ("Validation", checks(rows)),
         ("Laws", laws(rows)),
@@ -133,6 +137,32 @@ def curvature(measured: Measurements) -> str:
     if own is None or snug is None:
         return text
     return f"{text} Mean curvature itself: the simulation {number(own)} 1/m, SNUG {number(snug)} 1/m."
+
+
+def left_out(rows: Sequence[Row]) -> str:
+    """How many ablations are worse than the full recipe in each measure, and which in none, by garment."""
+    sentences = []
+    for garment, means in measured_ablations(rows).items():
+        worse = {m: compared(means[FULL], own)[0] for m, own in means.items() if m != FULL}
+        counts = [f"{sum(what in found for found in worse.values())} in {what}" for what in JUDGED.values()]
+        text = f"{garment}, of {len(worse)} ablations worse than full SNUG beyond the scatter of seeds: "
+        none = [palette.label(method) for method, found in worse.items() if not found]
+        sentences.append(f"{text}{_listed(counts)}{f'; in nothing: {_listed(none)}' if none else ''}.")
+    return " ".join(sentences)
+
+
+def judged(rows: Sequence[Row]) -> str:
+    """How the findings of the paper that this run can judge came out."""
+    table = paper_findings.findings(rows)
+    found = [str(line[-1]) for line in table.rows if line[-1] is not None] if table else []
+    if not found:
+        return ""
+    ways = (paper_findings.REPRODUCED, paper_findings.SCATTERED)
+    reproduced, scattered = (sum(word == way for word in found) for way in ways)
+    text = f"Of {len(found)} comparisons that its findings come to here, {reproduced} come out as there"
+    text += f", {scattered} lie within the scatter of seeds" if scattered else ""
+    other = len(found) - reproduced - scattered
+    return text + (f", {other} do not come out." if other else ".")
 
 
 def checks(rows: Sequence[Row]) -> str:

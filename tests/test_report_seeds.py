@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from run_folder import row
 
-from reports import bars
+from reports import bars, words
 from reports.ablations import ABLATIONS, ablations, ablations_judged
 from reports.document import document
 from reports.summary import TIE, Mean, Measurements, dressed_scenes, scatter, wardrobe
@@ -43,6 +43,9 @@ def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
     assert [line[1] for line in made["ablations"].rows] == ["snug", "snug-no-noise", "snug-window6"]
     full = made["ablations"].rows[0]
     assert full[-1] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, complete=True)
+    said = dict(words.findings(rows))["Ablations"]
+    assert "of 2 ablations" in said and "1 in total energy, 0 in curvature error" in said
+    assert said.endswith("in nothing: SNUG, windows of 6.")
     assert made["ablations_judged"].rows == (
         ("T-shirt", "snug-no-noise", "total energy", "drift of long roll-outs"),
         ("T-shirt", "snug-window6", "", ""),
@@ -95,6 +98,15 @@ def test_throughput_is_of_the_scenes_that_were_measured_both_ways(tmp_path):
     assert table.rows[0][4:] == pytest.approx((2000.0, 10000.0, 5.0))
     (picture,) = throughput_bars(tmp_path, rows)
     assert picture.path.is_file() and throughput_bars(tmp_path, rows[-1:]) == []
+
+
+def test_the_front_page_counts_what_came_out():
+    rows = seeds_of("snug", "energy/strain", (1.0, 1.1)) + seeds_of("pbns", "energy/strain", (2.0, 2.1))
+    rows += seeds_of("snug", "energy/bending", (1.0, 1.4)) + seeds_of("pbns", "energy/bending", (1.1, 1.5))
+    rows += seeds_of("snug", "energy/gravity", (2.0, 2.1)) + seeds_of("pbns", "energy/gravity", (1.0, 1.1))
+    said = dict(words.findings(rows))["The paper's findings"]
+    assert said.startswith("Of 3 comparisons") and "1 come out as there, 1 lie within" in said
+    assert said.endswith("1 do not come out.")
 
 
 def test_the_page_says_how_many_seeds_there_were():
