@@ -19,6 +19,7 @@ from snug.baselines.tailornet import BandTargets, FrequencyMixture
 from snug.recipe import Recipe, RecipeError
 from snug.regressor import Regressor, parameter_megabytes
 from snug.swing import SwingTeacher
+from snug.swinging_regressor import SwingingRegressor
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 
 FORMAT = "snug-model-1"
@@ -45,7 +46,7 @@ class Kind:
 
 KINDS = {
     "snug": Kind(Regressor, "motion", sequences=True),
-    "dynamic": Kind(Regressor, "rates", sequences=True, teacher=SwingTeacher),
+    "dynamic": Kind(SwingingRegressor, "rates", sequences=True, teacher=SwingTeacher),
     "supervised": Kind(Regressor, "motion", sequences=True, targets=VertexTargets),
     "pbns": Kind(PoseSpaceDeformation, "pose", sequences=False),
     "santesteban2019": Kind(FitAndWrinkles, "pose_shape", sequences=True, targets=VertexTargets),
@@ -143,11 +144,13 @@ def make_network(
 
     pins: vertices without offset, which the body carries.
     """
+    how = find_kind(kind)
+    options: dict[str, Any] = {"output_scale": recipe.output_scale, "zero_last_layer": recipe.zero_last_layer}
+    if how.teacher:
+        options["components"] = recipe.swing_components
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        network: Any = find_kind(kind).network(
-            inputs, vertices, output_scale=recipe.output_scale, zero_last_layer=recipe.zero_last_layer
-        )
+        network: Any = how.network(inputs, vertices, **options)
     network.pins = tuple(pins)
     if network.pins:
         free = torch.ones(vertices, 1)
