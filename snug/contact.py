@@ -177,9 +177,12 @@ class Anchors:
         )
         return values, gradients
 
-    def renew(self, frame: int, points: np.ndarray, positions: np.ndarray) -> None:
-        """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame."""
-        found = self.patch.search(points, positions, self.faces[frame])
+    def renew(self, frame: int, points: np.ndarray, positions: np.ndarray, *, forget: bool = False) -> None:
+        """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame.
+
+        forget: old anchors are no guide, and none stands for being roughly right.
+        """
+        found = self.patch.search(points, positions, None if forget else self.faces[frame])
         self.faces[frame], self.barycentric[frame] = kept(*found, len(self.patch.faces))
         self.age[frame] = 0
 

@@ -4,18 +4,19 @@ Self-supervision needs no simulation, so a training set is not bound to what was
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
 clip takes the root, the legs, the spine and each arm from five random places of the training clips (mirrored
 half of the time), scales legs and spine, adds to each joint of the trunk a slow turn about a random axis, and
-spreads the arms where they come too near to the torso. Every part stays continuous in time, so velocities
-keep their meaning.
+spreads the arms and opens the hips where limbs come too near to the torso. Every part stays continuous in
+time, so velocities keep their meaning.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from snug.motion import Motion, arm_clearance, spread_arms
-from snug.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
 
 PARTS: tuple[tuple[str, ...], ...] = (
     ("pelvis",),
@@ -35,6 +36,9 @@ PARTS: tuple[tuple[str, ...], ...] = (
 )
 SCALE = {1: (0.6, 1.3), 2: (0.6, 1.3)}  # of legs and spine; an arm swung further might enter the torso
 CLEARANCE = 30.0  # degrees between upper arm and spine: nearer, a sleeve is pinched and no shape is good
+# Degrees between thigh and spine, about those of the deepest squat that is given. Legs of a squat under the
+# spine of a bow came to 40: thighs enter the belly, and the hem between them is in contact whatever it does.
+LAP = 65.0
 # Turn of each joint, relative to the recipe's; the collar bone turns little.
 TURNED = {
     "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,
@@ -96,4 +100,31 @@ def _mixed(motions: Sequence[Motion], random: np.random.Generator, turn: float, 
         added = rotation_matrices(stays + swings * np.sin(phase))
         poses[:, JOINT[joint]] = axis_angles(rotation_matrices(poses[:, JOINT[joint]]) @ added)
     mixed = Motion(name, poses, translations, fps=fps, kind="mixed")
+    mixed = opened_hips(mixed, max(0.0, LAP - float(np.rad2deg(lap_clearance(mixed).min()))))
     return spread_arms(mixed, max(0.0, CLEARANCE - float(np.rad2deg(arm_clearance(mixed).min()))))
+
+
+def lap_clearance(motion: Motion) -> np.ndarray:
+    """Angle between each thigh and the upward spine: small when the thigh lies on the belly.
+
+    -> (T, 2) [rad], left and right.
+    """
+    joints = joint_positions(motion.poses, motion.translations)
+    up = joints[:, JOINT["spine3"]] - joints[:, JOINT["spine1"]]
+    thighs = [
+        joints[:, JOINT[f"{side}_knee"]] - joints[:, JOINT[f"{side}_hip"]] for side in ("left", "right")
+    ]
+    cosines = [
+        (thigh * up).sum(-1) / np.linalg.norm(thigh, axis=-1) / np.linalg.norm(up, axis=-1)
+        for thigh in thighs
+    ]
+    return np.arccos(np.clip(np.stack(cosines, axis=1), -1.0, 1.0))
+
+
+def opened_hips(motion: Motion, degrees: float) -> Motion:
+    """Both thighs turned back by the same angle in all frames, about the axis through the hips."""
+    poses = motion.poses.copy()
+    back = rotation_matrices(np.array([np.deg2rad(degrees), 0.0, 0.0]))
+    for joint in (JOINT["left_hip"], JOINT["right_hip"]):
+        poses[:, joint] = axis_angles(back @ rotation_matrices(poses[:, joint]))
+    return replace(motion, poses=poses)

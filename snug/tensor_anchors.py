@@ -65,8 +65,10 @@ class TensorAnchors:
         directions = (weights * normals[row, corners]).sum(-2)
         return points, directions / (torch.linalg.vector_norm(directions, dim=-1, keepdim=True) + 1e-30)
 
-    def renew(self, frame: int, points: Tensor, positions: Tensor) -> None:
-        """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame."""
+    def renew(self, frame: int, points: Tensor, positions: Tensor, *, forget: bool = False) -> None:
+        """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame. Brute force has no
+        use for old anchors, so that `forget` changes nothing.
+        """
         for start in range(0, len(points), CHUNK):
             part = slice(start, start + CHUNK)
             faces, barycentric = self._searched(points[part], self.sample_rest[part], positions)

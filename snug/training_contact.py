@@ -103,8 +103,13 @@ class TrainingContact:
         self._credit -= count
         self.search(self.anchors.oldest(frames.ravel(), count), frames, posed, x)
 
-    def search(self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
-        """Search the anchors of some places (n,) among the frames (N T,) of a batch; else as `renew`."""
+    def search(
+        self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor, *, forget: bool = False
+    ) -> None:
+        """Search the anchors of some places (n,) among the frames (N T,) of a batch; else as `renew`.
+
+        forget: see Anchors.renew.
+        """
         flat, (rows, positions, _) = frames.ravel(), posed
         vertices = x.detach().flatten(0, 1)
         share = len(vertices)
@@ -112,7 +117,7 @@ class TrainingContact:
             owner, mine = divmod(int(place), share)
             if owner == self.group.rank:
                 samples = self._samples(vertices[mine])
-                self.anchors.renew(int(flat[place]), samples, positions[rows[mine]])
+                self.anchors.renew(int(flat[place]), samples, positions[rows[mine]], forget=forget)
             self._send(int(flat[place]), owner)
 
     def _samples(self, vertices: Tensor) -> Any:

@@ -117,7 +117,12 @@ def test_a_high_window_has_its_anchors_searched_before_it_is_judged(monkeypatch)
     usual = row["collision"]
     anchors = trainer.contact.anchors
     searched, whole = [], anchors.renew
-    monkeypatch.setattr(anchors, "renew", lambda frame, *rest: (searched.append(frame), whole(frame, *rest)))
+
+    def renew(frame, *rest, **how):
+        searched.append(frame)
+        whole(frame, *rest, **how)
+
+    monkeypatch.setattr(anchors, "renew", renew)
     # Every anchor of the next batch's first window on the far side of the trunk.
     order = trainer.order.copy()
     frames = trainer.data.starts[order[0]] + np.arange(3)

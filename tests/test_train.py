@@ -10,7 +10,7 @@ import torch
 from dressing import leaning, swaying, tube_dress
 
 from snug.baselines.supervised import TargetError, vertex_loss
-from snug.mixing import mirrored, mixed_motions
+from snug.mixing import lap_clearance, mirrored, mixed_motions
 from snug.motion import Motion, arm_clearance, make_motion
 from snug.recipe import DEFAULT, PAPER, Recipe
 from snug.rollout import roll_out
@@ -198,6 +198,13 @@ def test_mixed_motions_are_continuous_and_repeat():
     assert np.rad2deg(min(arm_clearance(clip).min() for clip in mixed)) > 25.0
     fastest = max(joint_speeds(clip).max() for clip in clips)
     assert max(joint_speeds(clip).max() for clip in mixed) < 2 * fastest + 2.0
+
+
+def test_mixed_thighs_stay_off_the_belly():
+    clips = [make_motion(name) for name in ("squat", "bow")]  # together: a squat's legs under a bowed spine
+    mixed = mixed_motions(clips, 3000, turn=0.1, seed=3)
+    nearest = [np.rad2deg(lap_clearance(clip).min()) for clip in [*clips, *mixed]]
+    assert min(nearest) > 55.0 and max(nearest) > 70.0  # 25 where nothing opens the hips
 
 
 def test_mixed_motions_join_the_training_set():
