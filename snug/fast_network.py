@@ -15,7 +15,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import torch
+from numba import njit
 from torch import Tensor, nn
 
 _LINEAR = (
@@ -87,20 +89,34 @@ class FastGRU(torch.autograd.Function):
 def _back_in_time(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tuple[Tensor, Tensor]:
     """Gradients (T N, 3H) of what W_i x and W_h h gave, from those y (T, N, H) of a layer's outputs."""
     frames, count, size = y.shape
-    r, z, n, q = gates.split(size, -1)
-    to_n = (1 - z) * (1 - n * n)
-    to_z = (hidden[:-1] - n) * z * (1 - z)
-    to_r = to_n * q * r * (1 - r)
-    slopes = torch.stack([to_r, to_z, to_n], 2), torch.stack([to_r, to_z, to_n * r], 2)
-    found = tuple(y.new_empty(frames, count, 3, size) for _ in slopes)
-    back = y.new_zeros(count, size)
+    to_inputs, to_recurrent = (y.new_empty(frames, count, 3 * size) for _ in range(2))
+    back, y = y.new_zeros(count, size), y.contiguous()
+    arrays = [tensor.numpy() for tensor in (y, gates, hidden, to_inputs, to_recurrent)]
     for t in reversed(range(frames)):
-        back = back + y[t]
-        for slope, out in zip(slopes, found):
-            torch.mul(slope[t], back[:, None], out=out[t])
+        _cell_back(back.numpy(), *(array[t] for array in arrays))
         if t:
-            back = torch.addcmul(product(found[1][t].flatten(1), w_h.t()), back, z[t])
-    return found[0].view(frames * count, -1), found[1].view(frames * count, -1)
+            back += product(to_recurrent[t], w_h.t())
+    return to_inputs.flatten(0, 1), to_recurrent.flatten(0, 1)
+
+
+@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def _cell_back(back, y, gates, before, to_inputs, to_recurrent):
+    """One frame of a layer: back (N, H), the gradient of h' that comes from later frames, becomes what passes
+    to h through z alone.
+    """
+    one, size = np.float32(1.0), back.shape[1]
+    for i in range(len(back)):
+        for j in range(size):
+            r, z = gates[i, j], gates[i, size + j]
+            n, q = gates[i, 2 * size + j], gates[i, 3 * size + j]
+            whole = back[i, j] + y[i, j]
+            to_n = whole * (one - z) * (one - n * n)
+            to_r = to_n * q * r * (one - r)
+            to_z = whole * (before[i, j] - n) * z * (one - z)
+            to_inputs[i, j] = to_recurrent[i, j] = to_r
+            to_inputs[i, size + j] = to_recurrent[i, size + j] = to_z
+            to_inputs[i, 2 * size + j], to_recurrent[i, 2 * size + j] = to_n, to_n * r
+            back[i, j] = whole * z
 
 
 class FastLinear(torch.autograd.Function):

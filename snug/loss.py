@@ -96,6 +96,30 @@ class ClosedForm(torch.autograd.Function):
         return above[0][..., None, None] * ctx.gradients, None, *([None] * ctx.extra)
 
 
+class ClosedInertia(torch.autograd.Function):
+    """apply(x (N, T, V, 3) [m], ahead (N, T, 3) [m], masses / dt^2 (V, 1) [N/m], detached) -> (N, T) [J].
+
+    With a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t: E = m / (2 dt^2) |a|^2, zero for t < 3. Differentiable once,
+    by x alone.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, ahead: Tensor, stiffness: Tensor, detached: bool) -> Tensor:
+        a = torch.sub(x[:, 2:], x[:, 1:-1], alpha=2).add_(x[:, :-2]).sub_(ahead[:, 2:, None])
+        ctx.force, ctx.detached = stiffness * a, detached
+        return torch.nn.functional.pad(0.5 * (a.mul_(ctx.force)).sum((-1, -2)), (2, 0))
+
+    @staticmethod
+    def backward(ctx: Any, *above: Tensor) -> Any:
+        force = above[0][:, 2:, None, None] * ctx.force
+        gradient = force.new_zeros(force.shape[0], force.shape[1] + 2, *force.shape[2:])
+        gradient[:, 2:] = force
+        if not ctx.detached:
+            gradient[:, 1:-1].sub_(force, alpha=2)
+            gradient[:, :-2] += force
+        return gradient, None, None, None
+
+
 def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Tensor:
     """Energy of each configuration, (..., V, 3) -> (...) [J]: by kernel from frame data in numpy, or by its
     definition from tensors.
@@ -143,13 +167,19 @@ class PhysicsLoss:
         """
         terms = {name: summed(energy, x, kernels=self.kernels) for name, energy in self.static.items()}
         if "inertia" in self.terms and x.shape[1] >= 3:
-            past = x.detach() if self.detached else x
-            x_hat = 2 * past[:, 1:-1] - past[:, :-2] + ahead[:, 2:, None]
-            inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
-            terms["inertia"] = torch.nn.functional.pad(inertia, (2, 0))
+            terms["inertia"] = self._inertia(x, ahead)
         if "collision" in self.terms and planes is not None:
             if callable(planes):
                 terms["collision"] = ClosedForm.apply(x, planes)
             else:
                 terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
         return terms
+
+    def _inertia(self, x: Tensor, ahead: Tensor) -> Tensor:
+        if self.kernels:
+            stiffness = torch.as_tensor(self.inertia.masses / self.inertia.dt**2).to(x)[:, None]
+            return ClosedInertia.apply(x, ahead, stiffness, self.detached)
+        past = x.detach() if self.detached else x
+        x_hat = 2 * past[:, 1:-1] - past[:, :-2] + ahead[:, 2:, None]
+        inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
+        return torch.nn.functional.pad(inertia, (2, 0))

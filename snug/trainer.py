@@ -14,6 +14,7 @@ from torch import Tensor
 
 from snug.baselines.supervised import VertexTargets
 from snug.dresser import DressedBody
+from snug.fast_skinning import FastSkin
 from snug.guard import SETTLING, Guard, live_tensors
 from snug.loss import PhysicsLoss
 from snug.mixing import mixed_motions
@@ -197,7 +198,8 @@ class Trainer:
         with self.clock.part("forward"):
             offsets, _ = self._callable(batch.features, state)
         with self.clock.part("skinning"):
-            return skin(batch.rest + offsets, self.weights, batch.transforms), offsets
+            posed_by = FastSkin.apply if self.kernels else skin
+            return posed_by(batch.rest + offsets, self.weights, batch.transforms), offsets
 
     def _set_rate(self, number: int) -> None:
         recipe = self.recipe

@@ -77,6 +77,23 @@ def test_inertia_reaches_all_three_frames():
     assert torch.allclose(two, -2 * three) and torch.allclose(one, three) and three.norm() > 0
 
 
+@pytest.mark.parametrize("detached", [False, True])
+def test_closed_inertia_is_the_definition_and_its_derivative(detached):
+    dressed, x, *_ = posed_batch()
+    x = torch.cat([x, x.flip(1)], 1) + 0.01 * torch.arange(6.0)[:, None, None] ** 2
+    recipe = Recipe(terms=("inertia",), detached=detached)
+    ahead, weight = 0.01 * torch.arange(18.0).reshape(1, 6, 3), torch.arange(1.0, 7.0)
+    found = []
+    for kernels in (True, False):
+        loss, at = PhysicsLoss(dressed.cloth, recipe, dt=DT, kernels=kernels), x.clone().requires_grad_()
+        value = loss(at, ahead, None)["inertia"]
+        (value * weight).sum().backward()
+        found.append((value.detach(), at.grad))
+    assert found[1][1].norm() > 1e-3 and found[0][0][0, 2] > 0 and not found[0][0][0, :2].any()
+    for fast, slow in zip(*found):
+        assert torch.allclose(fast, slow, rtol=1e-5, atol=1e-7 * float(slow.abs().max()))
+
+
 def test_leaving_out_a_term_leaves_it_out():
     dressed, x, points, normals = posed_batch()
     recipe = Recipe(terms=("strain", "collision"))

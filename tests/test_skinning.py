@@ -5,6 +5,7 @@ import pytest
 import torch
 from scipy.spatial.transform import Rotation
 
+from snug.fast_skinning import FastSkin
 from snug.skinning import axis_angle_to_matrix, joint_transforms, matrix_to_6d, skin
 
 PARENTS = [-1, 0, 1, 1]
@@ -93,3 +94,17 @@ def test_batches_broadcast_and_gradients_flow():
     torch.testing.assert_close(posed[1, 3], skin(points[1, 3], weights, one))
     (gradient,) = torch.autograd.grad(posed.square().sum(), turns)
     assert torch.isfinite(gradient).all() and gradient.norm() > 1.0
+
+
+def test_closed_form_is_skinning_and_its_derivative():
+    points, transforms, above = (
+        random_tensor(*s).float() for s in ((2, 3, 50, 3), (2, 3, 4, 3, 4), (2, 3, 50, 3))
+    )
+    weights = torch.softmax(random_tensor(50, 4), -1).float()
+    fast, slow = points.clone().requires_grad_(), points.double().requires_grad_()
+    posed = FastSkin.apply(fast, weights, transforms)
+    exact = skin(slow, weights.double(), transforms.double())
+    posed.backward(above)
+    exact.backward(above.double())
+    assert torch.allclose(posed.double(), exact, rtol=0, atol=3e-6)  # float32 of sums of size 10
+    assert torch.allclose(fast.grad.double(), slow.grad, rtol=0, atol=3e-6) and slow.grad.norm() > 1
