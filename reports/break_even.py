@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,10 +14,12 @@ from reports import palette
 from reports.canvas import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
 from reports.fronts import TIME, fastest, points_of, solvers
 from reports.numbers import duration, number
-from reports.summary import Measurements, dressed_scenes, speed_measurements, worn_scenes
+from reports.summary import Measurements, dressed_scenes, speed_measurements, wardrobe, worn_scenes
+from reports.table import Cell, Column, Table
 
 ACCURACIES = (("gap/relative", "energy gap"), ("curvature/error", "curvature error"))
 MOST_FRAMES = 1e7
+FEW = 3  # networks whose crossings a caption has room for; of more it names SNUG's, and a table all
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,44 @@ def compared_scenes(measured: Measurements, network: str = "snug") -> list[str]:
     ]
 
 
+def compared_costs(
+    measured: Measurements, scenes: Sequence[str], against: Iterable[str]
+) -> tuple[list[Cost], list[Cost]]:
+    """Costs of the networks that were trained, and of the solvers given, that were timed on the scenes."""
+    trained = [
+        m
+        for m in palette.leading(measured.methods)
+        if not palette.cut_of(m) and (measured.value(m, "cost/train", scenes) or 0.0) > 0.0
+    ]
+    found = ([cost_of(measured, m, scenes) for m in methods] for methods in (trained, against))
+    networks, solvers_ = ([cost for cost in costs if cost is not None] for costs in found)
+    return networks, solvers_
+
+
+def crossings(rows: Sequence[Row]) -> Table | None:
+    """From how many frames on each trained network is cheaper than the solvers it competes with."""
+    measured = speed_measurements(rows)
+    lines: list[tuple[Cell, ...]] = []
+    for garment, scenes in wardrobe(measured.only(compared_scenes(measured))).items():
+        networks, against = compared_costs(measured, scenes, rivals(measured, scenes))
+        for network in networks:
+            for rival in against:
+                frames = crossing(network, rival)
+                total = None if frames is None else network.total(frames)
+                rounded = None if frames is None else float(f"{frames:.1e}")
+                lines.append((garment, network.method, palette.label(rival.method), rounded, total))
+    if not lines:
+        return None
+    columns = (
+        Column("garment", "Garment"),
+        Column("method", "Network"),
+        Column("solver", "Overtakes"),
+        Column("crossing", "From frames on"),
+        Column("total_time", "Total time by then", "s"),
+    )
+    return Table("crossings", columns, tuple(lines))
+
+
 def break_even(folder: Path, rows: Sequence[Row]) -> list[Picture]:
     """One figure: total time of N frames for each trained network and for the solvers it competes with."""
     measured = speed_measurements(rows)
@@ -82,12 +122,8 @@ def break_even(folder: Path, rows: Sequence[Row]) -> list[Picture]:
     if not scenes:
         return []
     against = rivals(measured, scenes)
-    trained = [
-        m
-        for m in palette.leading(measured.methods)
-        if not palette.cut_of(m) and (measured.value(m, "cost/train", scenes) or 0.0) > 0.0
-    ]
-    costs = [c for m in (*against, *trained) if (c := cost_of(measured, m, scenes))]
+    trained, rival_costs = compared_costs(measured, scenes, against)
+    costs = [*rival_costs, *trained]
     if not trained or len(costs) < 2:
         return []
     figure = new_figure(PAGE_WIDTH * 0.8, 3.1)
@@ -96,7 +132,7 @@ def break_even(folder: Path, rows: Sequence[Row]) -> list[Picture]:
     for cost in costs:
         look = palette.style(cost.method)
         axes.plot(frames, [cost.total(n) for n in frames], color=look.colour, linestyle=look.line)
-    told = _mark_crossings(axes, [c for c in costs if c.method in trained], costs[: len(against)])
+    told = _mark_crossings(axes, trained, rival_costs)
     axes.set(xlabel="frames", ylabel="data, training and frames [s]")
     axes.set_xscale("log")
     log_axis(axes, "y")
@@ -120,6 +156,8 @@ def _mark_crossings(axes, trained: Sequence[Cost], against: Sequence[Cost]) -> s
             if frames is not None and 1.0 <= frames <= MOST_FRAMES:
                 total = network.total(frames)
                 axes.plot(frames, total, "o", color=palette.style(network.method).colour, markersize=4.5)
+                if len(trained) > FEW and network.method != "snug":
+                    continue
                 names = f"{palette.label(network.method)} overtakes {palette.label(rival.method)}"
                 parts.append(f"{names} at {frames_text(frames)} frames ({duration(total)})")
     return "; ".join(parts) + "." if parts else "No training pays within ten million frames."

@@ -40,6 +40,8 @@ CAPTIONS = {
     "most its error, the fastest solver that starts from a network or skinning, has less error than SNUG and "
     "is overtaken by no solver alone; frames after which training pays against the converged simulation, and "
     "against that solver.",
+    "crossings": "From how many frames on the training of a network pays, against the converged simulation "
+    "and the fastest solvers with at most SNUG's error; a dash: never.",
     "speed": "The points of the plots: run time of one frame; relative energy gap, gradient left, errors of "
     "mean curvature and of its histogram, distance to the simulation, total energy above it.",
     "validation": "Measured and expected value of every check.",
@@ -78,6 +80,7 @@ PAPER = {
 
 BY_GARMENT = (
     "energies", "curvature", "dynamics", "penetration", "shape", "cost", "ablations", "ablations_judged",
+    "crossings",
 )  # fmt: skip
 GROUPED = {
     "energies_by_scene": ("scene",),
@@ -113,7 +116,7 @@ def document(
                 for kind in ("break_even", "profile", "speed")
                 for block in _figures(rest, "speed", kind)
             ]
-            + _tables(tables, "answers", "speed"),
+            + _tables(tables, "answers", "crossings", "speed"),
         },
         {
             "title": "Validation: known answers",

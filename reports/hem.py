@@ -42,11 +42,8 @@ def hem_curves(
     if stop is not None:
         first = max(stop - BEFORE, 0)
         turned = {m: curve - curve[-1] for m, curve in yaw.items()}
-        panels[1:] = [
-            ("after the stop: yaw from its end", turned, first),
-            ("after the stop: hem from its end [mm]", from_end, first),
-        ]
-    figure = new_figure(PAGE_WIDTH, 2.6)
+        panels[1:] = [("yaw from its end [degrees]", turned, first), ("from its end [mm]", from_end, first)]
+    figure = new_figure(PAGE_WIDTH, 2.6 if len(methods) <= 4 else 3.0)
     for axes, (title, curves, first) in zip(figure.subplots(1, len(panels)), panels):
         for method in reversed(methods):  # the reference last, on top
             look, times = palette.style(method), series[method].times
@@ -60,7 +57,8 @@ def hem_curves(
     legend_above(figure, methods, lines=True)
     caption = f"{scene}: the hem in the axes of the root."
     if stop is not None and body is not None:
-        caption += f" Grey: the body has stopped, at {number(float(body.times[stop]))} s. "
+        caption += f" Grey: the body has stopped, at {number(float(body.times[stop]))} s; "
+        caption += "the middle and the right panel begin just before. "
         caption += _overshoots(yaw, stop)
     else:
         caption += " Each curve is one method; what the simulation does beyond the others is swing."

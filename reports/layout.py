@@ -36,10 +36,11 @@ _WORDS: dict[str, Callable[[str], str]] = {
 }
 _DIGITS = {
     "measured": 7, "expected": 7, "tolerance": 2, "gradient": 2, "apart": 2, "scatter": 2, "gain": 2,
+    "crossing": 2,
 }  # fmt: skip
 _NOISE = 1e-3  # what is measured below it is an error, of which two digits say enough
 _ZERO = {"lag": 5e-3}  # lags are looked for in hundredths of a frame: less is none
-_TIMES = ("data_generation", "training")
+_TIMES = ("data_generation", "training", "total_time")
 
 
 def table_block(

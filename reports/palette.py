@@ -24,6 +24,9 @@ STATUS_COLOURS = {
 }
 
 
+Line = str | tuple[float, tuple[float, ...]]  # matplotlib's: a name, or an offset and the dashes [points]
+
+
 @dataclass(frozen=True)
 class Style:
     """Label for people, colour, matplotlib marker and line of one method."""
@@ -31,7 +34,7 @@ class Style:
     label: str
     colour: str
     marker: str
-    line: str = "-"
+    line: Line = "-"
 
 
 _KNOWN = {
@@ -65,6 +68,8 @@ _FAMILIES = {
     "simulation-tolerance": Style("Simulation to a tolerance", "#555555", "*"),
     "simulation-dt": Style("Simulation with smaller steps", "#882255", "*"),
 }
+# Members of a family share its colour. Cuts go by doubling: four in a row have four lines.
+_DASHES: tuple[Line, ...] = ((0.0, (8.0, 1.5)), "--", "-.", ":")
 _SPARE = ("#999933", "#661100", "#AA4499", "#117733", "#88CCEE", "#DDCC77")
 CLEANED = "+cleanup"  # at the end of a method's name: its vertices were pushed out of the body afterwards
 
@@ -125,7 +130,8 @@ def style(method: str) -> Style:
     if cut.family == "simulation-dt":
         return Style(f"Simulation, step {cut.mark}", base.colour, base.marker)
     steps = "iteration" if cut.mark == "1" else "iterations"
-    return Style(f"{base.label}, {cut.mark} {steps}", base.colour, base.marker, base.line)
+    dashes = _DASHES[int(cut.order).bit_length() % len(_DASHES)]
+    return Style(f"{base.label}, {cut.mark} {steps}", base.colour, base.marker, dashes)
 
 
 def label(method: str) -> str:

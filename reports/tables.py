@@ -12,6 +12,7 @@ from benchmarks.results import Row
 from reports import bars
 from reports.ablations import ablations, ablations_judged
 from reports.answers import by_scene
+from reports.break_even import crossings
 from reports.findings import findings, recipes
 from reports.garment_tables import cost, curvature, dynamics, energies, energies_by_scene, geometry, shape
 from reports.stability import refusals
@@ -150,6 +151,7 @@ MAKERS = (
     bars.table,
     recipes,
     by_scene,
+    crossings,
     speed,
     validation,
     laws,

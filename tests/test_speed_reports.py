@@ -9,7 +9,7 @@ import pytest
 from benchmarks.results import Row, RunFolder
 from reports import build, palette
 from reports.answers import answers, by_scene
-from reports.break_even import Cost, break_even, crossing, rivals
+from reports.break_even import Cost, break_even, crossing, crossings, rivals
 from reports.canvas import _columns
 from reports.fronts import Point, fastest, front, hybrids, points_of, solvers
 from reports.profile import performance_profile, staircases, times_to_reach
@@ -138,6 +138,18 @@ def test_the_same_scene_by_scene():
     assert gap[4:6] == ("none", "L-BFGS, 20 iterations, 16.0 ms") and gap[7:] == (2000.0, 13000.0)
     assert gap[6] == "SNUG + L-BFGS, 1 iteration, 1.00 ms"
     assert curvature[4:6] == ("Skinning alone, 0.100 ms", "L-BFGS, 5 iterations, 4.00 ms")
+
+
+def test_every_network_has_its_crossings_in_a_table():
+    table = crossings(all_rows())
+    assert table is not None
+    found = {line[2]: line[3:] for line in table.rows}
+    assert {line[1] for line in table.rows} == {"snug"}
+    assert found["Simulation"] == (2000.0, pytest.approx(200.5, rel=1e-3))
+    assert found["L-BFGS, 20 iterations"][0] == 13000.0 and set(found) == {
+        "Simulation", "L-BFGS, 20 iterations", "L-BFGS, 5 iterations",
+    }  # fmt: skip
+    assert crossings([r for r in all_rows() if "snug" not in r.method]) is None
 
 
 def test_garments_are_answered_for_by_themselves():
