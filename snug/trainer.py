@@ -28,7 +28,6 @@ from snug.trained_model import find_kind, make_network
 from snug.training_contact import Posed, TrainingContact
 from snug.training_set import CPU, Batch, TrainingError, TrainingSet
 
-DOUBTFUL = 0.75  # of the recipe's spike: from there on a window's contact is looked at again
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -167,7 +166,7 @@ class Trainer:
     def _searched_for_high(
         self, number: int, windows: np.ndarray, posed: Posed, x: Tensor, terms: dict[str, Tensor]
     ) -> bool:
-        """Search the anchors of windows near or above the spike limit at once; whether there were any.
+        """Search the anchors of windows above the spike limit at once; whether there were any.
 
         An anchor from the T-pose, or of a garment that has moved on, can claim a contact that is none; so can
         one that stood for being roughly right, hence they are forgotten. Not where most windows are high:
@@ -177,7 +176,7 @@ class Trainer:
         if number < SETTLING:
             return False
         joules = torch.stack(list(terms.values())).detach().sum(0).mean(1)
-        high = np.flatnonzero(self.group.gathered(joules > DOUBTFUL * self.recipe.spike).cpu().numpy())
+        high = np.flatnonzero(self.group.gathered(joules > self.recipe.spike).cpu().numpy())
         if not 0 < len(high) <= MOSTLY_FINE * len(windows):
             return False
         frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
