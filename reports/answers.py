@@ -24,7 +24,8 @@ def answers(rows: Sequence[Row]) -> list[tuple[str, str]]:
     def told(say: Callable[[Sequence[str]], str]) -> str:
         """Of each garment by itself; named where there are several."""
         said = {garment: words for garment, scenes in garments.items() if (words := say(scenes))}
-        return " ".join(f"{garment}: {words}" if len(said) > 1 else words for garment, words in said.items())
+        several = len(garments) > 1
+        return " ".join(f"{garment}: {words}" if several else words for garment, words in said.items())
 
     return [
         ("Run time", run_time(measured)),
@@ -75,7 +76,7 @@ def _names(measured: Measurements, scene: str, points: Sequence[Point], own: Poi
 
 
 def _named(point: Point | None) -> str:
-    return f"{palette.label(point.method)}, {number(point.time)} ms" if point else "none"
+    return f"{palette.label(point.method)}, {number(point.time)}\u00a0ms" if point else "none"
 
 
 def run_time(measured: Measurements) -> str:

@@ -135,9 +135,9 @@ def test_the_same_scene_by_scene():
         ("dressed/walk", "mean-curvature error"),
     ]
     gap, curvature = table.rows[:2]
-    assert gap[4:6] == ("none", "L-BFGS, 20 iterations, 16.0 ms") and gap[7:] == (2000.0, 13000.0)
-    assert gap[6] == "SNUG + L-BFGS, 1 iteration, 1.00 ms"
-    assert curvature[4:6] == ("Skinning alone, 0.100 ms", "L-BFGS, 5 iterations, 4.00 ms")
+    assert gap[4:6] == ("none", "L-BFGS, 20 iterations, 16.0\u00a0ms") and gap[7:] == (2000.0, 13000.0)
+    assert gap[6] == "SNUG + L-BFGS, 1 iteration, 1.00\u00a0ms"
+    assert curvature[4:6] == ("Skinning alone, 0.100\u00a0ms", "L-BFGS, 5 iterations, 4.00\u00a0ms")
 
 
 def test_every_network_has_its_crossings_in_a_table():
