@@ -116,7 +116,7 @@ def style(method: str) -> Style:
         return _KNOWN[method]
     if method.endswith(CLEANED):
         base = style(method.removesuffix(CLEANED))
-        return Style(f"{base.label}, cleaned up", base.colour, base.marker, ":")
+        return Style(f"{base.label}, cleaned up", base.colour, "p", ":")
     if method.startswith(_VARIANT) and "+" not in method:
         base = family_style(method)
         words = re.sub(r"^window(\d+)$", r"windows of \1", method.removeprefix(_VARIANT)).replace("-", " ")
