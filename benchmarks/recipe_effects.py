@@ -50,7 +50,7 @@ DEVIATIONS = (
     Deviation("six numbers a joint", ("pose_input",)),
     Deviation("velocity in root axes", ("velocity_frame",)),
     Deviation("smoothed weights", ("smoothing",)),
-    Deviation("rate drops at 70 %", ("drop_after_epochs",)),
+    Deviation("rate falls by a cosine", ("schedule",)),
     Deviation("first state sigma 0.3", ("h0_sigma",)),
     Deviation("overlapping windows", ("window_stride",)),
     Deviation("mean body alone", ("shape_range",)),

@@ -29,8 +29,8 @@ class Recipe:
         DressedBody.weights).
     zero_last_layer: start at the skinned template instead of at centimetres of noise.
     output_scale: factor on the predicted offsets.
-    learning_rate, drop_at, drop_factor: Adam, divided by `drop_factor` after the fraction `drop_at` of the
-    steps. drop_after_epochs: when given, divide after this many epochs instead.
+    learning_rate: of Adam. schedule: what becomes of it, `cosine` (half a cosine, down to a hundredth of it at
+        the last step), `epochs` (a tenth after `drop_after_epochs` epochs) or `constant`.
     h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
     window, batch: frames of a sub-sequence, sub-sequences of a step.
     window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
@@ -59,9 +59,8 @@ class Recipe:
     zero_last_layer: bool = True
     output_scale: float = 0.1
     learning_rate: float = 1e-3
-    drop_at: float = 0.7
-    drop_factor: float = 10.0
-    drop_after_epochs: int | None = None
+    schedule: str = "cosine"
+    drop_after_epochs: int = 10
     h0_sigma: float = 0.3
     window: int = 3
     batch: int = 16
@@ -71,7 +70,7 @@ class Recipe:
     contact_stiffness: float | None = None
     contact_margin: float | None = None
     contact_refresh: float = 0.03
-    mixed: float = 4.0
+    mixed: float = 12.0
     mixed_turn: float = 0.1
     terms: tuple[str, ...] = TERMS
     material: str = "stvk"
@@ -86,6 +85,7 @@ class Recipe:
         for option, allowed in (
             ("pose_input", ("six", "axis_angle")),
             ("velocity_frame", ("root", "world")),
+            ("schedule", ("cosine", "epochs", "constant")),
             ("contact_samples", ("all", "vertices")),
             ("material", ("stvk", "springs", "pbns")),
         ):
@@ -106,7 +106,7 @@ class Recipe:
         for option in ("swing", "rehearsal", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
-        for option in ("learning_rate", "output_scale", "drop_factor", "gradient_limit", "spike"):
+        for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
 
@@ -135,7 +135,7 @@ PAPER = Recipe(
     smoothing=0,
     zero_last_layer=False,
     output_scale=1.0,
-    drop_after_epochs=10,
+    schedule="epochs",
     h0_sigma=0.1,
     window_stride=3,
     shape_range=3.0,
@@ -157,7 +157,7 @@ TAILORNET = replace(
     window=1,
     batch=32,
     learning_rate=1e-4,
-    drop_at=1.0,
+    schedule="constant",
     output_scale=1.0,
     terms=(),
 )

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -28,6 +29,7 @@ from snug.trained_model import find_kind, make_network
 from snug.training_contact import Posed, TrainingContact
 from snug.training_set import CPU, Batch, TrainingError, TrainingSet
 
+DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -201,13 +203,13 @@ class Trainer:
             return posed_by(batch.rest + offsets, self.weights, batch.transforms), offsets
 
     def _set_rate(self, number: int) -> None:
-        recipe = self.recipe
-        if recipe.drop_after_epochs is not None:
-            late = self.epoch > recipe.drop_after_epochs
-        else:
-            late = number >= recipe.drop_at * self.steps
+        recipe, share = self.recipe, 1.0
+        if recipe.schedule == "epochs" and self.epoch > recipe.drop_after_epochs:
+            share = DROPPED
+        elif recipe.schedule == "cosine":
+            share = LEAST_SHARE + (1 - LEAST_SHARE) * 0.5 * (1 + math.cos(math.pi * number / self.steps))
         for group in self.optimiser.param_groups:
-            group["lr"] = self.guard.rate * recipe.learning_rate / (recipe.drop_factor if late else 1.0)
+            group["lr"] = self.guard.rate * recipe.learning_rate * share
 
     def _update(
         self, number: int, windows: np.ndarray, terms: dict[str, Tensor]

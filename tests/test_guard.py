@@ -13,7 +13,7 @@ from snug.trainer import Trainer
 from snug.training_run import TrainingRun
 from snug.training_set import TrainingError
 
-PLAIN = replace(DEFAULT, mixed=0.0)
+PLAIN = replace(DEFAULT, mixed=0.0, schedule="constant")
 
 
 def test_guard_names_a_window_and_keeps_the_weights():

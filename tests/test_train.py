@@ -41,6 +41,20 @@ def test_training_lowers_the_potential(trained):
     assert last["loss"] == pytest.approx(parts, rel=1e-6) and last["step"] == 150
 
 
+@pytest.mark.parametrize(
+    ("schedule", "wanted"),
+    [("cosine", (1.0, 0.505, 0.01)), ("constant", (1.0, 1.0, 1.0)), ("epochs", (1.0, 1.0, 0.1))],
+)
+def test_rate_follows_its_schedule(schedule, wanted):
+    recipe = replace(PLAIN, schedule=schedule, drop_after_epochs=2)
+    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=40, seed=0, recipe=recipe)
+    for number, epoch, share in zip((0, 20, 40), (1, 2, 3), wanted):
+        trainer.epoch = epoch
+        trainer._set_rate(number)
+        rate = trainer.optimiser.param_groups[0]["lr"]
+        assert rate == pytest.approx(share * PLAIN.learning_rate, rel=1e-9)
+
+
 def test_trained_beats_skinning_in_a_roll_out(trained):
     from reference_sim.energies import Gravity, StretchStVK
 
