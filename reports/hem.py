@@ -90,5 +90,6 @@ def overshoot(yaw: Sequence[float] | np.ndarray, stop: int) -> float:
 
 
 def _overshoots(yaw: Mapping[str, np.ndarray], stop: int) -> str:
-    parts = [f"{palette.label(method)} {number(overshoot(curve, stop), 2)}" for method, curve in yaw.items()]
+    far = {method: round(overshoot(curve, stop), 1) for method, curve in yaw.items()}
+    parts = [f"{palette.label(method)} {number(degrees, 2)}" for method, degrees in far.items()]
     return f"Farthest past its end after the stop, in degrees: {', '.join(parts)}."

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from reports import palette
-from reports.canvas import PAGE_WIDTH, Picture, file_name, new_figure, save
+from reports.canvas import PAGE_WIDTH, Picture, file_name, new_figure, save, wrapped
 from reports.numbers import number
 from reports.painter import paint
 from reports.vtkhdf import MeshSeries, read_series
@@ -27,6 +27,7 @@ SIZE = (420, 520)  # pixels of one view
 BODY_COLOUR = "#D9CFC6"
 CLOTH_COLOUR = "#7FA8C9"
 GL_SECONDS = 20.0, 1.5  # to start pyvista, and for each view; some drivers hang rather than crash
+LETTERS = 15  # of a view's title in an inch
 PER_ROW = 6  # of up to so many views; more share as few rows as there have to be evenly
 
 
@@ -176,13 +177,16 @@ def _compose(folder: Path, dressed: Dressed, views: Sequence[View], renderer: st
     lines = -(-len(views) // PER_ROW)
     columns = -(-len(views) // lines)
     width = min(PAGE_WIDTH, columns * 1.6)
-    figure = new_figure(width, lines * (width / columns * SIZE[1] / SIZE[0] + 0.2))
+    methods = palette.leading(dressed.series)
+    titles = [wrapped(palette.label(method), round(LETTERS * width / columns)) for method in methods]
+    room = 0.2 * max(title.count("\n") for title in titles) + 0.25
+    figure = new_figure(width, lines * (width / columns * SIZE[1] / SIZE[0] + room))
     panels = np.atleast_1d(figure.subplots(lines, columns)).ravel()
     for axes in panels:
         axes.set_axis_off()
-    for axes, method, view in zip(panels, palette.leading(dressed.series), views):
+    for axes, method, title, view in zip(panels, methods, titles, views):
         axes.imshow(imread(view.image))
-        axes.set_title(palette.label(method), color=palette.style(method).colour, fontsize=9)
+        axes.set_title(title, color=palette.style(method).colour, fontsize=9)
     frame = views[0].frame
     time = float(next(iter(dressed.series.values())).times[frame])
     caption = f"{dressed.scene}: frame {frame} (t = {number(time)} s), "
