@@ -14,6 +14,8 @@ from reports.summary import Mean, Measurements, suite_rows, wardrobe
 from reports.table import Cell, Column, Table
 
 SINGLE, BATCH = "cost/frame", "cost/batch"
+
+
 def pairs(rows: Sequence[Row]) -> list[tuple[str, str, Mean, Mean]]:
     """Garment, method, ms of a frame alone and in a batch, of networks that were measured both ways."""
     own = [Measurements(suite_rows(rows, suite)) for suite in ("garments", "speed")]

@@ -29,8 +29,8 @@ class Recipe:
         DressedBody.weights).
     zero_last_layer: start at the skinned template instead of at centimetres of noise.
     output_scale: factor on the predicted offsets.
-    learning_rate: of Adam. schedule: what becomes of it, `cosine` (half a cosine, down to a hundredth of it at
-        the last step), `epochs` (a tenth after `drop_after_epochs` epochs) or `constant`.
+    learning_rate: of Adam. schedule: what becomes of it, `cosine` (half a cosine, down to a hundredth of it
+        at the last step), `epochs` (a tenth after `drop_after_epochs` epochs) or `constant`.
     h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
     window, batch: frames of a sub-sequence, sub-sequences of a step.
     window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
@@ -163,8 +163,8 @@ TAILORNET = replace(
 )
 PBNS_SPRINGS = replace(DEFAULT, name="pbns-springs", material="pbns", contact_samples="vertices")
 
-# Motions are simulated, so none are mixed. The swing begins at joules, so the guard is told to expect them.
-DYNAMIC = replace(DEFAULT, name="dynamic", mixed=0.0, detached=True, swing=1.0, spike=20.0)
+# Mixed motions cost it swing. The swing begins at joules, so the guard is told to expect them.
+DYNAMIC = replace(DEFAULT, name="dynamic", mixed=0.0, detached=True, swing=0.3, spike=20.0)
 
 
 def _without(term: str) -> Recipe:

@@ -46,6 +46,7 @@ LEAST_WEIGHT = 0.1  # of a narrow component, in the rehearsal: its coordinate is
 class SwingTeacher:
     """Coordinates of the simulated swing in every training frame.
 
+    motions: those that were simulated; the frames of a set that come after theirs are dressed, not taught.
     Raises TargetError for a motion without a fitting trajectory, and for fewer frames than coordinates.
     """
 
@@ -61,7 +62,7 @@ class SwingTeacher:
         vertices = matched_targets(motions, trajectories, dressed.vertices)
         pelvis = [dressed.pelvis(motion) for motion in motions]
         posed = torch.cat([torch.as_tensor(x - p[:, None]).float() for x, p in zip(vertices, pelvis)])
-        offsets = unposed(posed.to(data.device), weights, data.transforms) - data.rest
+        offsets = unposed(posed.to(data.device), weights, data.transforms[: len(posed)]) - data.rest
         flat = offsets.flatten(1)
         if len(flat) <= recipe.swing_components:
             raise TargetError(
@@ -77,6 +78,7 @@ class SwingTeacher:
         self.coordinates = (flat - self.mean) @ self.directions.T / self.spread  # (F, K)
         self.data = data
         self.bounds = [(int(a), int(b)) for a, b in pairwise(data.first)]
+        self.simulated = len(motions)
         self.stiffness = recipe.swing * float(dressed.cloth.masses.mean()) / data.dt**2
 
     def start(self, network: SwingingRegressor, *, steps: int, sigma: float, seed: int) -> None:
@@ -90,7 +92,7 @@ class SwingTeacher:
         for step in range(steps):
             for group in optimiser.param_groups:
                 group["lr"] = REHEARSAL_RATE * min(1.0, 2.04 - 2 * step / steps)
-            chosen = random.choice(len(self.bounds), min(TOGETHER, len(self.bounds)), replace=False)
+            chosen = random.choice(self.simulated, min(TOGETHER, self.simulated), replace=False)
             optimiser.zero_grad(set_to_none=True)
             self._apart(network, chosen, sigma, noise).backward()
             torch.nn.utils.clip_grad_norm_(learned, 1.0)

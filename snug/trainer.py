@@ -60,11 +60,12 @@ class Trainer:
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
+        mixed: list[Any] = []
         if how.physics:
             frames = round(recipe.mixed * sum(len(motion.poses) for motion in motions))
-            motions = [*motions, *mixed_motions(motions, frames, turn=recipe.mixed_turn, seed=seed)]
+            mixed = mixed_motions(motions, frames, turn=recipe.mixed_turn, seed=seed)
         self.data = TrainingSet(
-            dressed, motions, recipe, features=how.features, sequences=how.sequences, device=device
+            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
         )
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
         pins = dressed.garment.pins

@@ -68,10 +68,7 @@ def outcomes(run, wardrobe, trained):
         methods = DRESSED_METHODS if scene.dressed else SMALL_METHODS
         found[scene.name] = (
             built,
-            [
-                run_cell(Cell(scene, m.name, 0, ("garments", "speed")), m, built, run)
-                for m in methods
-            ],
+            [run_cell(Cell(scene, m.name, 0, ("garments", "speed")), m, built, run) for m in methods],
         )
     return found
 

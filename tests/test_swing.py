@@ -194,3 +194,12 @@ def test_training_learns_the_swing_and_the_file_brings_it_back(tmp_path):
     alone = roll_out(again, tube_dress(), resting, held_pose=True).positions
     np.testing.assert_allclose(held[0], alone[0], atol=1e-5)
     assert np.abs(held - one).max() > 1e-3
+
+
+def test_mixed_frames_are_dressed_but_not_taught():
+    motions = [swaying(30)]
+    model = train(
+        "dynamic", tube_dress(), motions, steps=2, seed=1, recipe=replace(SMALL, mixed=2.0, rehearsal=2),
+        trajectories={motions[0].name: swung(motions[0])[0]}, progress=False,
+    )  # fmt: skip
+    assert model.summary["training_frames"] == 30 + 60
