@@ -100,7 +100,8 @@ def _loss(trainer: Any, batch: Batch, x: Tensor) -> float:
     planes = None
     if trainer.contact:
         posed = trainer.contact.posed(batch)
-        trainer.contact.search(np.arange(batch.frames.size), batch.frames, posed, x)
+        everywhere = np.arange(batch.frames.size)
+        trainer.contact.search(everywhere, batch.frames, posed, x, forget=True)  # the exact search
         planes = trainer.contact.planes(batch, posed)
     terms = trainer.loss(x, batch.ahead, planes)
     return float(torch.stack(list(terms.values())).sum(0).mean())
