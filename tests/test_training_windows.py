@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -30,6 +31,14 @@ def test_a_network_that_lives_on_its_state_does_not():
     model = untrained_model("snug", tube_dress(), MOTIONS, seed=0)
     window, roll_out = both_losses(model, tube_dress(), MOTIONS)
     assert abs(window - roll_out) > 1e-3 * window
+
+
+def test_a_run_without_a_network_has_no_windows_to_look_at():
+    def named(names):
+        raise KeyError(names[0])  # the motions of training are loaded for networks alone
+
+    wardrobe = SimpleNamespace(body=None, garment=None, named=named)
+    assert rows(SimpleNamespace(models=(), train=("walk",)), RunFolder(Path()), wardrobe) == []
 
 
 def test_rows_are_those_of_networks_that_energies_taught(tmp_path):

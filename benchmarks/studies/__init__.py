@@ -26,6 +26,7 @@ STUDIES = (
         description="every network on its training motions: windows as it was trained beside whole roll-outs",
         suite="garments",
         module="benchmarks.studies.training_windows",
+        reads=("networks",),
     ),
     Study(
         name="dependence",

@@ -38,8 +38,8 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     from snug.dresser import DressedBody
     from snug.trained_model import TrainedModel, find_kind
 
-    if wardrobe is None:
-        return []
+    if wardrobe is None or not plan.models:
+        return []  # no network of the run: its training motions were not even loaded
     dressed, motions = DressedBody(wardrobe.body, wardrobe.garment), wardrobe.named(plan.train)
     found: list[Row] = []
     for name, seed in plan.models:
