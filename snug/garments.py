@@ -58,6 +58,8 @@ class Garment:
 
     def carried(self, body, poses: Array, translations: Array) -> Array:
         """Where the pins are (T,P,3) [m] on the body in poses (T,24,3) [rad] at translations (T,3) [m]."""
+        if not len(self.pins):
+            return np.empty((len(poses), 0, 3))  # and torch, which poses the joints, is not loaded
         transforms = body.transforms(poses, translations)
         blended = np.einsum("pj,tjab->tpab", self.skinning_weights[self.pins], transforms)
         turned = np.einsum("tpab,pb->tpa", blended[..., :3], self.rest_positions[self.pins])
@@ -203,14 +205,15 @@ RANGES = {
     "clearance": (0.005, 0.05, " m"),
     "sleeve": (0.3, 0.9, " of the upper arm"),
     "rise": (0.14, 0.2, " m"),
-    "length": (-0.05, 0.35, " m"),
+    "length": (-0.05, 0.25, " m"),
+    "skirt length": (0.1, 0.35, " m"),  # above, its hem would come to where its flare begins
     "flare": (0.0, 0.15, " m"),
 }
 
 
 def _demand_in_range(name: str, parameters: Mapping[str, float]) -> None:
     for parameter, value in parameters.items():
-        low, high, unit = RANGES[parameter]
+        low, high, unit = RANGES.get(f"{name} {parameter}", RANGES.get(parameter, ()))
         if not (np.isfinite(value) and low <= value <= high):
             raise GarmentError(
                 f"{parameter}={value}: a {name} can be tailored from {low:g} to {high:g}{unit}"

@@ -38,8 +38,8 @@ class Recipe:
     contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
     contact_refresh: share of a batch's frames whose contact anchors are searched anew after a step.
-    mixed: frames of mixed motions (snug.mixing) for each frame of a training motion; not for `supervised`,
-        which can only learn what was simulated. mixed_turn: see there [rad].
+    mixed: frames of mixed motions (snug.mixing) for each frame of a training motion, up to 20,000; not for
+        what learns simulated vertices. mixed_turn: see there [rad].
     terms: energies in the loss; leaving one out is an ablation, and it is then never evaluated.
     material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
         (edges, hinges, uniform mass and squared contact of PBNS, see snug.baselines.springs; it has its own

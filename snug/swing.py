@@ -46,7 +46,8 @@ LEAST_WEIGHT = 0.1  # of a narrow component, in the rehearsal: its coordinate is
 class SwingTeacher:
     """Coordinates of the simulated swing in every training frame.
 
-    motions: those that were simulated; the frames of a set that come after theirs are dressed, not taught.
+    motions: those that were simulated. Frames of the set after theirs take no part in the rehearsal, and are
+    then told and held to coordinates like all others.
     Raises TargetError for a motion without a fitting trajectory, and for fewer frames than coordinates.
     """
 
@@ -124,3 +125,16 @@ class SwingTeacher:
         wanted = batch.features[..., -len(self.spread) :] * self.spread
         apart = (offsets.flatten(2) - self.mean) @ self.directions.T - wanted
         return 0.5 * self.stiffness * apart.square().sum(-1)
+
+    def state(self) -> dict[str, Tensor]:
+        """What a resumed training goes on with; made anew, another thread count might round it otherwise."""
+        told = self.data.features[:, -len(self.spread) :]
+        return {"told": told, "mean": self.mean, "directions": self.directions, "spread": self.spread}
+
+    def resume(self, tensors: Mapping[str, Tensor]) -> None:
+        """The inverse of `state`."""
+        device = self.data.device
+        self.data.features[:, -len(self.spread) :] = tensors["told"].to(device)
+        self.mean, self.directions, self.spread = (
+            tensors[name].to(device) for name in ("mean", "directions", "spread")
+        )

@@ -65,7 +65,7 @@ def train(
 
     start = time.perf_counter()
     if recipe is None:
-        recipe = TRAININGS[model_kind].recipe if model_kind in TRAININGS else DEFAULT
+        recipe = next((t.recipe for t in TRAININGS.values() if t.kind == model_kind), DEFAULT)
     trainer = Trainer(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
         device=find_device(device), kernels=kernels, group=group or ALONE,

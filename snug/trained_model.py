@@ -22,7 +22,8 @@ from snug.swing import SwingTeacher
 from snug.swinging_regressor import SwingingRegressor
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 
-FORMAT = "snug-model-1"
+FORMAT = "snug-model-2"
+KEPT = ("seed", "steps", "seconds", "setup_seconds", "history", "summary")  # in the file as in the model
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,8 @@ class TrainedModel:
     history: one dict for every few steps: step, seconds, loss and each energy [J per frame], and as
         `seconds/<part>` what the parts of a step took on the mean (snug.stopwatch).
     summary: windows above the spike limit, updates left out, returns to good weights, with names.
-    seconds: wall time of the steps, contact search included; setup_seconds: of making ready the motions and
-        the first anchors.
+    seconds: wall time of the steps, contact search included, and of a rehearsal before them; setup_seconds:
+        of making ready the motions and the first anchors.
     """
 
     kind: str
@@ -118,13 +119,11 @@ class TrainedModel:
             if data["format"] != FORMAT:
                 raise ModelFileError(f"{path}: format {data['format']!r}, this version reads {FORMAT!r}")
             recipe = Recipe.from_dict(data["recipe"])
-            pins = data.get("pins", ())
             network = make_network(
-                data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=pins
+                data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=data["pins"]
             )
             network.load_state_dict(tensors)
-            rest = {name: data[name] for name in ("seed", "steps", "seconds", "history", "summary")}
-            rest["setup_seconds"] = data.get("setup_seconds", 0.0)
+            rest = {name: data[name] for name in KEPT}
         except (KeyError, RecipeError, RuntimeError) as error:
             raise ModelFileError(f"{path}: broken model file ({error})") from error
         return cls(data["kind"], network.eval(), recipe, **rest)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -30,6 +31,7 @@ from snug.training_contact import Posed, TrainingContact
 from snug.training_set import CPU, Batch, TrainingError, TrainingSet
 
 DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
+MOST_MIXED = 20_000  # frames: each keeps its body and its anchors, 0.1 MB at 1000 vertices and more above
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -62,7 +64,8 @@ class Trainer:
         self.kernels = device.type == "cpu" if kernels is None else kernels
         mixed: list[Any] = []
         if how.physics:
-            frames = round(recipe.mixed * sum(len(motion.poses) for motion in motions))
+            given = sum(len(motion.poses) for motion in motions)
+            frames = min(round(recipe.mixed * given), MOST_MIXED)
             mixed = mixed_motions(motions, frames, turn=recipe.mixed_turn, seed=seed)
         self.data = TrainingSet(
             dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
@@ -86,22 +89,32 @@ class Trainer:
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
         self.targets: VertexTargets | None = None
-        if how.targets is None:
-            self.loss = PhysicsLoss(
-                dressed.cloth, recipe, dt=self.data.dt, device=device, kernels=self.kernels
-            )
-            self.contact = self.contact_of(self.data)
-        else:
-            if group.size > 1:
-                raise GroupError(f"{kind} is trained by one process: only the energies are shared by several")
-            on_cpu = (dressed.weights(recipe.smoothing), self.data.transforms.cpu())
-            self.targets = how.targets(dressed, motions, trajectories, *on_cpu).to(device)
         self.teacher: SwingTeacher | None = None
-        if how.teacher:
-            self.teacher = how.teacher(self.data, motions, trajectories, self.weights, recipe)
-            self.teacher.start(self.network, steps=recipe.rehearsal, sigma=recipe.h0_sigma, seed=seed)
+        self.rehearsed = 0.0  # s
+        self._be_taught(motions, trajectories)
         self.guard = Guard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
+
+    def _be_taught(self, motions: Sequence[Any], trajectories: Mapping[str, np.ndarray] | None) -> None:
+        """By simulated vertices, or by the energies, and then perhaps by a simulated swing too."""
+        how, recipe, data = self.how, self.recipe, self.data
+        if how.targets:
+            if self.group.size > 1:
+                raise GroupError(
+                    f"{self.kind} is trained by one process: only the energies are shared by several"
+                )
+            on_cpu = (self.dressed.weights(recipe.smoothing), data.transforms.cpu())
+            self.targets = how.targets(self.dressed, motions, trajectories, *on_cpu).to(self.device)
+            return
+        self.loss = PhysicsLoss(
+            self.dressed.cloth, recipe, dt=data.dt, device=self.device, kernels=self.kernels
+        )
+        self.contact = self.contact_of(data)
+        if how.teacher:
+            self.teacher = how.teacher(data, motions, trajectories, self.weights, recipe)
+            begun = time.perf_counter()
+            self.teacher.start(self.network, steps=recipe.rehearsal, sigma=recipe.h0_sigma, seed=self.seed)
+            self.rehearsed = time.perf_counter() - begun
 
     def contact_of(self, data: TrainingSet) -> TrainingContact | None:
         """Anchors for the frames of a set; None where the recipe has no collision."""
@@ -241,6 +254,8 @@ class Trainer:
         """Everything that the next step depends on: tensors, and plain facts for a JSON header."""
         tensors = {name: tensor.detach() for name, tensor in live_tensors(self.network, self.optimiser)}
         tensors["order"], tensors["noise"] = torch.as_tensor(self.order.copy()), self.noise.get_state()
+        if self.teacher:
+            tensors |= {f"teacher.{key}": tensor for key, tensor in self.teacher.state().items()}
         facts: dict[str, Any] = {"epoch": self.epoch, "random": self.random.bit_generator.state}
         for name, part in (("guard", self.guard), ("contact", self.contact)):
             if part is not None:
@@ -258,6 +273,8 @@ class Trainer:
             found = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
             self.optimiser.state[parameter] = {key: tensor.to(self.device) for key, tensor in found.items()}
         self.network.load_state_dict(part_of(tensors, "network"))
+        if self.teacher:
+            self.teacher.resume(part_of(tensors, "teacher"))
         self.guard.resume(part_of(tensors, "guard"), facts["guard"])
         if self.contact is not None:
             self.contact.resume(part_of(tensors, "contact"), facts["contact"])

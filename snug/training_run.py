@@ -49,7 +49,7 @@ class TrainingRun:
     """One trainer taken through all its steps by `go`.
 
     log gets each row of the history, every `every` steps; progress: a bar on standard error; stop: asked
-    after each step. setup_seconds: what making the trainer took.
+    after each step. setup_seconds: what making the trainer took; of that, a rehearsal counts as training.
     """
 
     def __init__(
@@ -69,8 +69,8 @@ class TrainingRun:
         self.patience = validation.patience if validation else 0
         self.validator = Validator(trainer, validation) if validation else None
         self.validated_every = validation.every if validation else 0
-        self.setup_seconds = setup_seconds
-        self.done, self.seconds = 0, 0.0
+        self.setup_seconds = setup_seconds - trainer.rehearsed
+        self.done, self.seconds = 0, trainer.rehearsed
         self.history: list[dict[str, float]] = []
         self.recent: list[dict[str, float]] = []
         self.best: dict[str, Tensor] = {}
@@ -151,9 +151,6 @@ class TrainingRun:
         if self.saving is None or not self.trainer.group.writes:
             return
         tensors, facts = self.trainer.state()
-        if self.validator:
-            held, facts["validator"] = self.validator.state()
-            tensors.update({f"validator.{name}": tensor for name, tensor in held.items()})
         tensors.update({f"best.{name}": tensor for name, tensor in self.best.items()})
         header = {
             "format": FORMAT,
@@ -162,7 +159,7 @@ class TrainingRun:
             "seconds": self.seconds + time.perf_counter() - self._started,
             "history": self.history,
             "recent": self.recent,
-            "validation": [self.best_value, self.best_step, self.last_value],
+            "validation": [self.best_value, self.best_step, self.last_value, self._validating],
             "trainer": facts,
         }
         write_tensors(self.saving.path, tensors, header)
@@ -172,8 +169,12 @@ class TrainingRun:
         """What must be the same for a run to be the same run."""
         trainer, digest = self.trainer, hashlib.sha256()
         taught = trainer.targets.vertices if trainer.targets else trainer.data.ahead
-        for tensor in (trainer.data.features, trainer.data.rest, taught):
+        # Coordinates that a teacher told are round-off's too, and in the checkpoint.
+        features = trainer.data.features[:, : len(trainer.network.input_mean)]
+        for tensor in (features, trainer.data.rest, taught):
             digest.update(tensor.cpu().numpy().tobytes())
+        if trainer.teacher:
+            digest.update(np.round(trainer.teacher.mean.cpu().numpy(), 4).tobytes())
         return {
             "kind": trainer.kind,
             "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},
@@ -203,11 +204,9 @@ class TrainingRun:
                 raise TensorFileError(f"{path}: checkpoint of another run ({named}); delete it to start anew")
         try:
             self.trainer.resume(tensors, header["trainer"])
-            if self.validator:
-                self.validator.resume(part_of(tensors, "validator"), header["trainer"]["validator"])
             device = self.trainer.device
             self.best = {name: tensor.to(device) for name, tensor in part_of(tensors, "best").items()}
-            self.best_value, self.best_step, self.last_value = header["validation"]
+            self.best_value, self.best_step, self.last_value, self._validating = header["validation"]
             self.done, self.seconds = header["done"], header["seconds"]
             self.history, self.recent = header["history"], header["recent"]
         except (KeyError, RuntimeError) as error:

@@ -55,8 +55,6 @@ class Validator:
             here, there = 1 / self.data.dt, 1 / trainer.data.dt
             raise TrainingError(f"validation has {here:g} frames a second, training {there:g}: resample them")
         self.contact = trainer.contact_of(self.data)
-        if self.contact:
-            self.contact.refresh = 1.0
         self.targets = None
         if how.targets:
             on_cpu = (trainer.weights.cpu(), self.data.transforms.cpu())
@@ -85,15 +83,6 @@ class Validator:
         planes = None
         if self.contact:
             posed = self.contact.posed(batch)
-            self.contact.renew(batch.frames, posed, x)
+            self.contact.search(np.arange(batch.frames.size), batch.frames, posed, x, forget=True)
             planes = self.contact.planes(batch, posed)
         return trainer.loss(x, batch.ahead, planes)
-
-    def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
-        """Anchors, for a resumed run."""
-        return ({}, {}) if self.contact is None else self.contact.state()
-
-    def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-        """The inverse of `state`."""
-        if self.contact is not None:
-            self.contact.resume(tensors, facts)

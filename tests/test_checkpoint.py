@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from dressing import swaying, tube_dress
@@ -15,7 +16,7 @@ from dressing import swaying, tube_dress
 from reference_sim import Material
 from snug import tensor_file
 from snug.dresser import DressedBody
-from snug.recipe import DEFAULT, PAPER
+from snug.recipe import DEFAULT, DYNAMIC, PAPER
 from snug.tensor_file import TensorFileError, read_tensors
 from snug.train import train
 from snug.trained_model import TrainedModel
@@ -27,8 +28,16 @@ PLAIN = replace(DEFAULT, mixed=0.0)
 CLIPS = [swaying(30)]
 
 
+def shaken(motion):
+    """World vertices (T, V, 3) [m] that a simulation might have come to."""
+    noise = np.random.default_rng(7).normal(scale=0.01, size=(motion.frames, tube_dress().vertices, 3))
+    return tube_dress().skinned(motion) + noise
+
+
 def short(kind="snug", *, steps=24, seed=0, recipe=PLAIN, clips=CLIPS, **options):
     options = {"progress": False, "every": 5, **options}
+    if kind == "dynamic":
+        options["trajectories"] = {clip.name: shaken(clip) for clip in clips}
     return train(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
 
 
@@ -49,8 +58,13 @@ def asked_after(steps):
 
 @pytest.mark.parametrize(
     ("kind", "recipe"),
-    [("snug", replace(DEFAULT, mixed=2.0)), ("snug", PAPER), ("pbns", PLAIN)],
-    ids=["mixed", "paper", "pbns"],
+    [
+        ("snug", replace(DEFAULT, mixed=2.0)),
+        ("snug", PAPER),
+        ("pbns", PLAIN),
+        ("dynamic", replace(DYNAMIC, swing_components=6, rehearsal=3)),
+    ],
+    ids=["mixed", "paper", "pbns", "dynamic"],
 )
 def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path):
     whole = short(kind, recipe=recipe)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,8 @@ import pytest
 from meshes import patch
 
 from benchmarks.presets import find_preset
-from benchmarks.scenes import SMALL_SCENES
+from benchmarks.scenes import SMALL_SCENES, dressed_scene
+from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Inertia, StretchStVK
 
@@ -28,6 +30,20 @@ for name in sys.argv[2].split(","):
     method = find_method(name).make(models=Path("."), seed=0)
     method.prepare(scene)
     assert method.run().frames == scene.frames
+print(*sys.modules)
+"""
+DRESSED = """
+import dataclasses, pickle, sys
+from pathlib import Path
+from benchmarks.methods import find_method
+from benchmarks.presets import find_preset
+from benchmarks.scenes import dressed_scene
+wardrobe, body, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
+wardrobe = dataclasses.replace(wardrobe, motions={"kick": motion}, bodies={"kick": body})
+scene = dressed_scene("kick").build(find_preset("smoke"), wardrobe)
+method = find_method("lbfgs-5").make(models=Path("."), seed=0)
+method.prepare(dataclasses.replace(scene, settle=lambda: start))
+assert method.run().frames == 4
 print(*sys.modules)
 """
 STATIC = """
@@ -70,6 +86,18 @@ def test_a_scene_loads_what_it_declares_and_no_more_whoever_solves_it(scene, pre
     modules = loaded(CELL, scene, "simulation,lbfgs-5,vbd-5,xpbd-10")
     assert set(present) <= modules
     assert not modules & set(absent), modules & set(absent)
+
+
+def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
+    """Whoever poses the joints needs torch; a cell is given the posed body."""
+    wardrobe = open_wardrobe(find_preset("smoke"), embedded_motions(["kick"]))
+    scene = dressed_scene("kick").build(find_preset("smoke"), wardrobe)
+    path = tmp_path / "told"
+    told = (wardrobe, wardrobe.posed_body("kick")[:4], scene.start, wardrobe.motions["kick"].cut(0, 4))
+    path.write_bytes(pickle.dumps(told))
+    modules = loaded(DRESSED, str(path))
+    assert {"reference_sim.obstacle", CONTACT[0], *MATERIAL} <= modules
+    assert not modules & {"torch", "snug.skinning", "snug.dresser", "snug.regressor"}
 
 
 def test_a_static_problem_loads_no_time_step():

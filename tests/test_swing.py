@@ -21,6 +21,7 @@ from snug.skinning import unposed
 from snug.swing import SwingTeacher
 from snug.train import train
 from snug.trained_model import TrainedModel, make_network
+from snug.trainer import Trainer
 from snug.training_set import TrainingSet
 
 SMALL = replace(DYNAMIC, swing_components=6, rehearsal=0)
@@ -196,10 +197,21 @@ def test_training_learns_the_swing_and_the_file_brings_it_back(tmp_path):
     assert np.abs(held - one).max() > 1e-3
 
 
-def test_mixed_frames_are_dressed_but_not_taught():
-    motions = [swaying(30)]
-    model = train(
-        "dynamic", tube_dress(), motions, steps=2, seed=1, recipe=replace(SMALL, mixed=2.0, rehearsal=2),
-        trajectories={motions[0].name: swung(motions[0])[0]}, progress=False,
+def test_mixed_frames_are_told_a_swing_that_only_simulated_ones_teach(monkeypatch):
+    rehearsed_on: list[int] = []
+    whole = SwingTeacher._apart
+
+    def apart(self, network, chosen, *rest):
+        rehearsed_on.extend(chosen)
+        return whole(self, network, chosen, *rest)
+
+    monkeypatch.setattr(SwingTeacher, "_apart", apart)
+    motion = swaying(30)
+    trainer = Trainer(
+        "dynamic", tube_dress(), [motion], steps=2, seed=1, recipe=replace(SMALL, mixed=2.0, rehearsal=4),
+        trajectories={motion.name: swung(motion)[0]},
     )  # fmt: skip
-    assert model.summary["training_frames"] == 30 + 60
+    assert trainer.data.frames == 30 + 60 and set(rehearsed_on) == {0}
+    assert trainer.teacher.coordinates.shape == (30, 6)
+    assert trainer.data.features[30:, -6:].abs().sum(-1).min() > 0  # mixed frames have coordinates too
+    assert trainer.step(0)["swing"] > 0 and trainer.rehearsed > 0
