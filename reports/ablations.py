@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from benchmarks.results import Row
-from reports.summary import TSHIRT, Mean, Measurements, scatter, suite_rows, wardrobe
+from reports.scatter import scatter
+from reports.summary import TSHIRT, Measurements, suite_rows, wardrobe
 from reports.table import Cell, Column, Table
 
 FULL = "snug"
@@ -44,16 +45,20 @@ CAPTIONS = {
     "ablations": "Ablations: full SNUG first, then less one ingredient each. Drift: after a thousand frames "
     "there and back, T-shirt alone.",
     "ablations_judged": "Where each ablation is worse than full SNUG, and where better, by more than the "
-    "scatter of seeds.",
+    "scatter of seeds, over the scenes that both have.",
 }
+
+
+# Where each metric of a garment is found, and in which scenes.
+Source = dict[str, tuple[Measurements, Sequence[str]]]
 
 
 def ablations(rows: Sequence[Row]) -> Table | None:
     """The numbers of the full recipe and of each ablation that ran, by garment; None where none did."""
     lines: list[tuple[Cell, ...]] = [
-        (garment, method, *(own[metric] for metric in COLUMNS))
-        for garment, means in measured_ablations(rows).items()
-        for method, own in means.items()
+        (garment, method, *(measured.mean(method, m, scenes) for m, (measured, scenes) in source.items()))
+        for garment, ran, source in _garments(rows)
+        for method in (FULL, *ran)
     ]
     return Table("ablations", (*HEAD, *COLUMNS.values()), tuple(lines)) if lines else None
 
@@ -61,41 +66,53 @@ def ablations(rows: Sequence[Row]) -> Table | None:
 def ablations_judged(rows: Sequence[Row]) -> Table | None:
     """In words, by garment: in which measures each ablation is worse or better than the full recipe."""
     lines: list[tuple[Cell, ...]] = [
-        (garment, method, *(", ".join(found) for found in compared(means[FULL], own)))
-        for garment, means in measured_ablations(rows).items()
-        for method, own in means.items()
-        if method != FULL
+        (garment, method, *(", ".join(f"{what}{fewer}" for what, fewer in way.items()) for way in ways))
+        for garment, own in judged_ablations(rows).items()
+        for method, ways in own.items()
     ]
     columns = (*HEAD, Column("worse", "Worse in"), Column("better", "Better in"))
     return Table("ablations_judged", columns, tuple(lines)) if lines else None
 
 
-def measured_ablations(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, Mean | None]]]:
-    """garment -> method -> metric -> mean, of garments on which the full recipe and some ablation ran."""
-    measured = Measurements(suite_rows(rows, "garments"))
-    found = {}
-    for garment, scenes in wardrobe(measured).items():
-        ran = [m for m in (FULL, *ABLATIONS) if measured.mean(m, "energy/total", scenes) is not None]
-        if ran[:1] == [FULL] and len(ran) > 1:
-            long = Measurements(suite_rows(rows, ROLL_OUTS) if garment == TSHIRT else ())
-            found[garment] = {
-                method: {
-                    metric: long.mean(method, metric, LONG)
-                    if metric.startswith("roll_out/")
-                    else measured.mean(method, metric, scenes)
+def set_apart(measured: Measurements, scenes: Sequence[str], metric: str = "energy/total") -> list[str]:
+    """The ablations with the metric in these scenes, if the full recipe has it too: they stand below it."""
+    ran = [m for m in (FULL, *ABLATIONS) if measured.mean(m, metric, scenes) is not None]
+    return ran[1:] if ran[:1] == [FULL] else []
+
+
+def _garments(rows: Sequence[Row]) -> Iterator[tuple[str, list[str], Source]]:
+    """Of the garments on which the full recipe and some ablation ran."""
+    worn, roll_outs = (Measurements(suite_rows(rows, suite)) for suite in ("garments", ROLL_OUTS))
+    for garment, scenes in wardrobe(worn).items():
+        if ran := set_apart(worn, scenes):
+            long = roll_outs if garment == TSHIRT else Measurements(())
+            yield (
+                garment,
+                ran,
+                {
+                    metric: (long, LONG) if metric.startswith("roll_out/") else (worn, scenes)
                     for metric in COLUMNS
-                }
-                for method in ran
-            }
-    return found
+                },
+            )
 
 
-def compared(full: dict[str, Mean | None], own: dict[str, Mean | None]) -> tuple[list[str], list[str]]:
-    """The measures in which an ablation is worse than the full recipe, and those in which it is better."""
-    worse: list[str] = []
-    better: list[str] = []
+def judged_ablations(rows: Sequence[Row]) -> dict[str, dict[str, tuple[dict[str, str], dict[str, str]]]]:
+    """garment -> ablation -> the measures in which it is worse than the full recipe, and better.
+
+    Each measure comes with words that say where it was compared over fewer scenes than all.
+    """
+    return {
+        garment: {method: _judged(method, source) for method in ran}
+        for garment, ran, source in _garments(rows)
+    }
+
+
+def _judged(method: str, source: Source) -> tuple[dict[str, str], dict[str, str]]:
+    worse: dict[str, str] = {}
+    better: dict[str, str] = {}
     for metric, words in JUDGED.items():
-        one, other = full[metric], own[metric]
-        if one is not None and other is not None and abs(one.value - other.value) > scatter(one, other):
-            (worse if other.value > one.value else better).append(words)
+        measured, scenes = source[metric]
+        full, own = measured.pair(FULL, method, metric, scenes)
+        if full is not None and own is not None and abs(full.value - own.value) > scatter(full, own):
+            (worse if own.value > full.value else better)[words] = own.fewer
     return worse, better

@@ -82,13 +82,16 @@ def _named(point: Point | None) -> str:
 def run_time(measured: Measurements) -> str:
     """SNUG's time a frame against the simulation's."""
     scenes = dressed_scenes(measured)
-    own, reference = (measured.value(m, TIME, scenes) for m in (NETWORK, palette.REFERENCE))
+    means = measured.pair(NETWORK, palette.REFERENCE, TIME, scenes)
+    own, reference = (mean.value if mean else 0.0 for mean in means)
     if not own or not reference:
         return ""
+    fewer = means[0].fewer if means[0] else ""
     pace = f"{number(reference / own, 2)} times faster"
     if reference <= own:
         pace = f"{number(own / reference, 2)} times slower"
-    return f"SNUG takes {number(own)} ms per frame, the converged simulation {number(reference)} ms: {pace}."
+    text = f"SNUG takes {number(own)} ms per frame, the converged simulation {number(reference)} ms"
+    return f"{text}: {pace}{fewer}."
 
 
 def _per_error(measured: Measurements, scenes: Sequence[str], say) -> str:
@@ -157,19 +160,21 @@ def _cut_solver(points: Sequence[Point], own: Point, words: str, unit: str) -> s
 
 
 def _hybrid(points: Sequence[Point], own: Point, words: str, unit: str) -> str:
-    """Hybrids that no solver alone beats in both time and error, and how far below SNUG the cheapest is."""
+    """Hybrids that neither SNUG nor a solver alone beats in both time and error, and what the fastest has."""
     mixed = [p for p in hybrids(points) if p.method.startswith(f"{NETWORK}+")]
     alone = [*solvers(points), own]
     if not mixed:
         return ""
     winning = [p for p in mixed if not overtaken(p, alone)]
     if not winning:
-        return f"By {words} every SNUG-started solver is beaten by a solver alone that is no slower."
+        beaten = "is beaten by SNUG itself or by a solver alone that is no slower"
+        return f"By {words} every SNUG-started solver {beaten}."
     first = min(winning, key=lambda p: p.time)
     names = ", ".join(palette.label(p.method) for p in sorted(winning, key=lambda p: p.time))
     return (
-        f"By {words} {len(winning)} of {len(mixed)} SNUG-started solvers are beaten by none without it "
-        f"({names}); the fastest has {number(first.error)}{unit} in {number(first.time)} ms."
+        f"By {words} {len(winning)} of {len(mixed)} SNUG-started solvers are beaten neither by SNUG itself "
+        f"nor by a solver alone ({names}); the fastest has {number(first.error)}{unit} in "
+        f"{number(first.time)} ms."
     )
 
 

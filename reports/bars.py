@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from benchmarks.results import Row
 from reports.ablations import ROLL_OUTS, TRAINING
+from reports.scatter import scatter, spreads_of
 from reports.summary import TSHIRT, Mean, Measurements, suite_rows, wardrobe
 from reports.table import Cell, Column, Table
 
@@ -53,7 +54,7 @@ def table(rows: Sequence[Row]) -> Table | None:
         found = bar.value(measured, long)
         if found is not None:
             bound = f"{'at least' if bar.at_least else 'at most'} {bar.bound:g}".replace("-", "−")
-            lines.append((bar.words, found, bound, bar.unit, met(bar, found)))
+            lines.append((bar.words, found, bound, bar.unit, met(bar, found) + found.fewer))
     if not lines:
         return None
     columns = (
@@ -68,21 +69,32 @@ def table(rows: Sequence[Row]) -> Table | None:
 
 def met(bar: Bar, found: Mean) -> str:
     """In words; a number nearer to its bound than seeds scatter is said to be."""
-    if found.spread and abs(found.value - bar.bound) <= found.spread:
+    exact = Mean(bar.bound, None, found.scenes, seeds=1, complete=True, seeded=False)
+    if found.spread and abs(found.value - bar.bound) <= scatter(found, exact):
         return "within the scatter of seeds"
     within = found.value >= bar.bound if bar.at_least else found.value <= bar.bound
     return "met" if within else "missed"
 
 
 def ratio(one: Mean | None, other: Mean | None) -> Mean | None:
-    """one / other, with both their spreads."""
+    """one / other. Its spread over the root of its seeds is the standard error of the ratio."""
     if one is None or other is None or not one.value or not other.value:
         return None
     value = one.value / other.value
-    known = [abs(mean.spread / mean.value) for mean in (one, other) if mean.spread is not None]
-    spread = abs(value) * math.hypot(*known) if known else None
-    complete = one.complete and other.complete
-    return Mean(value, spread, one.scenes, max(one.seeds, other.seeds), complete)
+    spread, seeds = None, one.seeds
+    if spreads := spreads_of(one, other):
+        seeds = min(mean.seeds for mean in (one, other) if mean.spread is not None)
+        errors = (s / (m.value * math.sqrt(m.seeds)) for s, m in zip(spreads, (one, other)))
+        spread = abs(value) * math.hypot(*errors) * math.sqrt(seeds)
+    return replace(
+        one,
+        value=value,
+        spread=spread,
+        seeds=seeds,
+        complete=one.complete and other.complete,
+        stalled=one.stalled or other.stalled,
+        seeded=one.seeded or other.seeded,
+    )
 
 
 def _percent(mean: Mean | None) -> Mean | None:
@@ -90,7 +102,7 @@ def _percent(mean: Mean | None) -> Mean | None:
     if mean is None:
         return None
     spread = None if mean.spread is None else 100.0 * mean.spread
-    return Mean(100.0 * (mean.value - 1.0), spread, mean.scenes, mean.seeds, mean.complete)
+    return replace(mean, value=100.0 * (mean.value - 1.0), spread=spread)
 
 
 def _shirt(measured: Measurements) -> Sequence[str]:
@@ -103,8 +115,7 @@ def _of(metric: str, method: str) -> Callable[[Measurements, Measurements], Mean
 
 def _times(metric: str, one: str, other: str) -> Callable[[Measurements, Measurements], Mean | None]:
     def found(measured: Measurements, _: Measurements) -> Mean | None:
-        scenes = _shirt(measured)
-        return ratio(measured.mean(one, metric, scenes), measured.mean(other, metric, scenes))
+        return ratio(*measured.pair(one, other, metric, _shirt(measured)))
 
     return found
 
@@ -128,8 +139,5 @@ def _swing(metric: str) -> Callable[[Measurements, Measurements], Mean | None]:
 
 
 def _swing_strain(measured: Measurements, _: Measurements) -> Mean | None:
-    strains = (measured.mean(m, "energy/strain", SWINGING) for m in ("snug-dynamic", "simulation"))
-    above = _percent(ratio(*strains))
-    if above is None:
-        return None
-    return Mean(abs(above.value), above.spread, above.scenes, above.seeds, above.complete)
+    above = _percent(ratio(*measured.pair("snug-dynamic", "simulation", "energy/strain", SWINGING)))
+    return None if above is None else replace(above, value=abs(above.value))

@@ -247,6 +247,7 @@ def _definitions(rows: Sequence[Row]) -> list[str]:
         "inertia": "energy/inertia",
         "collision": "energy/collision",
         "total": "energy/total",
+        "scatter": "energy/total",
         "curvature": "curvature/mean",
         "curvature_difference": "curvature/mean_difference",
         "distance": "distance/rms",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from benchmarks.results import Row
-from reports.ablations import ABLATIONS
+from reports.ablations import set_apart
 from reports.summary import (
     EXTRA_TERMS,
     TERMS,
@@ -24,15 +24,17 @@ OPTIONAL = ("distance/p95", "distance/floor", "cost/batch", "cost/peak", "inters
 def _by_garment(name: str, rows: Sequence[Row], columns: Iterable[tuple[str, Column]]) -> Table | None:
     """One row per garment and method with any of the metrics, as means over the garment's scenes.
 
-    Ablations have a table of their own. Columns nobody has are dashes, or left out if OPTIONAL.
+    Ablations beside the full recipe have a table of their own. Columns nobody has are dashes, or left out
+    if OPTIONAL.
     """
     measured = Measurements(suite_rows(rows, "garments"))
     pairs = [p for p in columns if p[0] not in OPTIONAL or p[0] in measured.metrics]
     lines: list[tuple[Cell, ...]] = []
     for garment, scenes in wardrobe(measured).items():
+        apart = set_apart(measured, scenes)
         for method in measured.methods:
             means = [measured.mean(method, metric, scenes) for metric, _ in pairs]
-            if method not in ABLATIONS and any(mean is not None for mean in means):
+            if method not in apart and any(mean is not None for mean in means):
                 lines.append((garment, method, *means))
     if not lines:
         return None

@@ -71,6 +71,8 @@ _FAMILIES = {
 # Members of a family share its colour. Cuts go by doubling: four in a row have four lines.
 _DASHES: tuple[Line, ...] = ((0.0, (8.0, 1.5)), "--", "-.", ":")
 _SPARE = ("#999933", "#661100", "#AA4499", "#117733", "#88CCEE", "#DDCC77")
+# Nothing of these is random, nor of a solver that starts from one of them; nor are solvers cut short.
+_UNSEEDED = (REFERENCE, MOVED, "skinning", "free-bound", "newton-vbd", "newton-xpbd")
 CLEANED = "+cleanup"  # at the end of a method's name: its vertices were pushed out of the body afterwards
 
 
@@ -98,6 +100,12 @@ def is_hybrid(method: str) -> bool:
     start, plus, solver = method.partition("+")
     cut = cut_of(solver)
     return bool(start and plus and cut and cut.family in _FAMILIES)
+
+
+def is_seeded(method: str) -> bool:
+    """Whether what it gives depends on the seed of the run: a network, or what starts from one."""
+    start = method.partition("+")[0]
+    return start not in _UNSEEDED and cut_of(start) is None
 
 
 def family_style(name: str) -> Style:

@@ -8,10 +8,9 @@ deviation over seeds (n - 1), absent for a single seed.
 
 from __future__ import annotations
 
-import math
 import statistics
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from benchmarks.results import Row
 from reports import palette
@@ -20,7 +19,6 @@ from reports.numbers import finite
 TERMS = ("strain", "bending", "gravity", "inertia", "collision", "total")
 USABLE = ("ok", "stalled")
 EXTRA_TERMS = ("spring", "area", "friction", "barrier")
-TIE = 0.05  # share of the larger of two values by which they may differ where no seeds tell their scatter
 TSHIRT = "T-shirt"
 _GARMENTS = {"dressed": TSHIRT}  # by the part of a scene's name before its motion, where that does not say
 
@@ -31,7 +29,7 @@ class Mean:
 
     `complete` says that every seed has every scene asked for; otherwise the mean is over fewer cells
     than its neighbours in a table, and the table must say so. `stalled` says that a solver left some
-    frames of some cell unconverged.
+    frames of some cell unconverged, `seeded` that another seed would give another value.
     """
 
     value: float
@@ -40,6 +38,12 @@ class Mean:
     seeds: int
     complete: bool
     stalled: bool = False
+    seeded: bool = True
+
+    @property
+    def fewer(self) -> str:
+        """Words for a verdict: over how many scenes, where these are not all."""
+        return "" if self.complete else only(self.scenes)
 
 
 class Measurements:
@@ -85,12 +89,45 @@ class Measurements:
         spread = statistics.stdev(means) if len(means) > 1 else None
         complete = all(len(values) == len(asked) for values in by_seed.values())
         stalled = any((scene, method) in self._stalled for scene in used)
-        return Mean(statistics.fmean(means), spread, len(used), len(means), complete, stalled)
+        seeded = palette.is_seeded(method)
+        return Mean(statistics.fmean(means), spread, len(used), len(means), complete, stalled, seeded)
+
+    def shared(
+        self, methods: Iterable[str], metric: str, scenes: Sequence[str] | None = None
+    ) -> tuple[str, ...]:
+        """Of the scenes (all by default) those where each method has the metric, with all its seeds."""
+        asked = self.scenes if scenes is None else scenes
+        own = {m: {seed for s in asked for seed in self.seeds(s, m, metric)} for m in methods}
+        return tuple(
+            s for s in asked if all(had and self.seeds(s, m, metric).keys() == had for m, had in own.items())
+        )
+
+    def pair(
+        self, one: str, other: str, metric: str, scenes: Sequence[str] | None = None
+    ) -> tuple[Mean | None, Mean | None]:
+        """Both means over the scenes that the two methods share, None where they share none.
+
+        Where one of them was not measured at all, the other's mean is over its own scenes.
+        """
+        asked = self.scenes if scenes is None else scenes
+        both = self.shared((one, other), metric, asked)
+        first, second = (self.mean(method, metric, both or asked) for method in (one, other))
+        if first is None or second is None:
+            return first, second
+        if not both:
+            return None, None
+        complete = len(both) == len(asked)
+        return replace(first, complete=complete), replace(second, complete=complete)
 
     def value(self, method: str, metric: str, scenes: Sequence[str] | None = None) -> float | None:
         """The mean alone, or None."""
         mean = self.mean(method, metric, scenes)
         return None if mean is None else mean.value
+
+
+def only(scenes: int) -> str:
+    """Words behind a number or verdict that is over so many scenes, fewer than all."""
+    return f" ({scenes} {'scene' if scenes == 1 else 'scenes'} only)"
 
 
 def wardrobe(measurements: Measurements) -> dict[str, tuple[str, ...]]:
@@ -107,15 +144,6 @@ def dressed_scenes(measurements: Measurements) -> tuple[str, ...]:
     other garment.
     """
     return next(iter(wardrobe(measurements).values()), ())
-
-
-def scatter(one: Mean, other: Mean) -> float:
-    """How far two such means differ by their seeds alone: the root of both variances over seeds; where
-    neither has more than one seed, `TIE` of the larger.
-    """
-    if one.spread is None and other.spread is None:
-        return TIE * max(abs(one.value), abs(other.value))
-    return math.hypot(one.spread or 0.0, other.spread or 0.0)
 
 
 def worn_scenes(measurements: Measurements) -> tuple[str, ...]:

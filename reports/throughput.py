@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks.results import Row
 from reports import palette
-from reports.ablations import ABLATIONS
+from reports.ablations import set_apart
 from reports.canvas import PAGE_WIDTH, Picture, grid, log_axis, new_figure, save
 from reports.numbers import number
 from reports.summary import Mean, Measurements, suite_rows, wardrobe
@@ -17,15 +17,19 @@ SINGLE, BATCH = "cost/frame", "cost/batch"
 
 
 def pairs(rows: Sequence[Row]) -> list[tuple[str, str, Mean, Mean]]:
-    """Garment, method, ms of a frame alone and in a batch, of networks that were measured both ways."""
+    """Garment, method, ms of a frame alone and in a batch, of networks that were measured both ways.
+
+    Ablations are left out where the full recipe stands for them.
+    """
     own = [Measurements(suite_rows(rows, suite)) for suite in ("garments", "speed")]
     measured = own[0] if BATCH in own[0].metrics else own[1]
     found = []
     for garment, scenes in wardrobe(measured).items():
+        apart = set_apart(measured, scenes, BATCH)
         for method in measured.methods:
             both = [s for s in scenes if measured.seeds(s, method, BATCH)]
             single, batch = (measured.mean(method, metric, both) for metric in (SINGLE, BATCH))
-            if single and batch and method not in ABLATIONS:
+            if single and batch and method not in apart:
                 found.append((garment, method, single, batch))
     return found
 

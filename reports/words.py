@@ -8,17 +8,12 @@ from collections.abc import Iterable, Sequence
 from benchmarks.results import Row
 from reports import findings as paper_findings
 from reports import palette
-from reports.ablations import FULL, JUDGED, compared, measured_ablations
+from reports.ablations import JUDGED, judged_ablations
 from reports.answers import answers
 from reports.numbers import number, with_spread
 from reports.palette import NETWORKS, REFERENCE
-from reports.summary import (
-    TERMS,
-    Measurements,
-    dressed_scenes,
-    scatter,
-    suite_rows,
-)
+from reports.scatter import TIE, scatter
+from reports.summary import TERMS, Measurements, dressed_scenes, only, suite_rows
 
 PAPER_TERMS = ("strain", "bending", "gravity", "inertia")
 _NAMES = {
@@ -60,19 +55,21 @@ def name(method: str) -> str:
 
 def lowest_network(measured: Measurements) -> str:
     """Which trained network ends lowest in total energy, beside simulation, skinning and no training."""
-    totals = {m: t for m in NETWORKS if (t := measured.mean(m, "energy/total")) is not None}
+    scenes = _shared(measured, NETWORKS, "energy/total")
+    totals = {m: t for m in NETWORKS if (t := measured.mean(m, "energy/total", scenes)) is not None}
     if not totals:
         return ""
     order = sorted(totals, key=lambda method: totals[method].value)
     best = totals[order[0]]
-    text = f"Of the trained networks, {name(order[0])} has the lowest mean total on unseen motions: "
+    text = f"Of the trained networks, {name(order[0])} has the lowest mean total on unseen motions"
+    text += f"{_only(scenes, measured)}: "
     text += f"{with_spread(best.value, best.spread)} J per frame"
     rest = [f"{name(method)} {number(totals[method].value)} J" for method in order[1:]]
     text += f" ({', '.join(rest)})." if rest else " (no other one ran)."
     others = [
         f"{name(method)} {number(total)} J"
         for method in (REFERENCE, "skinning", "untrained")
-        if (total := measured.value(method, "energy/total")) is not None
+        if (total := measured.value(method, "energy/total", scenes)) is not None
     ]
     return text + (f" For comparison: {', '.join(others)}." if others else "")
 
@@ -80,11 +77,13 @@ def lowest_network(measured: Measurements) -> str:
 def against(measured: Measurements, rival: str) -> str:
     """SNUG beside another method, term by term, whichever way it comes out."""
     groups: dict[str, list[str]] = {"lower in": [], "higher in": [], "equal in": []}
-    below = set()
+    below: set[str] = set()
+    told, fewer = False, ""
     for term in TERMS:
-        own, other = measured.mean("snug", f"energy/{term}"), measured.mean(rival, f"energy/{term}")
+        own, other = measured.pair("snug", rival, f"energy/{term}")
         if own is None or other is None:
             continue
+        told, fewer = told or own.spread is not None or other.spread is not None, own.fewer or fewer
         a, b = own.value, other.value
         if abs(a - b) <= scatter(own, other):
             groups["equal in"].append(term)
@@ -94,7 +93,8 @@ def against(measured: Measurements, rival: str) -> str:
     parts = [f"{word} {_listed(terms)}" for word, terms in groups.items() if terms]
     if not parts:
         return ""
-    text = f"SNUG is {'; '.join(parts)}{_equal_within(measured, rival) if groups['equal in'] else ''}."
+    within = " within the scatter of seeds" if told else f" within {100.0 * TIE:g} %, for want of more seeds"
+    text = f"SNUG is {'; '.join(parts)}{within if groups['equal in'] else ''}{fewer}."
     if rival == "pbns":
         held = len(below & set(PAPER_TERMS))
         verdict = "is reproduced" if held == len(PAPER_TERMS) else f"is reproduced in {held} of the 4"
@@ -102,10 +102,13 @@ def against(measured: Measurements, rival: str) -> str:
     return text
 
 
-def _equal_within(measured: Measurements, rival: str) -> str:
-    means = (measured.mean("snug", "energy/total"), measured.mean(rival, "energy/total"))
-    several = any(mean is not None and mean.spread is not None for mean in means)
-    return " within the scatter of seeds" if several else " within 5 %, the scatter of seeds"
+def _shared(measured: Measurements, methods: Iterable[str], metric: str) -> tuple[str, ...]:
+    """The scenes that those of the methods that have the metric at all have in common."""
+    return measured.shared([m for m in methods if measured.mean(m, metric) is not None], metric)
+
+
+def _only(scenes: Sequence[str], measured: Measurements) -> str:
+    return "" if len(scenes) == len(measured.scenes) else only(len(scenes))
 
 
 def change(value: float, other: float) -> str:
@@ -121,29 +124,28 @@ def change(value: float, other: float) -> str:
 
 def curvature(measured: Measurements) -> str:
     """Who is closest to the simulation's wrinkles, and how wrinkled each is by itself."""
-    errors = {
-        method: error
-        for method in palette.leading(measured.methods)
-        if method != REFERENCE and (error := measured.value(method, "curvature/error")) is not None
-    }
+    others = [method for method in palette.leading(measured.methods) if method != REFERENCE]
+    scenes = _shared(measured, others, "curvature/error")
+    errors = {m: e for m in others if (e := measured.value(m, "curvature/error", scenes)) is not None}
     if not errors:
         return ""
     order = sorted(errors, key=lambda method: errors[method])
-    text = f"Smallest mean-curvature error: {name(order[0])}, {number(errors[order[0]])} 1/m"
+    text = f"Smallest mean-curvature error{_only(scenes, measured)}: "
+    text += f"{name(order[0])}, {number(errors[order[0]])} 1/m"
     rest = [f"{name(method)} {number(errors[method])}" for method in order[1:]]
     text += f" ({', '.join(rest)})." if rest else "."
-    own = measured.value(REFERENCE, "curvature/mean")
-    snug = measured.value("snug", "curvature/mean")
+    own, snug = measured.pair(REFERENCE, "snug", "curvature/mean")
     if own is None or snug is None:
         return text
-    return f"{text} Mean curvature itself: the simulation {number(own)} 1/m, SNUG {number(snug)} 1/m."
+    text += f" Mean curvature itself: the simulation {number(own.value)} 1/m, SNUG {number(snug.value)} 1/m"
+    return f"{text}{own.fewer}."
 
 
 def left_out(rows: Sequence[Row]) -> str:
     """How many ablations are worse than the full recipe in each measure, and which in none, by garment."""
     sentences = []
-    for garment, means in measured_ablations(rows).items():
-        worse = {m: compared(means[FULL], own)[0] for m, own in means.items() if m != FULL}
+    for garment, own in judged_ablations(rows).items():
+        worse = {method: ways[0] for method, ways in own.items()}
         counts = [f"{sum(what in found for found in worse.values())} in {what}" for what in JUDGED.values()]
         text = f"{garment}, of {len(worse)} ablations worse than full SNUG beyond the scatter of seeds: "
         none = [palette.label(method) for method, found in worse.items() if not found]
@@ -158,7 +160,7 @@ def judged(rows: Sequence[Row]) -> str:
     if not found:
         return ""
     ways = (paper_findings.REPRODUCED, paper_findings.SCATTERED)
-    reproduced, scattered = (sum(word == way for word in found) for way in ways)
+    reproduced, scattered = (sum(word.startswith(way) for word in found) for way in ways)
     text = f"Of {len(found)} comparisons that its findings come to here, {reproduced} come out as there"
     text += f", {scattered} lie within the scatter of seeds" if scattered else ""
     other = len(found) - reproduced - scattered

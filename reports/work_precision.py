@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.results import Row
 from reports import palette
-from reports.ablations import ABLATIONS
+from reports.ablations import set_apart
 from reports.canvas import PAGE_WIDTH, Picture, file_name, grid, legend_above, log_axis, new_figure, save
 from reports.fronts import TIME, Point, front, points_of
 from reports.numbers import number
@@ -38,7 +38,9 @@ def error_against_time(folder: Path, rows: Sequence[Row]) -> list[Picture]:
 
     Dressed bodies come first, and of those the one on which most methods ran.
     """
-    measured = speed_measurements(row for row in rows if row.method not in ABLATIONS)
+    every = speed_measurements(rows)
+    apart = set_apart(every, every.scenes, TIME)
+    measured = speed_measurements(row for row in rows if row.method not in apart)
     dressed = dressed_scenes(measured)
     ran = {s: sum(bool(measured.seeds(s, m, TIME)) for m in measured.methods) for s in measured.scenes}
     pictures = []

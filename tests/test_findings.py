@@ -30,8 +30,9 @@ def test_every_method_of_a_claim_is_one_that_can_be_run():
         ((0.5,), (1.0,), "reproduced"),
         ((0.97,), (1.0,), "within the scatter of seeds"),
         ((1.0,), (0.5,), "not reproduced: the other way round"),
-        ((0.5, 0.9), (1.0, 1.0), "reproduced"),  # 0.3 apart, 0.28 of scatter
-        ((0.6, 1.0), (1.0, 1.0), "within the scatter of seeds"),  # 0.2 apart, 0.28 of scatter
+        ((0.5, 0.6, 0.7), (1.0, 1.0, 1.0), "reproduced"),  # 0.4 apart, 0.25 of scatter
+        ((0.7, 0.8, 0.9), (1.0, 1.0, 1.0), "within the scatter of seeds"),  # 0.2 apart, 0.25 of scatter
+        ((0.6, 0.7, 0.8), (1.0,), "within the scatter of seeds"),  # 0.3 apart, 0.50: it has seeds of its own
     ],
 )
 def test_a_term_is_reproduced_beyond_a_tie_and_beyond_the_scatter_of_seeds(snug, pbns, verdict):
@@ -49,9 +50,19 @@ def test_a_steady_roll_out_is_allowed_a_share():
     rows += [row("snug", k, v, suite="roll-outs", scene="there_and_back") for k, v in ends.items()]
     rows.append(row("snug", "train/window", 1.0, suite="roll-outs", scene="training"))
     lines = told(rows)
-    first = lines["A thousand frames end where they began"][2]
-    assert first.value == 1.0 and first.complete
-    assert lines["A thousand frames end where they began"][-1] == "not reproduced"
+    steady = lines["A thousand frames end at most 5 % above where they began"]
+    assert steady[2].value == 1.0 and steady[2].complete
+    assert steady[4:] == (pytest.approx(6.0), None, "not reproduced")
+
+
+def test_means_are_compared_over_the_scenes_that_both_have():
+    rows = [row("snug", "energy/strain", value, scene=f"dressed/{k}") for k, value in enumerate((1.0, 9.0))]
+    rows.append(row("pbns", "energy/strain", 2.0, scene="dressed/0"))
+    line = told(rows)["SNUG is below PBNS in strain"]
+    assert (line[1].value, line[2].value) == (1.0, 2.0) and not line[1].complete
+    assert line[4] == pytest.approx(-50.0) and line[-1] == "reproduced (1 scene only)"
+    rows[-1] = row("pbns", "energy/strain", 2.0, scene="dressed/2")
+    assert told(rows)["SNUG is below PBNS in strain"][1:3] == (None, None)
 
 
 def test_without_a_network_there_is_no_table():

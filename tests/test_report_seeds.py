@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from run_folder import row
+from scipy import stats
 
+from benchmarks.methods import METHODS
 from reports import bars, words
 from reports.ablations import ABLATIONS, ablations, ablations_judged
 from reports.document import document
-from reports.summary import TIE, Mean, Measurements, dressed_scenes, scatter, wardrobe
+from reports.scatter import TIE, scatter
+from reports.summary import Mean, Measurements, dressed_scenes, wardrobe
 from reports.tables import make_tables
 from reports.throughput import throughput, throughput_bars
 
@@ -17,10 +22,35 @@ def seeds_of(method, metric, values, **more):
     return [row(method=method, metric=metric, value=value, seed=k, **more) for k, value in enumerate(values)]
 
 
-def test_the_scatter_is_that_of_both_or_a_share_where_no_seeds_tell_it():
-    assert scatter(Mean(1.0, 0.3, 1, 3, True), Mean(2.0, 0.4, 1, 3, True)) == pytest.approx(0.5)
-    assert scatter(Mean(1.0, 0.3, 1, 3, True), Mean(2.0, None, 1, 1, True)) == pytest.approx(0.3)
-    assert scatter(Mean(1.0, None, 1, 1, True), Mean(-2.0, None, 1, 1, True)) == pytest.approx(2.0 * TIE)
+def mean_of(values, method="snug"):
+    mean = Measurements(seeds_of(method, "energy/strain", values)).mean(method, "energy/strain")
+    assert mean is not None
+    return mean
+
+
+ONE = (1.0, 1.3, 1.1)
+
+
+@pytest.mark.parametrize("shift", [0.1, 0.4, 0.5, 0.9])
+def test_the_scatter_is_the_threshold_of_welchs_test(shift):
+    other = (0.9 + shift, 1.5 + shift, 1.0 + shift, 1.1 + shift)
+    apart = abs(mean_of(ONE).value - mean_of(other).value)
+    beyond = apart > scatter(mean_of(ONE), mean_of(other))
+    assert beyond == (stats.ttest_ind(ONE, other, equal_var=False).pvalue < 0.05)
+    # What has no seeds is a known number; what could have had some is one draw more of the same scatter.
+    s, t = mean_of(ONE).spread, stats.t.ppf(0.975, 2)
+    assert scatter(mean_of(ONE), mean_of((2.0,), "simulation")) == pytest.approx(t * s * math.sqrt(1 / 3))
+    assert scatter(mean_of((2.0,), "pbns"), mean_of(ONE)) == pytest.approx(t * s * math.sqrt(1 + 1 / 3))
+
+
+def test_where_no_seeds_tell_it_the_scatter_is_a_share():
+    assert scatter(mean_of((1.0,)), mean_of((-2.0,), "pbns")) == pytest.approx(2.0 * TIE)
+    assert scatter(mean_of((1.0, 1.0)), mean_of((2.0, 2.0))) == 0.0
+
+
+@pytest.mark.parametrize("entry", METHODS, ids=lambda entry: entry.name)
+def test_the_report_knows_which_methods_have_seeds(entry):
+    assert mean_of((1.0,), entry.name).seeded == entry.seeded
 
 
 def test_garments_have_their_own_means_and_the_shirt_comes_first():
@@ -58,6 +88,37 @@ def test_without_the_full_recipe_nothing_is_compared():
     assert ablations([row(metric="energy/total")]) is None
 
 
+def test_without_the_full_recipe_ablations_stand_in_the_other_tables():
+    cost = {"unit": "ms", "method": "snug-springs"}
+    rows = [row(method="snug-springs", metric="energy/total"), row(metric="cost/frame", **cost)]
+    rows.append(row(metric="cost/batch", **cost))
+    full = [row(metric=r.metric) for r in rows]
+    assert [line[1] for line in make_tables(rows)["energies"].rows] == ["snug-springs"]
+    assert [line[1] for line in make_tables([*rows, *full])["energies"].rows] == ["snug"]
+    assert [line[1] for line in throughput(rows).rows] == ["snug-springs"]
+    assert [line[1] for line in throughput([*rows, *full]).rows] == ["snug"]
+
+
+def on_two_scenes(method, *values, metric="energy/total"):
+    scenes = ("dressed/walk", "dressed/kick")
+    return [row(scene, method, metric, value) for scene, value in zip(scenes, values)]
+
+
+def test_ablations_are_judged_over_the_scenes_that_both_have():
+    rows = on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("snug-no-noise", 2.0)
+    assert ablations_judged(rows).rows == (("T-shirt", "snug-no-noise", "total energy (1 scene only)", ""),)
+    assert "1 in total energy" in dict(words.findings(rows))["Ablations"]
+    assert [line[7].value for line in ablations(rows).rows] == [5.0, 2.0]
+
+
+def test_bars_compare_the_scenes_that_both_have_and_say_what_stalled():
+    rows = on_two_scenes("snug", 1.05, 9.0)
+    rows.append(row("dressed/walk", "free-bound", "energy/total", 1.0, status="stalled", reason="a frame"))
+    line = bars.table(rows).rows[0]
+    assert line[1].value == pytest.approx(5.0) and line[1].stalled and not line[1].complete
+    assert line[-1] == "met (1 scene only)"
+
+
 def met(rows):
     table = bars.table(rows)
     assert table is not None
@@ -65,7 +126,8 @@ def met(rows):
 
 
 def test_bars_are_met_missed_or_too_near_to_tell():
-    rows = seeds_of("snug", "energy/total", (1.04, 1.06)) + seeds_of("free-bound", "energy/total", (1.0,))
+    rows = seeds_of("snug", "energy/total", (1.04, 1.05, 1.06))  # 3 from the bar, 2.5 of scatter
+    rows += seeds_of("free-bound", "energy/total", (1.0,))
     assert met(rows)["Total above the free lower bound"] == (pytest.approx(5.0), "met")
     rows += seeds_of("snug", "energy/strain", (0.2, 0.4)) + seeds_of("skinning", "energy/strain", (1.2,))
     times = met(rows)["Strain below skinning's, so many times"]

@@ -109,6 +109,20 @@ def test_a_difference_within_the_spread_of_the_seeds_is_no_difference():
     assert words.against(measured, "pbns").startswith("SNUG is equal in strain")
 
 
+def test_words_compare_means_over_the_scenes_that_both_have():
+    rows = [row(scene, "snug", "energy/total", v) for scene, v in zip(SCENES, (1.0, 9.0))]
+    rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
+    measured = Measurements(rows)
+    assert words.against(measured, "pbns").startswith("SNUG is lower in total (−50 %) (1 scene only).")
+    assert words.lowest_network(measured).startswith("Of the trained networks, SNUG has the lowest")
+    assert "unseen motions (1 scene only): 1.00 J" in words.lowest_network(measured)
+    rows = [row(s, m, "curvature/error", v) for s, m, v in zip((*SCENES, SCENES[0]), ("snug", "snug", "pbns"),
+            (1.0, 9.0, 2.0))]  # fmt: skip
+    assert words.curvature(Measurements(rows)) == (
+        "Smallest mean-curvature error (1 scene only): SNUG, 1.00 1/m (PBNS 2.00)."
+    )
+
+
 def test_sections_exist_only_for_what_ran():
     check = row("free_fall", "simulation", "check", 0.0, suite="validation", expected=0.0, tolerance=1.0)
     made_tables = tables.make_tables([check])

@@ -128,6 +128,37 @@ def test_the_answers_follow_the_numbers():
     assert "after 13,000 frames" in said["When training pays"]
 
 
+def test_hybrids_may_lose_to_the_network_itself():
+    rows = [r for r in all_rows() if "+" not in r.method]
+    numbers = (("cost/frame", 1.0), ("gap/relative", 0.1))  # slower than SNUG and no better
+    rows += [row(scene, "snug+lbfgs-1", *pair) for scene in SCENES for pair in numbers]
+    said = dict(answers(rows))["Network plus solver"]
+    assert said == (
+        "By energy gap every SNUG-started solver is beaten by SNUG itself or by a solver alone that is no "
+        "slower. (mean of 2 scenes.)"
+    )
+
+
+def test_run_times_are_of_the_scenes_that_both_have():
+    rows = [r for r in all_rows() if (r.method, r.scene) != ("simulation", SCENES[0])]
+    rows += [row(SCENES[0], "snug", "cost/train", 200.0, "s")]
+    rows = [dataclasses.replace(r, value=9.0) if _is(r, SCENES[0], "snug", "cost/frame") else r for r in rows]
+    assert dict(answers(rows))["Run time"].endswith("100 ms: 400 times faster (1 scene only).")
+
+
+def _is(found, *wanted):
+    return (found.scene, found.method, found.metric) == wanted
+
+
+def test_ablations_are_drawn_where_the_full_recipe_is_not(tmp_path):
+    costs = (("cost/frame", 1.0), ("gap/relative", 0.1))
+    rows = [row("dressed/walk", m, k, v) for m in ("snug-springs", "newton-1") for k, v in costs]
+    assert len(error_against_time(tmp_path, rows)) == 1
+    rows += [row("dressed/walk", "snug", *cost) for cost in costs]
+    kept = [r for r in rows if r.method != "newton-1"]
+    assert error_against_time(tmp_path, kept) == []  # one point is no plot
+
+
 def test_the_same_scene_by_scene():
     worse = ("skinning+lbfgs-1", 0.5, 0.5)  # than SNUG, though no solver alone is as fast
     rows = [*all_rows(), row(SCENES[0], worse[0], "cost/frame", worse[1], "ms")]

@@ -1,0 +1,41 @@
+"""How far apart seeds alone may put two means: the one rule by which the report calls numbers different."""
+
+from __future__ import annotations
+
+import math
+
+from reports.summary import Mean
+
+TIE = 0.05  # share of the larger of two values by which they may differ where no seeds tell their scatter
+LEVEL = 0.975  # of each side: 95 % in all
+
+
+def scatter(one: Mean, other: Mean) -> float:
+    """The threshold of Welch's two-sided 95 % t test, t_{.975, nu} sqrt(s1^2 / n1 + s2^2 / n2) (Welch 1947).
+
+    Of one seed nothing is known: a network is then taken to have the s of the one beside it, and where
+    neither has several seeds, `TIE` of the larger value is the threshold. What no seed changes has s = 0.
+    """
+    from scipy.special import stdtrit
+
+    spreads = spreads_of(one, other)
+    if spreads is None:
+        return TIE * max(abs(one.value), abs(other.value))
+    first, second = (spread**2 / mean.seeds for spread, mean in zip(spreads, (one, other)))
+    if first + second == 0.0:
+        return 0.0
+    freedom = float(max(one.seeds, other.seeds) - 1)
+    if min(one.seeds, other.seeds) > 1:
+        freedom = (first + second) ** 2 / (first**2 / (one.seeds - 1) + second**2 / (other.seeds - 1))
+    return float(stdtrit(freedom, LEVEL)) * math.sqrt(first + second)
+
+
+def spreads_of(one: Mean, other: Mean) -> tuple[float, float] | None:
+    """Both standard deviations over seeds as `scatter` takes them, None where neither has several seeds."""
+    known = [mean.spread for mean in (one, other) if mean.spread is not None]
+    if not known:
+        return None
+    first, second = (
+        mean.spread if mean.spread is not None else known[0] * mean.seeded for mean in (one, other)
+    )
+    return first, second
