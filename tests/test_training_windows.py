@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 from dressing import swaying, tube_dress
 
 from benchmarks.methods.networks import model_path
 from benchmarks.results import RunFolder
-from benchmarks.studies.training_windows import both_losses, rows
+from benchmarks.studies.training_windows import _loss, both_losses, rows
 from snug.recipe import DEFAULT
+from snug.skinning import skin
 from snug.train import train, untrained_model
+from snug.trainer import Trainer
 
 MOTIONS = [swaying(30), swaying(24, name="slow", degrees=10.0)]
 
@@ -41,11 +45,20 @@ def test_a_run_without_a_network_has_no_windows_to_look_at():
     assert rows(SimpleNamespace(models=(), train=("walk",)), RunFolder(Path()), wardrobe) == []
 
 
+def test_what_was_judged_before_leaves_no_trace():
+    trainer = Trainer("snug", tube_dress(), MOTIONS, steps=1, seed=0, recipe=replace(DEFAULT, mixed=0.0))
+    batch = trainer.data.batch(np.arange(4), None)
+    x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.05])  # deep inside
+    first = _loss(trainer, batch, x)
+    _loss(trainer, batch, x + torch.tensor([0.1, 0.0, 0.1]))  # anchors elsewhere
+    assert _loss(trainer, batch, x) == first
+
+
 def test_rows_are_those_of_networks_that_energies_taught(tmp_path):
     dressed, folder = tube_dress(), RunFolder(tmp_path)
-    train("snug", dressed, MOTIONS, steps=3, seed=1, progress=False).save(
-        model_path(folder.models, "snug", 1)
-    )
+    model = train("snug", dressed, MOTIONS, steps=3, seed=1, progress=False)
+    model.summary["high_windows"] = 2
+    model.save(model_path(folder.models, "snug", 1))
     train("pbns", dressed, MOTIONS, steps=2, seed=0, progress=False).save(
         model_path(folder.models, "pbns", 0)
     )
@@ -56,4 +69,17 @@ def test_rows_are_those_of_networks_that_energies_taught(tmp_path):
     assert {(row.method, row.seed) for row in found} == {("snug", 1)}
     values = {row.metric: row.value for row in found}
     assert set(values) == {"train/window", "train/roll_out", "train/high_windows", "train/step"}
-    assert values["train/roll_out"] > 0.0 and values["train/high_windows"] == 0.0
+    assert values["train/roll_out"] > 0.0 and values["train/high_windows"] == 2.0
+
+
+def test_a_network_that_is_not_finite_has_diverged(tmp_path):
+    dressed, folder = tube_dress(), RunFolder(tmp_path)
+    model = train("snug", dressed, MOTIONS, steps=1, seed=0, progress=False)
+    with torch.no_grad():
+        model.network.offsets.bias.fill_(torch.nan)
+    model.save(model_path(folder.models, "snug", 0))
+    wardrobe = SimpleNamespace(body=dressed.body, garment=dressed.garment, named=lambda names: MOTIONS)
+    found = rows(SimpleNamespace(models=(("snug", 0),), train=("sway", "slow")), folder, wardrobe)
+    states = {row.metric: (row.status, row.value) for row in found}
+    assert states["train/window"] == states["train/roll_out"] == ("diverged", None)
+    assert states["train/step"][0] == "ok" and all(row.passed or row.reason for row in found)
