@@ -50,10 +50,7 @@ class Guarded:
         ended.
         """
         if self._process is None:
-            self._pipe, far = self._context.Pipe()
-            self._process = self._context.Process(target=_serve, args=(far, *self._begin), daemon=True)
-            self._process.start()
-            far.close()
+            self._start()
         try:
             self._pipe.send((function, arguments))
             if not self._pipe.poll(seconds):
@@ -70,6 +67,18 @@ class Guarded:
         if fine:
             return answer
         raise answer
+
+    def _start(self) -> None:
+        near, far = self._context.Pipe()
+        process = self._context.Process(target=_serve, args=(far, *self._begin), daemon=True)
+        try:
+            process.start()
+        except BaseException:  # there is no process then, and no other side to wait for
+            near.close()
+            raise
+        finally:
+            far.close()
+        self._pipe, self._process = near, process
 
     def close(self) -> None:
         """Let the worker end by itself, for it has nothing to do; then end all that it has started."""

@@ -204,6 +204,13 @@ def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():
         assert guarded.call(operator.mul, 2, 5, seconds=60) == 10
 
 
+def test_a_process_that_cannot_start_is_none_at_all():
+    with Guarded(lambda: None) as guarded:  # cannot be sent to it
+        for _ in range(2):
+            with pytest.raises(Exception, match="lambda"):
+                guarded.call(operator.mul, 2, 4, seconds=1)
+
+
 @pytest.mark.parametrize(("does", "words"), [("broken", "no answer"), ("wrong", "RuntimeError: lost")])
 def test_what_did_not_come_back_is_a_failed_row(monkeypatch, does, words):
     class Lost:
