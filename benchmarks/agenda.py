@@ -18,7 +18,7 @@ from .clips import SUFFIX
 from .fingerprint import ROOT, code_of, digest, digest_of_file, preset_values
 from .methods import find_method
 from .plan import Cell, Network, Plan, network_of, runs
-from .records import Work
+from .records import Records, Work
 from .scene import Scene
 from .scenes import dressed_scene
 
@@ -35,6 +35,12 @@ class Agenda:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.lost: frozenset[str] = frozenset()
+
+    def remember_lost(self, records: Records) -> None:
+        """Those whose records say that they have failed."""
+        learned = [(motion, g) for g in self.plan.simulated for motion in self.plan.train_of(g)]
+        works = [self.data(motion, garment) for motion, garment in learned]
+        self.lost |= {work.name for work in works if records.find(work).state == "failed"}
 
     @cached_property
     def machine(self) -> dict[str, Any]:

@@ -33,8 +33,8 @@ def rows_of_cells(
     plan, kept = agenda.plan, dict[Cell, str]()
     for cell in (outcome.cell for outcome in outcomes if outcome.recorded):
         trajectory = records.find(agenda.cell(cell))
-        if trajectory.state == "stale":
-            kept[cell] = f"kept though {trajectory.why} changed"
+        if trajectory.remark:
+            kept[cell] = trajectory.remark
     recorded = [outcome for outcome in outcomes if outcome.recorded and outcome.cell not in kept]
     works = {outcome.cell: agenda.metrics(outcome.cell) for outcome in outcomes if outcome.recorded}
     jobs = jobs_of_scenes(recorded, works, plan, records)
@@ -50,7 +50,7 @@ def rows_of_cells(
             outcome = dataclasses.replace(outcome, reason=outcome.reason or remark)
             metrics = {**found.result, **clock_costs(outcome), **costs_of(outcome.cell, agenda, records)}
         elif remark:
-            reason = f"{remark}, and never measured"
+            reason = f"{remark}; no metrics of it are there"
             outcome = dataclasses.replace(outcome, status="skipped", reason=reason)
         elif found is not None:
             reason = f"metrics: {reasons.get(outcome.cell.scene.name, 'the worker ended')}"
@@ -66,8 +66,10 @@ def costs_of(cell: Cell, agenda: Agenda, records: Records) -> dict[str, float]:
     if network is None or not result:
         return {}
     motions = plan.train_of(network.garment) if network.garment in plan.simulated else ()
-    data = [records.find(agenda.data(motion, network.garment)).result or {} for motion in motions]
-    return model_costs(Trained(**result), sum(simulated.get("seconds", 0.0) for simulated in data))
+    data = [records.find(agenda.data(motion, network.garment)) for motion in motions]
+    gone = any(found.state == "missing" for found in data)
+    seconds = None if gone else sum((found.result or {}).get("seconds", 0.0) for found in data)
+    return model_costs(Trained(**result), seconds)
 
 
 def jobs_of_scenes(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from .agenda import Agenda
-from .judged import work_of, work_of_study
+from .judged import unfounded, work_of, work_of_study
 from .plan import Plan, runs
 from .records import Found, Records, Work
 from .results import RunFolder
@@ -39,6 +39,8 @@ class Outlook:
         self.plan, self.agenda = plan, Agenda(plan)
         only = ("finished", "failed", "stale", "missing") if plan.fresh else plan.only
         self.records = Records(RunFolder(plan.folder), only=only)
+        if "failed" not in only:
+            self.agenda.remember_lost(self.records)
         self.wanted: list[Found] = []
         self.cached = 0
 
@@ -56,11 +58,7 @@ class Outlook:
             targets = "simulated for networks that learn from it" if simulated else "not simulated"
             yield f"training motions {', '.join(plan.train_of(garment))} ({targets})"
             for motion in plan.train_of(garment) if simulated else ():
-                work = agenda.data(motion, garment)
-                found = self.records.find(work)
-                if found.state == "failed" and not found.wanted:
-                    agenda.lost |= {work.name}
-                yield f"  simulate {motion}: {self.verdict(work)}"
+                yield f"  simulate {motion}: {self.verdict(agenda.data(motion, garment))}"
         for network in plan.networks:
             steps = plan.preset.steps_of(network.name)
             yield f"  train {network.label}: {steps} steps, {self.verdict(agenda.network(network))}"
@@ -80,6 +78,9 @@ class Outlook:
     def of_study(self, study: Study) -> str:
         """What happens to a study, which may read what is still to be done."""
         work = work_of_study(study, self.agenda, self.records)
+        kept = "stale" not in self.records.only  # what is stale otherwise is done again before the study
+        if kept and self.records.find(work).wanted and (why := unfounded(study, self.agenda, self.records)):
+            return f"skip ({why})"
         return self.verdict(work)
 
     def verdict(self, work: Work) -> str:

@@ -50,8 +50,8 @@ class Work:
 class Found:
     """What the folder says of a piece of work. state: one of STATES; why: what has changed, or what failed.
 
-    result, seconds and commit: of the record, also of a stale one; None or empty without one.
-    wanted: to be done now.
+    result, seconds and commit: of the record, also of a stale one; None or empty without one. A record whose
+    files are gone has no result. wanted: to be done now.
     """
 
     state: str
@@ -60,6 +60,11 @@ class Found:
     seconds: float | None = None
     commit: str = ""
     wanted: bool = True
+
+    @property
+    def remark(self) -> str:
+        """What rows say that are kept though they are out of date; empty of all others."""
+        return f"kept though {self.why} changed" if self.state == "stale" else ""
 
 
 class Records:
@@ -122,7 +127,7 @@ class Records:
         for name, content in files.items():
             path = self.folder.path / name
             if not path.is_file():
-                return "missing", f"{name} is gone", record
+                return "missing", f"{name} is gone", record | {"result": None}
             if content and digest_of_file(path) != content:
                 return "stale", f"{name} is another", record
         if record["key"] != work.key:

@@ -19,12 +19,16 @@ if TYPE_CHECKING:
     from .training import Trained
 
 
-def model_costs(trained: Trained | None, data_seconds: float) -> dict[str, float]:
-    """cost/data, cost/train and cost/memory of a method that uses this network; nothing without one."""
+def model_costs(trained: Trained | None, data_seconds: float | None) -> dict[str, float]:
+    """cost/data, cost/train and cost/memory of a method that uses this network; nothing without one.
+
+    data_seconds: None where nobody knows them any more; then there is no cost/data.
+    """
     if trained is None:
         return {}
     data = data_seconds if learns_from_simulation(trained.kind) else 0.0
-    return {"cost/data": data, "cost/train": trained.seconds, "cost/memory": trained.megabytes}
+    known = {} if data is None else {"cost/data": data}
+    return known | {"cost/train": trained.seconds, "cost/memory": trained.megabytes}
 
 
 def clock_costs(outcome: Outcome) -> dict[str, float]:

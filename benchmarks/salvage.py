@@ -8,7 +8,7 @@ from .agenda import Agenda
 from .cells import outcome_of_record, with_repeat
 from .check import Check
 from .curves import remarked
-from .judged import kept_rows, work_of, work_of_study
+from .judged import kept_row, kept_rows, work_of, work_of_study
 from .measuring import costs_of
 from .plan import runs
 from .records import Records
@@ -28,6 +28,7 @@ def with_finished(rows: Iterable[Row], agenda: Agenda, records: Records) -> list
 def finished_rows(agenda: Agenda, records: Records) -> Iterator[Row]:
     """Rows of cells with their metrics, checks, cases and studies. Computes and measures nothing."""
     plan = agenda.plan
+    agenda.remember_lost(records)  # the interrupt may have come before the stage that asks for them
     cells: list[Row] = []
     for cell in filter(runs, plan.cells):
         found, metrics = records.find(agenda.cell(cell)), records.find(agenda.metrics(cell))
@@ -45,7 +46,7 @@ def finished_rows(agenda: Agenda, records: Records) -> Iterator[Row]:
     for item in items:
         found = records.find(work_of(item, agenda))
         if found.state in ENDED and found.result is not None:
-            yield Row(**found.result | {"commit": found.commit})
+            yield kept_row(Row(**found.result), found)
     for study in plan.studies:
         found = records.find(work_of_study(study, agenda, records))
         if found.state in ENDED:

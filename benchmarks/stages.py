@@ -26,7 +26,7 @@ from .records import Found, Work
 from .results import Row
 from .salvage import with_finished
 from .scenes import TSHIRT, dressed_scene, worn_in
-from .workers import Failure, Job, run_jobs
+from .workers import Failure, Job, one_line, run_jobs
 
 if TYPE_CHECKING:
     from .wardrobe import Wardrobe
@@ -41,7 +41,8 @@ def execute(plan: Plan) -> int:
     except KeyboardInterrupt:
         record.note("interrupted", True)
         record.rows = with_finished(record.rows, stages.agenda, record.records)
-        record.write_rows()
+        if record.rows or not record.folder.rows_path.is_file():  # nothing known is no reason to lose a table
+            record.write_rows()
         raise
     made = stages.make_report()
     from .closing import remarks, summary
@@ -288,11 +289,6 @@ class Stages:
         for problem in problems:
             print(f"report: left out: {problem}", file=sys.stderr)
         return True
-
-
-def one_line(error: Exception) -> str:
-    """What was raised, in one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def _bar(items: Any, title: str, unit: str) -> Any:

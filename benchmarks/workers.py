@@ -53,6 +53,11 @@ class Failure:
     reason: str
 
 
+def one_line(error: Exception) -> str:
+    """What was raised, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
 def worker_count() -> int:
     """Worker processes used on this machine unless the request names another number."""
     return min(WORKERS, usable_cores())
@@ -105,27 +110,32 @@ class Worker:
     """A process that does one job after another, another process after one that was killed."""
 
     def __init__(self, wardrobe: Wardrobe | None) -> None:
-        # Of its own: one that is killed while it reports leaves no lock that others wait for.
+        self.wardrobe = wardrobe
+        self._renew()
+
+    def _renew(self) -> None:
+        # A queue for each process: one that is killed while it reports leaves a lock that nobody opens.
         self.progress = multiprocessing.get_context("spawn").SimpleQueue()
-        self.process = Guarded(_begin, wardrobe, self.progress)
+        self.process = Guarded(_begin, self.wardrobe, self.progress)
 
     def do(self, job: Job) -> Any:
         """The result of a job, or a Failure."""
         try:
             return self.process.call(_call, job, seconds=None)
         except Broken as broken:
+            self._renew()
             return Failure(job.label, f"{broken.status}: {broken}")
         except Exception as error:
-            return Failure(job.label, " ".join(f"{type(error).__name__}: {error}".split()))
+            return Failure(job.label, one_line(error))
 
 
 def _watch(futures: Sequence[Future[Any]], crew: Sequence[Worker], bar: Any) -> None:
     left = set(futures)
     while left:
         _, left = wait(left, timeout=POLL, return_when=FIRST_COMPLETED)
-        for worker in crew:
-            while not worker.progress.empty():
-                bar.update(min(worker.progress.get(), bar.total - bar.n))
+        for progress in [worker.progress for worker in crew]:  # a worker may get another meanwhile
+            while not progress.empty():
+                bar.update(min(progress.get(), bar.total - bar.n))
 
 
 def _end(futures: Sequence[Future[Any]]) -> None:

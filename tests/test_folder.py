@@ -15,11 +15,15 @@ from test_cells import TINY, harness, of_session, outcome_of, plan_of
 
 from benchmarks import run, stages
 from benchmarks.agenda import Agenda
+from benchmarks.cell import Outcome
 from benchmarks.guarded import Guarded
-from benchmarks.plan import Network
+from benchmarks.outlook import describe
+from benchmarks.plan import Cell, Network
 from benchmarks.record import Record
-from benchmarks.records import Work
+from benchmarks.records import Records, Work
 from benchmarks.results import RunFolder
+from benchmarks.salvage import finished_rows
+from benchmarks.scenes import dressed_scene
 from benchmarks.workers import Failure, Job
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -191,6 +195,34 @@ def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path
     assert RunFolder(tmp_path).read_rows() == [row for row in before if row.method == "simulation"]
     monkeypatch.setattr(Guarded, "call", perform)
     assert run.main(words) == 0 and RunFolder(tmp_path).read_rows() == before
+
+
+def test_an_interrupt_before_anything_is_known_leaves_the_last_table(tmp_path, monkeypatch):
+    words = words_of(tmp_path, "simulation")
+    assert run.main(words) == 0
+    before = RunFolder(tmp_path).read_rows()
+
+    def interrupt(self):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stages.Stages, "run", interrupt)
+    assert run.main([*words, "--fresh"]) == 130
+    assert before and RunFolder(tmp_path).read_rows() == before
+
+
+def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
+    cell = Cell(dressed_scene("kick"), "supervised", 0, ("garments",))
+    plan = plan_of(tmp_path, train=("walk", "run"), cells=(cell,))
+    records, agenda = Records(RunFolder(tmp_path)), Agenda(plan)
+    records.keep(agenda.data("run", "tshirt"), {}, seconds=0.0, failed="diverged")
+    agenda.remember_lost(records)
+    failed = dataclasses.asdict(Outcome(cell, "failed", "killed"))
+    del failed["cell"], failed["commit"]
+    records.keep(agenda.cell(cell), failed, seconds=0.0, failed="failed: killed")
+    (row,) = finished_rows(Agenda(plan), records)
+    assert (row.method, row.status, row.reason) == ("supervised", "failed", "killed")
+    assert "train supervised seed 0: 60 steps, run (missing)" in describe(plan)
+    assert "dressed/kick x supervised [garments]: cached (failed" in describe(plan)
 
 
 @pytest.mark.slow

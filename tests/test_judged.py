@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import pytest
+
 from benchmarks import judged
 from benchmarks.agenda import Agenda
 from benchmarks.check import run_check
@@ -18,6 +20,7 @@ from benchmarks.studies import STUDIES
 from benchmarks.study import Study
 from benchmarks.suites.extremes import CASES
 from benchmarks.suites.validation import CHECKS
+from snug.recipe import DEFAULT
 
 
 def test_a_check_is_computed_once_and_again_when_it_declares_something_else(tmp_path):
@@ -39,6 +42,19 @@ def test_a_check_is_computed_once_and_again_when_it_declares_something_else(tmp_
     assert failed.status == "failed" and len(done) == 2
     assert records.find(judged.work_of(off, agenda)).state == "failed"
     assert judged.rows_of([off], run, agenda, records) == [failed] and len(done) == 2
+
+
+def test_a_check_that_is_kept_though_it_is_out_of_date_says_so(tmp_path):
+    plan = Plan(
+        preset=find_preset("smoke"), suites=("validation",), cells=(), checks=(), cases=(), train=(), test=(),
+        seeds=(0,), device="cpu", folder=tmp_path, command="",
+    )  # fmt: skip
+    agenda, check = Agenda(plan), next(c for c in CHECKS if c.smoke)
+    judged.rows_of([check], run_check, agenda, Records(RunFolder(tmp_path)))
+    finer = dataclasses.replace(check, tolerance=1e-30)
+    only = Records(RunFolder(tmp_path), only=("missing",))
+    (row,) = judged.rows_of([finer], run_check, agenda, only)
+    assert row.status == "ok" and row.reason == "kept though declared changed"
 
 
 def test_every_check_and_case_has_an_identity_of_its_own(tmp_path):
@@ -96,10 +112,36 @@ def test_a_study_is_done_once_and_again_when_what_it_reads_is_another(tmp_path):
     assert "counting [validation]: run (stale: read)" in describe(plan)
     assert judged.rows_of_study(study, agenda, records, None) == first and len(done) == 2
     longer = dataclasses.replace(plan, preset=dataclasses.replace(plan.preset, frames=21))
+    stale = judged.rows_of_study(study, Agenda(longer), records, None)
+    assert [row.status for row in stale] == ["skipped"] and "kept though" in stale[0].reason
+    assert len(done) == 2  # a study is not built upon a roll-out that is out of date
+    only = dataclasses.replace(longer, only=frozenset({"missing"}))
+    kept = judged.rows_of_study(study, Agenda(longer), Records(RunFolder(tmp_path), only=only.only), None)
+    assert [row.value for row in kept] == [row.value for row in first]
+    assert all("kept though" in row.reason for row in kept) and "far away" in kept[1].reason
+    records.path(judged.work_of_study(study, Agenda(longer), records)).unlink()
+    assert "counting [validation]: skip (not built upon cell dressed-kick/simulation" in describe(only)
+    assert "counting [validation]: run (missing)" in describe(longer)
+    records.keep(Agenda(longer).cell(cell), {}, seconds=0.0)
     judged.rows_of_study(study, Agenda(longer), records, None)
     assert len(done) == 3
     left_out = Records(RunFolder(tmp_path / "new"), only=("failed",))
     assert judged.rows_of_study(study, agenda, left_out, None) == [] and len(done) == 3
+
+
+@pytest.mark.parametrize("name", ["dependence", "hard_motions"])
+def test_a_study_depends_on_what_it_reaches_by_name(name, tmp_path, monkeypatch):
+    study = next(study for study in STUDIES if study.name == name)
+    plan = Plan(
+        preset=find_preset("smoke"), suites=(), cells=(), checks=(), cases=(), train=(), test=(), seeds=(0,),
+        device="cpu", folder=tmp_path, command="",
+    )  # fmt: skip
+    agenda, records = Agenda(plan), Records(RunFolder(tmp_path))
+    work = judged.work_of_study(study, agenda, records)
+    assert {"benchmarks/scenes/dressed_body.py", "benchmarks/methods/skinning.py"} < set(work.code)
+    monkeypatch.setattr(judged, "DEFAULT", dataclasses.replace(DEFAULT, smoothing=DEFAULT.smoothing + 1))
+    other = judged.work_of_study(study, agenda, records)
+    assert [part for part in work.parts if other.parts[part] != work.parts[part]] == ["recipe"]
 
 
 def test_every_study_says_what_it_reads():

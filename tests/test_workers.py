@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import signal
 
+from benchmarks import workers
 from benchmarks.records import Records, Work
 from benchmarks.results import RunFolder
 from benchmarks.workers import Failure, Job, run_jobs
@@ -19,6 +22,17 @@ def test_workers_give_results_in_order_and_a_failure_as_a_value():
     first, second, third = run_jobs(jobs, "held", title="adding", unit="sum")
     assert first == ("held", 3) and third == ("held", 7)
     assert isinstance(second, Failure) and second.label == "two" and "TypeError" in second.reason
+
+
+def die_telling(wardrobe, tell):
+    workers._progress._wlock.acquire()  # as in the midst of a report
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_worker_that_was_killed_while_it_reported_keeps_no_other_waiting():
+    jobs = [Job("dies", die_telling, (), 1), Job("tells", add, (3, 4), 1)]
+    died, told = run_jobs(jobs, "held", title="adding", unit="sum", workers=1)
+    assert isinstance(died, Failure) and "SIGKILL" in died.reason and told == ("held", 7)
 
 
 @dataclasses.dataclass
