@@ -103,14 +103,14 @@ class Cells:
     def _with_many(self, outcome: Outcome) -> Outcome:
         """The outcome with the time of many bodies at once.
 
-        Where there is no room or time for so many, its run stands. A time that cannot be believed takes the
-        cell with it.
+        Whatever goes wrong with so many, its run stands. But a time that cannot be believed takes the cell
+        with it: a method that works on behind the clock did so in its run too.
         """
         many = self._guarded(perform_many, outcome.cell)
         if many.status == "ok":
             return dataclasses.replace(outcome, batch_seconds=many.batch_seconds)
         reason = f"many at once: {many.status}: {many.reason}"
-        if many.status in ("out-of-memory", "timeout"):
+        if many.batch_seconds is None:
             return dataclasses.replace(outcome, reason=outcome.reason or reason)
         self._clear(outcome.cell)
         return Outcome(outcome.cell, "failed", reason)

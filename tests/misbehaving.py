@@ -39,7 +39,7 @@ class Misbehaving:
     def ready_batch(self, copies: int):
         """Many at once: "greedy" takes a third of a gigabyte, "crowded" leaves the work to a thread.
 
-        "crammed" is killed for it.
+        "crammed" is killed for it, "torn" raises.
         """
 
         def compute() -> np.ndarray:
@@ -48,6 +48,8 @@ class Misbehaving:
                 np.ones(40_000_000).sum()
             if self.how == "crammed":
                 self._killed(still)
+            if self.how == "torn":
+                raise RuntimeError("no two bodies")
             if self.how == "crowded":
                 self._early(still)
             return still

@@ -14,7 +14,7 @@ import pytest
 
 from benchmarks import methods, run, stages
 from benchmarks.agenda import Agenda
-from benchmarks.cell import Outcome
+from benchmarks.cell import Outcome, failed
 from benchmarks.cells import Cells
 from benchmarks.outlook import describe
 from benchmarks.plan import Cell, Plan
@@ -134,17 +134,28 @@ def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_pa
     misbehaving("crowded")
     crowded = outcome_of(plan)
     assert crowded.status == "failed" and "many at once" in crowded.reason
+    assert "cannot be believed" in crowded.reason
     assert not crowded.recorded and not list(tmp_path.rglob("*.vtkhdf"))
 
 
-def test_what_a_cell_has_run_stands_where_there_is_no_room_for_many(tmp_path, misbehaving):
+@pytest.mark.parametrize(
+    ("how", "words"), [("crammed", ("out-of-memory", "SIGKILL")), ("torn", ("failed", "no two bodies"))]
+)
+def test_what_a_cell_has_run_stands_where_many_go_wrong(how, words, tmp_path, misbehaving):
     plan = plan_of(tmp_path, "newton-1")
-    misbehaving("crammed")
+    misbehaving(how)
     outcome = outcome_of(plan)
     assert (outcome.status, outcome.recorded, outcome.batch_seconds) == ("ok", True, None)
-    assert "many at once: out-of-memory" in outcome.reason and "SIGKILL" in outcome.reason
+    assert f"many at once: {words[0]}" in outcome.reason and words[1] in outcome.reason
     assert RunFolder(tmp_path).trajectory_path("free_fall", "newton-1").is_file()
     assert harness(plan).first(plan.cells[0], None) == outcome
+
+
+def test_torch_says_in_a_plain_error_that_there_is_no_room(tmp_path):
+    said = "[enforce fail at alloc_cpu.cpp:117] err == 0. DefaultCPUAllocator: can't allocate memory"
+    cell = plan_of(tmp_path, "newton-1").cells[0]
+    assert failed(cell, RuntimeError(said)).status == "out-of-memory"
+    assert failed(cell, RuntimeError("no such memory")).status == "failed"
 
 
 # --- reuse -----------------------------------------------------------------------------------------------
@@ -169,6 +180,10 @@ def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path
 
     RunFolder(tmp_path).trajectory_path("free_fall", "simulation").unlink()
     assert Records(RunFolder(tmp_path)).find(Agenda(plan).cell(plan.cells[0])).state == "missing"
+    gone = harness(dataclasses.replace(plan, only=frozenset({"failed"})))
+    left_out = gone.first(plan.cells[0], None)
+    assert (left_out.status, left_out.recorded, gone.reused) == ("skipped", False, [])
+    assert "left out" in describe(dataclasses.replace(plan, only=frozenset({"failed"})))
 
 
 def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path, misbehaving):
