@@ -9,13 +9,15 @@ from __future__ import annotations
 import csv
 import importlib
 import json
-import multiprocessing
+import os
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from .guarded import Broken, Guarded
 from .results import replacing
+from .workers import one_line
 
 Row = tuple[str, object, str]  # metric, value, unit
 COLUMNS = ("part", "case", "metric", "value", "unit")
@@ -35,50 +37,74 @@ def chosen(words: str, parts: Mapping[str, str]) -> list[str]:
     return names
 
 
-def measure_parts(package: str, parts: Sequence[str], settings: Any) -> list[dict[str, object]]:
-    """All rows of those parts of the package, each printed when it is there. A case that fails, or whose
-    process dies, is a row with metric "failed".
+def make_folder(folder: Path) -> None:
+    """Make the folder of the results, before anything is measured. Raises ValueError where that fails."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise ValueError(f"--out {folder}: cannot be made ({reason}); name another folder") from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise ValueError(f"--out {folder}: cannot be written to; name another folder")
+
+
+def run_parts(
+    package: str, parts: Sequence[str], settings: Any, folder: Path | None, *, device: str = "cpu",
+    **facts: Any,
+) -> int:  # fmt: skip
+    """Measure those parts of the package, and write their rows into the folder, where one is named.
+
+    Returns the exit status: 1 when a case failed, 130 after an interrupt. What was measured until then, or
+    until anything raised, is written all the same, and said to be incomplete.
     """
     rows: list[dict[str, object]] = []
+    complete = False
+    try:
+        for row in measure_parts(package, parts, settings):
+            rows.append(row)
+        complete = True
+    except KeyboardInterrupt:
+        kept = f"; {len(rows)} rows lie in {folder}" if folder is not None and rows else ""
+        print(f"{package}: interrupted{kept}", file=sys.stderr)
+        return 130
+    finally:
+        if folder is not None and rows:
+            write(folder, package.rpartition(".")[2], rows, device=device, complete=complete, **facts)
+    return int(any(row["metric"] == "failed" for row in rows))
+
+
+def measure_parts(package: str, parts: Sequence[str], settings: Any) -> Iterator[dict[str, object]]:
+    """The rows of those parts of the package, each printed when it is there. A case that fails, or whose
+    process dies, is a row with metric "failed".
+    """
     for part in parts:
         module = f"{package}.{part}"
         for case in importlib.import_module(module).CASES:
             for metric, value, unit in _in_own_process(module, case, settings):
                 value = float(f"{value:.4g}") if isinstance(value, float) else value
                 print(f"{part:<11} {case:<30} {metric:<34} {value} {unit}", flush=True)
-                rows.append(dict(zip(COLUMNS, (part, case, metric, value, unit))))
+                yield dict(zip(COLUMNS, (part, case, metric, value, unit)))
+
+
+def _in_own_process(module: str, case: str, settings: Any) -> list[Row]:
+    with Guarded() as worker:
+        try:
+            rows: list[Row] = worker.call(_report, module, case, settings, seconds=None)
+        except Broken as broken:
+            rows = [("failed", str(broken), "")]
     return rows
 
 
-def failed(rows: Sequence[Mapping[str, object]]) -> bool:
-    """Whether any case did."""
-    return any(row["metric"] == "failed" for row in rows)
-
-
-def _in_own_process(module: str, case: str, settings: Any) -> Iterator[Row]:
-    context = multiprocessing.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    child = context.Process(target=_report, args=(module, case, settings, sender))
-    child.start()
-    sender.close()
-    try:
-        yield from receiver.recv()
-    except EOFError:
-        child.join()
-        yield "failed", f"the process ended with status {child.exitcode}", ""
-    child.join()
-
-
-def _report(module: str, case: str, settings: Any, sender: Connection) -> None:
-    """In the process of the case: measure it and send its rows, with the peak memory of the process."""
+def _report(module: str, case: str, settings: Any) -> list[Row]:
+    """In the process of the case: its rows, and the peak memory of the process."""
     from .cell import peak_memory
 
     measure: Callable[[str, Any], list[Row]] = importlib.import_module(module).measure
     try:
         rows = measure(case, settings)
     except Exception as error:
-        rows = [("failed", " ".join(f"{type(error).__name__}: {error}".split()), "")]
-    sender.send([*rows, ("peak memory of the process", peak_memory(), "MB")])
+        rows = [("failed", one_line(error), "")]
+    return [*rows, ("peak memory of the process", peak_memory(), "MB")]
 
 
 def write(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import os
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from benchmarks import parts
 from benchmarks.solver_speed import barrier, linear, peers
 from benchmarks.solver_speed.__main__ import PARTS, main
 from benchmarks.solver_speed.cholesky_packages import PACKAGES
@@ -48,6 +50,15 @@ def test_the_command_runs_a_case_in_its_own_process_and_writes_its_rows(tmp_path
     assert float(rows["peak memory of the process"]["value"]) > 1
     assert "CHOLMOD, METIS: factorise" in capsys.readouterr().out
     assert sorted(p.name for p in tmp_path.iterdir()) == ["solver_speed.csv", "solver_speed.json"]
+
+
+def die(*_):
+    os._exit(7)
+
+
+def test_a_case_whose_process_dies_is_a_row(monkeypatch):
+    monkeypatch.setattr(parts, "_report", die)
+    assert parts._in_own_process("linear", "one", None) == [("failed", "the process ended with status 7", "")]
 
 
 def test_frames_with_an_intersection_are_counted():

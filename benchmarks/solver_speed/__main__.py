@@ -1,7 +1,7 @@
 """python -m benchmarks.solver_speed: the simulator's own benchmark. Times are medians; compare ratios.
 
 Every part runs in a process of its own, one after another, so that its peak memory is its own and nothing
-runs beside it. Nothing here is asserted by a test: a time belongs to the machine that it was taken on.
+runs beside it. No test asserts a time: it belongs to the machine that it was taken on.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..clock import one_thread
-from ..parts import chosen, described, failed, measure_parts, write
+from ..parts import chosen, described, make_folder, run_parts
 
 PARTS = {
     "sheet": "64 x 64 sheet pinned at two corners, 30 frames: ms a frame, convergence, where the time goes",
@@ -33,7 +33,7 @@ EXAMPLES = """examples:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the parts asked for; 0 when all ran, 1 when one failed, 2 for a wrong word."""
+    """Run the parts asked for; 0 when all ran, 1 when one failed, 2 for a wrong word, 130 if interrupted."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.solver_speed",
         description="Benchmark of the reference simulator." + described(PARTS),
@@ -44,18 +44,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--repeats", type=int, default=5, metavar="N", help="runs of each case (default 5)")
     parser.add_argument("-o", "--out", metavar="DIR", help="also write solver_speed.csv and .json there")
     options = parser.parse_args(arguments)
+    folder = Path(options.out) if options.out else None
     try:
         parts = chosen(options.parts, PARTS)
         if options.repeats < 1:
             raise ValueError("--repeats: at least 1")
+        if folder is not None:
+            make_folder(folder)
     except ValueError as error:
         print(f"benchmarks.solver_speed: {error}", file=sys.stderr)
         return 2
     one_thread()
-    rows = measure_parts("benchmarks.solver_speed", parts, options.repeats)
-    if options.out:
-        write(Path(options.out), "solver_speed", rows)
-    return int(failed(rows))
+    return run_parts("benchmarks.solver_speed", parts, options.repeats, folder)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """python -m benchmarks.training_speed: how fast networks train and run, up to the paper's scale.
 
-Every case runs in a process of its own, one after another, on one thread. Nothing here is asserted by a test:
-a time belongs to the machine that it was taken on.
+Every case runs in a process of its own, one after another, on one thread. No test asserts a time: it belongs
+to the machine that it was taken on.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..clock import one_thread
-from ..parts import chosen, described, failed, measure_parts, write
+from ..parts import chosen, described, make_folder, run_parts
 from .settings import VALIDATION, Settings
 
 PARTS = {
@@ -22,16 +22,17 @@ PARTS = {
 }
 EXAMPLES = """examples:
   python -m benchmarks.training_speed                               everything (a quarter of an hour on a CPU)
-  python -m benchmarks.training_speed --parts inference --repeats 20
+  python -m benchmarks.training_speed --parts inference --repeats 20 -o reports/runs/inference
   python -m benchmarks.training_speed --device cuda -o reports/runs/training_speed_gpu
   python -m benchmarks.training_speed --parts convergence --steps 60000      preset paper's length
 
+The results in a folder are those of its last run alone. An interrupt leaves the rows measured until then.
 A convergence that was killed goes on from its last checkpoint when the same command is given again.
 python -m reports.convergence DIR draws its curve."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the parts asked for; 0 when all ran, 1 when one failed, 2 for a wrong word."""
+    """Run the parts asked for; 0 when all ran, 1 when one failed, 2 for a wrong word, 130 if interrupted."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.training_speed",
         description="Benchmark of training and of trained networks." + described(PARTS),
@@ -60,15 +61,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             device=find_device(options.device).type, repeats=options.repeats, steps=options.steps,
             folder=folder,
         )  # fmt: skip
+        make_folder(folder)
     except ValueError as error:
         print(f"benchmarks.training_speed: {error}", file=sys.stderr)
         return 2
-    rows = measure_parts("benchmarks.training_speed", parts, settings)
-    write(
-        folder, "training_speed", rows, device=settings.device, configuration=_configuration(parts, settings)
-    )
+    status = run_parts(
+        "benchmarks.training_speed", parts, settings, folder, device=settings.device,
+        configuration=_configuration(parts, settings),
+    )  # fmt: skip
     print(folder.resolve())
-    return int(failed(rows))
+    return status
 
 
 def _configuration(parts: Sequence[str], settings: Settings) -> dict[str, object]:

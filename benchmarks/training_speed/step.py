@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..parts import Row
+from ..presets import find_preset
 from .settings import Settings, dressed_body, kind_and_vertices, training_motions
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 CASES = tuple(f"{kind}, {n}" for kind in ("snug", "supervised", "pbns") for n in (500, 1000, 2000, 4400))
 WARM_UP, BLOCK = 20, 20  # steps before the clock starts, and of each block that is timed
-PAPER_STEPS = 60_000  # of preset paper
+PAPER_STEPS = find_preset("paper").steps_of("snug")
 
 
 def measure(case: str, settings: Settings) -> list[Row]:
