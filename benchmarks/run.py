@@ -28,7 +28,7 @@ from .plan import (
 )
 from .presets import PRESETS, find_preset
 from .records import DEFAULT_ONLY, STATES
-from .results import RunFolder
+from .results import ResultsError, RunFolder
 from .workers import worker_count
 
 PROGRAM = "benchmarks.run"
@@ -55,7 +55,8 @@ a folder that holds a run is gone on with: what is finished there for the same i
 exit status: 0 when every cell ended as ok or as an explained skip (in extremes an honest failure with
   its reason is an accepted outcome); 1 when a cell, a training or a simulation failed: a line says why
   and the rest went on; 2 when the request cannot be met, also where another run is going on in the
-  folder: one line says why and nothing is left behind."""
+  folder: one line says why and nothing is left behind; 130 when it was interrupted: what had ended is
+  in the folder, whole, and the same command goes on from there."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -238,12 +239,21 @@ def choose_folder(out: str | None) -> Path:
             raise PlanError(f"--out {out}: is a file; name a folder")
         if folder.is_dir() and any(folder.iterdir()) and not RunFolder(folder).config_path.is_file():
             raise PlanError(f"--out {out}: is not empty and holds no run; name a new folder")
+        if RunFolder(folder).config_path.is_file():
+            _check_run(folder)
     parent = folder
     while not parent.exists():
         parent = parent.parent
     if not (parent.is_dir() and os.access(parent, os.W_OK | os.X_OK)):
         raise PlanError(f"--out {folder}: {parent} cannot be written to; name another folder")
     return folder
+
+
+def _check_run(folder: Path) -> None:
+    try:
+        RunFolder(folder).read_config()
+    except ResultsError as error:
+        raise PlanError(f"--out {error}; name another folder, or put that file right") from None
 
 
 if __name__ == "__main__":

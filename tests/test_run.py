@@ -60,6 +60,13 @@ def test_nothing_heavy_is_loaded_before_there_is_something_to_do(word, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_help_names_every_exit_status(capsys):
+    with pytest.raises(SystemExit):
+        run.main(["--help"])
+    said = capsys.readouterr().out.partition("exit status: ")[2]
+    assert all(f"{status} when " in said for status in (0, 1, 2, 130))
+
+
 def test_the_list_names_everything(capsys):
     assert run.main(["--list"]) == 0
     words = capsys.readouterr().out
@@ -90,6 +97,7 @@ def test_the_list_names_everything(capsys):
         (["--device", "tpu"], "cpu or cuda"),
         (["--out", "broken.npz"], "is a file"),
         (["--out", "full"], "holds no run"),
+        (["--out", "torn"], "torn/run.json: not readable"),
         (["--only", "finished"], "failed, stale, missing"),
         (["--only", "failed", "--fresh"], "leave out"),
         (["--workers", "0"], "1 or more"),
@@ -104,6 +112,8 @@ def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monk
     (tmp_path / "folder").mkdir()
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "note.txt").write_text("mine")
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "run.json").write_text('{"command": ')
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("benchmarks.stages.execute", lambda plan: pytest.fail("the run was begun"))
