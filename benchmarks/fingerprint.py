@@ -64,7 +64,10 @@ def code_of(*modules: str) -> dict[str, str]:
 
 
 def preset_values(preset: Preset, code: Iterable[str]) -> dict[str, Any]:
-    """The values of the preset that those files read; all of them where one hands the preset on unread."""
+    """The values of the preset that those files read, as attributes of what is called or declared a preset.
+
+    A file that hands the preset on unread reads none: what it is handed to is among the files itself.
+    """
     names = set().union(*(_source(path)[2] for path in code))
     return {f.name: getattr(preset, f.name) for f in dataclasses.fields(preset) if f.name in names}
 

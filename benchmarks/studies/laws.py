@@ -1,8 +1,8 @@
 """Which physical laws each roll-out on an unseen motion keeps, frame by frame, read from its file.
 
-Rows "law/..." of each method and dressed scene are reported. Three checks judge the simulation alone, at its
-worst frame: it must keep what nobody asks of a network. A run without dressed cells leaves nothing to read:
-one skipped row says so.
+Rows "law/..." of each method and dressed scene are reported, but of scenes whose garment has pins: nobody
+knows the forces on those. Three checks judge the simulation alone, at its worst frame: it must keep what
+nobody asks of a network. A run that leaves nothing to read has one skipped row, which says so.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ JUDGED = (
     ("simulation_energy", "rise", "J", 1e-9),
     ("simulation_residual", "residual", "vertex weights", 1e-6),
 )
-NOTHING = "no roll-out on a dressed body in this run: laws are read from the files of suite garments"
+NOTHING = "this run has no roll-out on a body without pins: laws are read from the files of suite garments"
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Kept:
 
 
 def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
-    """Reported rows of every method and dressed scene, then the judged rows of the simulation."""
+    """Reported rows of every method and dressed scene without pins, then the simulation's judged rows."""
     found: list[Row] = []
     references: list[Kept] = []
     for scene in (scene for scene in plan.scenes if scene.dressed) if wardrobe is not None else ():
@@ -50,7 +50,7 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
         paths = [folder.trajectory_path(scene.name, cell.method, cell.seed) for cell in cells]
         if any(path.is_file() for path in paths):
             built = scene.build(plan.preset, wardrobe)
-            if not len(built.cloth.pins):  # nobody knows the forces on those
+            if not len(built.cloth.pins):
                 found += _of_scene(built, cells, folder, references)
     if references:
         found += [judged(*check, references) for check in JUDGED]
