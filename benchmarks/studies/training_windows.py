@@ -11,6 +11,7 @@ terms (a window of three has one inertia), contact searched anew for every frame
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -63,8 +64,12 @@ def _judged(
         "train/high_windows": (float(model.summary["high_windows"]), "1"),
         "train/step": (1e3 * model.seconds / model.steps, "ms"),
     }
-    for metric, (value, unit) in numbers.items():
-        yield Row(SUITE, SCENE, name, seed, metric, unit, value, dtype="float32")
+    for metric, (number, unit) in numbers.items():
+        if math.isfinite(number):
+            yield Row(SUITE, SCENE, name, seed, metric, unit, number, dtype="float32")
+        else:
+            reason = f"its mean is {number}"
+            yield Row(SUITE, SCENE, name, seed, metric, unit, None, "diverged", reason, dtype="float32")
 
 
 def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any]) -> tuple[float, float]:
