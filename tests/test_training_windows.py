@@ -45,13 +45,15 @@ def test_a_run_without_a_network_has_no_windows_to_look_at():
     assert rows(SimpleNamespace(models=(), train=("walk",)), RunFolder(Path()), wardrobe) == []
 
 
-def test_what_was_judged_before_leaves_no_trace():
+def test_what_was_judged_before_leaves_no_trace(monkeypatch):
     trainer = Trainer("snug", tube_dress(), MOTIONS, steps=1, seed=0, recipe=replace(DEFAULT, mixed=0.0))
     batch = trainer.data.batch(np.arange(4), None)
-    x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.05])  # deep inside
+    x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.08])  # deep inside
     first = _loss(trainer, batch, x)
-    _loss(trainer, batch, x + torch.tensor([0.1, 0.0, 0.1]))  # anchors elsewhere
+    _loss(trainer, batch, x + torch.tensor([0.0, 0.1, 0.0]))  # its anchors are no good for x
     assert _loss(trainer, batch, x) == first
+    monkeypatch.setattr(trainer.contact, "search", None)  # vertices that are nowhere have no closest points
+    assert np.isnan(_loss(trainer, batch, torch.nan * x))
 
 
 def test_rows_are_those_of_networks_that_energies_taught(tmp_path):

@@ -102,6 +102,8 @@ def _loss(trainer: Any, batch: Batch, x: Tensor) -> float:
     import numpy as np
     import torch
 
+    if not torch.isfinite(x).all():
+        return math.nan  # such vertices have no closest points
     planes = None
     if trainer.contact:
         posed = trainer.contact.posed(batch)
