@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from run_folder import FRAMES, row, sheet, write_mesh
+from report_folder import FRAMES, row, sheet, write_mesh
 
 from reference_sim import Trajectory
 from reports import figures, hem, palette, vtkhdf, work_precision

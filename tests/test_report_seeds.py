@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from run_folder import row
+from report_folder import row
 from scipy import stats
 
 from benchmarks.methods import METHODS

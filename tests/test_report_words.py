@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from run_folder import SCENES, all_rows, row, skipped
+from report_folder import SCENES, all_rows, row, skipped
 
 from reports import numbers, tables, words
 from reports.document import document, merged

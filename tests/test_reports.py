@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from run_folder import FRAMES, METHODS, SCENES, TERMS, all_rows, sheet, write_mesh, write_model
+from report_folder import FRAMES, METHODS, SCENES, TERMS, all_rows, sheet, write_mesh, write_model
 
 from benchmarks.results import RunFolder
 from reports import build, render, training
