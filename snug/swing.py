@@ -72,7 +72,10 @@ class SwingTeacher:
             )
         self.mean = flat.mean(0)
         _, widths, directions = torch.linalg.svd(flat - self.mean, full_matrices=False)
-        self.directions = directions[: recipe.swing_components]  # (K, 3V)
+        # In rows, as a checkpoint keeps them: a product of another layout rounds otherwise.
+        self.directions = directions[: recipe.swing_components].clone(
+            memory_format=torch.contiguous_format
+        )  # (K, 3V)
         # Where a garment swings in fewer ways than there are components, the rest is round-off.
         widths = widths[: recipe.swing_components].clamp(min=1e-4 * float(widths[0]))
         self.spread = widths / len(flat) ** 0.5  # (K,) [m]
