@@ -9,7 +9,7 @@ from ..methods.learned import LEARNED
 METHODS = ("simulation", "skinning", "untrained", "snug", "supervised", "pbns")
 SWINGING = ("tunic", "skirt")
 # Only where methods are named, or at a preset that holds all.
-FURTHER = (*(entry.name for entry in LEARNED), "lbfgs-5", "lbfgs-10")
+FURTHER = (*(entry.name for entry in LEARNED), "simulation-moved", "lbfgs-5", "lbfgs-10")
 
 
 def scenes(
