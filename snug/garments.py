@@ -213,7 +213,7 @@ RANGES = {
 
 def _demand_in_range(name: str, parameters: Mapping[str, float]) -> None:
     for parameter, value in parameters.items():
-        low, high, unit = RANGES.get(f"{name} {parameter}", RANGES.get(parameter, ()))
+        low, high, unit = RANGES.get(f"{name} {parameter}") or RANGES[parameter]
         if not (np.isfinite(value) and low <= value <= high):
             raise GarmentError(
                 f"{parameter}={value}: a {name} can be tailored from {low:g} to {high:g}{unit}"
