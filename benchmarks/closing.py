@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from .clock import SPREAD
-from .curves import REMARK
-from .results import Row
+from .results import NOT_FALLING, Row
 
 COLUMNS = (
     ("energy/total", "total J"),
@@ -50,7 +49,7 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
     wide = [f"{cell} ({percent:.0f} %)" for cell, percent in spreads.items() if percent > 100.0 * SPREAD]
     if wide:
         lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {', '.join(wide)}")
-    rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(REMARK)]
+    rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(NOT_FALLING)]
     if rising:
         lines.append(f"more iterations or a smaller tolerance, and a larger gap: {', '.join(rising)}")
     return lines

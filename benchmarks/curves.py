@@ -10,10 +10,9 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 
 from .methods import METHODS
-from .results import Row
+from .results import NOT_FALLING, Row
 
 METRIC = "gap/relative"
-REMARK = "the error does not fall here"
 
 
 def _families() -> dict[str, tuple[str, ...]]:
@@ -63,7 +62,7 @@ def rises(gaps: Mapping[str, float]) -> dict[str, str]:
             if (gap := gaps.get(method)) is None:
                 continue
             if gap > max(lowest[1], ROUND_OFF):
-                remarks[method] = f"{REMARK}: {lowest[0]}, the coarser one, has a gap of {lowest[1]:.2g}"
+                remarks[method] = f"{NOT_FALLING}: {lowest[0]}, the coarser one, has a gap of {lowest[1]:.2g}"
             if gap < lowest[1]:
                 lowest = method, gap
     return remarks

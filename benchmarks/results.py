@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+NOT_FALLING = "the error does not fall here"  # how the reason of such a row begins, see benchmarks.curves
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
 
 COLUMNS = (

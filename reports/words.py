@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from benchmarks.results import Row
+from benchmarks.results import NOT_FALLING, Row
 from reports import findings as paper_findings
 from reports import palette
 from reports.ablations import JUDGED, judged_ablations
@@ -37,6 +37,7 @@ def findings(rows: Sequence[Row]) -> list[tuple[str, str]]:
         ("Ablations", left_out(rows)),
         ("The paper's findings", judged(rows)),
         *answers(rows),
+        ("Where it rises", rising(rows)),
         ("Validation", checks(rows)),
         ("Laws", laws(rows)),
         ("Extremes", outcomes(rows)),
@@ -207,6 +208,16 @@ def outcomes(rows: Sequence[Row]) -> str:
     text = f"{counts.pop('ok', 0)} of {len(ran)} cases converged"
     rest = [f"{count} {status}" for status, count in counts.items()]
     return text + (f"; {_listed(rest)}." if rest else ".")
+
+
+def rising(rows: Sequence[Row]) -> str:
+    """Where more iterations or a smaller tolerance end with a larger gap: why, see benchmarks.curves."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        if row.metric == "gap/relative" and row.reason.startswith(NOT_FALLING):
+            found.setdefault(row.scene, []).append(f"{name(row.method)} ({number(row.value)})")
+    scenes = "; ".join(f"{scene}: {', '.join(methods)}" for scene, methods in found.items())
+    return f"A gap above that of a coarser member of the family: {scenes}." if scenes else ""
 
 
 def trouble(rows: Sequence[Row]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from report_folder import SCENES, all_rows, row, skipped
 
+from benchmarks.results import NOT_FALLING
 from reports import numbers, tables, words
 from reports.document import document, merged
 from reports.layout import table_block
@@ -135,3 +136,14 @@ def test_sections_exist_only_for_what_ran():
 def test_no_number_of_the_report_is_infinite_or_nan():
     content = document({}, all_rows(), tables.make_tables(all_rows()), [], [])
     assert not re.search(r"\b(nan|inf|NaN|None)\b", json.dumps(content, allow_nan=False))
+
+
+def test_words_say_where_more_iterations_end_with_a_larger_gap():
+    gaps = (
+        ("lbfgs-5", 0.2, ""),
+        ("lbfgs-10", 0.3, f"{NOT_FALLING}: lbfgs-5 has 0.2"),
+    )
+    rows = [row("flag", method, "gap/relative", v, suite="speed", reason=why) for method, v, why in gaps]
+    found = dict(words.findings(rows))["Where it rises"]
+    assert "flag: L-BFGS, 10 iterations (0.300)" in found and "5 iterations" not in found
+    assert "Where it rises" not in dict(words.findings(rows[:1]))

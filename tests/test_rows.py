@@ -11,13 +11,12 @@ from benchmarks import provenance
 from benchmarks.cell import Outcome, frames_computed, judge
 from benchmarks.clock import Reading
 from benchmarks.closing import remarks, summary
-from benchmarks.curves import REMARK
 from benchmarks.methods import METHODS
 from benchmarks.named_metrics import UNITS, unit_of
 from benchmarks.plan import Cell, Plan
 from benchmarks.presets import find_preset
 from benchmarks.record import Record
-from benchmarks.results import Row
+from benchmarks.results import NOT_FALLING, Row
 from benchmarks.rows import rows_of
 from benchmarks.scenes import SMALL_SCENES, dressed_scene
 from benchmarks.stages import accepted
@@ -129,7 +128,7 @@ def test_the_remarks_name_repeats_that_lie_apart_gaps_that_rise_and_what_is_out_
     base = Row("speed", "flag", "newton-1", 0, "cost/spread", "%", 12.0)
     late = dataclasses.replace(base, method="lbfgs-5", value=31.0, status="stalled", reason="2 of 4 frames")
     tight = dataclasses.replace(base, status="stalled", reason="2 of 4 frames")
-    gap = dataclasses.replace(base, method="vbd-20", metric="gap/relative", reason=f"{REMARK}: so")
+    gap = dataclasses.replace(base, method="vbd-20", metric="gap/relative", reason=f"{NOT_FALLING}: so")
     said = remarks([tight, late, gap], 3, {"flag x snug": "preset"})
     assert [line for line in said if "flag x newton-1" in line] == [] and len(said) == 4
     assert said[0].startswith("3 results") and said[1] == "flag x snug: kept though preset changed"
