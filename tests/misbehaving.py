@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.guarded import Guarded
 from reference_sim.trajectory import Trajectory
 
 
@@ -84,3 +85,15 @@ class Misbehaving:
 
 def make(*, models: Path, seed: int, how: str) -> Misbehaving:
     return Misbehaving(how)
+
+
+def interrupt_at(method: str, monkeypatch) -> None:
+    """Whoever runs cells is interrupted from the keyboard when that method's turn has come."""
+    perform = Guarded.call
+
+    def call(self, function, task, **rest):
+        if task.cell.method == method:
+            raise KeyboardInterrupt
+        return perform(self, function, task, **rest)
+
+    monkeypatch.setattr(Guarded, "call", call)

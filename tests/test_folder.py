@@ -11,12 +11,12 @@ import time
 from pathlib import Path
 
 import pytest
+from misbehaving import interrupt_at
 from test_cells import TINY, harness, of_session, outcome_of, plan_of
 
 from benchmarks import run, stages
 from benchmarks.agenda import Agenda
 from benchmarks.cell import Outcome
-from benchmarks.guarded import Guarded
 from benchmarks.outlook import describe
 from benchmarks.plan import Cell, Network
 from benchmarks.record import Record
@@ -182,18 +182,11 @@ def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path
     words = words_of(tmp_path, "simulation,newton-4")
     assert run.main(words) == 0
     before = RunFolder(tmp_path).read_rows()
-    perform = Guarded.call
-
-    def call(self, function, task, **rest):
-        if task.cell.method == "newton-1":
-            raise KeyboardInterrupt
-        return perform(self, function, task, **rest)
-
-    monkeypatch.setattr(Guarded, "call", call)
     (tmp_path / "records" / "metrics" / "free_fall" / "newton-4.json").unlink()
-    assert run.main(words_of(tmp_path, "simulation,newton-1,newton-4")) == 130
+    with monkeypatch.context() as patch:
+        interrupt_at("newton-1", patch)
+        assert run.main(words_of(tmp_path, "simulation,newton-1,newton-4")) == 130
     assert RunFolder(tmp_path).read_rows() == [row for row in before if row.method == "simulation"]
-    monkeypatch.setattr(Guarded, "call", perform)
     assert run.main(words) == 0 and RunFolder(tmp_path).read_rows() == before
 
 

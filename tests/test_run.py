@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from misbehaving import interrupt_at
 
 from benchmarks import methods, run
-from benchmarks.guarded import Guarded
 from benchmarks.methods import METHODS
 from benchmarks.plan import PlanError
 from benchmarks.results import RunFolder
@@ -164,14 +164,7 @@ def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, caps
 
 
 def test_an_interrupt_leaves_what_was_finished(tmp_path, monkeypatch, capsys):
-    perform = Guarded.call
-
-    def call(self, function, task, **rest):
-        if task.cell.method == "newton-1":
-            raise KeyboardInterrupt
-        return perform(self, function, task, **rest)
-
-    monkeypatch.setattr(Guarded, "call", call)
+    interrupt_at("newton-1", monkeypatch)
     out = tmp_path / "run"
     words = ["--preset", "smoke", "--scenes", "free_fall", "--suite", "speed", "-o", str(out)]
     assert run.main([*words, "--methods", "simulation,newton-1"]) == 130
