@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from snug.contact import PARTS, Anchors, Patch
+from snug.sliding import CROSSINGS, SLACK
 
 NEAREST = 3  # body vertices whose faces are tried for each sample
 CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances
@@ -34,6 +35,7 @@ class TensorAnchors:
             torch.as_tensor(array, device=device)
             for array in (patch.rest, patch.centroids, patch.sample_rest)
         )
+        self.beyond = torch.as_tensor(patch.beyond, device=device).long()  # (Q, 3)
         self.around = torch.as_tensor(
             _incident(patch.faces), device=device
         )  # (P, K) faces, -1 beyond the last
@@ -65,17 +67,54 @@ class TensorAnchors:
         directions = (weights * normals[row, corners]).sum(-2)
         return points, directions / (torch.linalg.vector_norm(directions, dim=-1, keepdim=True) + 1e-30)
 
-    def renew(self, frame: int, points: Tensor, positions: Tensor, *, forget: bool = False) -> None:
+    def slide(
+        self, samples: Tensor, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor, *,
+        reach: float,
+    ) -> None:  # fmt: skip
+        """Anchors of frames (N,) go to where snug.sliding.slid takes them for samples (N, S, 3): those of
+        samples less than `reach` and SLACK above their planes. positions, normals: see `planes`.
+        """
+        points, directions = self.planes(frames, rows, positions, normals)
+        near = ((samples - points) * directions).sum(-1) < reach + SLACK
+        place, sample = near.nonzero(as_tuple=True)
+        chosen = torch.as_tensor(frames, device=samples.device)[place]
+        row = torch.as_tensor(rows, device=samples.device)[place]
+        x, home = samples[place, sample], self.sample_rest[sample]
+        face = self.faces[chosen, sample].long()
+        last, moving = face, torch.ones_like(face, dtype=torch.bool)
+        for _ in range(CROSSINGS):
+            v, w = self._foot(face, row, positions, x)
+            weights = torch.stack([1 - v - w, v, w], -1)
+            side = weights.argmin(-1)
+            other = self.beyond[face, side]
+            far = (self.centroids[other] - home).square().sum(-1) > self.patch.region**2
+            moving = moving & (weights.amin(-1) < 0) & (other >= 0) & (other != last) & ~far
+            last, face = torch.where(moving, face, last), torch.where(moving, other, face)
+        a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
+        v, w = closest_on_triangle(b - a, c - a, x - a)
+        kept = v + w <= 2.0  # numbers
+        faces, parts = in_parts(face[kept], torch.stack([v, w], -1)[kept], self.faces.dtype)
+        self.faces[chosen[kept], sample[kept]] = faces
+        self.barycentric[chosen[kept], sample[kept]] = parts
+
+    def _foot(self, face: Tensor, row: Tensor, positions: Tensor, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Weights of the second and third corner at the foot of each point on the plane of its face."""
+        a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
+        s, t, r = b - a, c - a, x - a
+        ss, tt, st = (s * s).sum(-1), (t * t).sum(-1), (s * t).sum(-1)
+        sr, tr = (s * r).sum(-1), (t * r).sum(-1)
+        determinant = ss * tt - st * st
+        return (tt * sr - st * tr) / determinant, (ss * tr - st * sr) / determinant
+
+    def renew(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame. Brute force has no
-        use for old anchors, so that `forget` changes nothing.
+        use for old anchors, so that `exact` changes nothing.
         """
         for start in range(0, len(points), CHUNK):
             part = slice(start, start + CHUNK)
             faces, barycentric = self._searched(points[part], self.sample_rest[part], positions)
-            second = (PARTS * barycentric[:, :1]).round()
-            third = torch.minimum((PARTS * barycentric[:, 1:]).round(), PARTS - second)
-            self.faces[frame, part] = faces.to(self.faces.dtype)
-            self.barycentric[frame, part] = torch.cat([second, third], 1).to(torch.uint8)
+            kept = in_parts(faces, barycentric, self.faces.dtype)
+            self.faces[frame, part], self.barycentric[frame, part] = kept
         self.age[frame] = 0
 
     def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
@@ -93,6 +132,13 @@ class TensorAnchors:
         best = squared.argmin(1, keepdim=True)
         pick = [table.gather(1, best)[:, 0] for table in (faces, v, w)]
         return pick[0], torch.stack(pick[1:], -1)
+
+
+def in_parts(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:
+    """As snug.contact.kept: faces (S,) of a small type, barycentric (S, 2) as uint8."""
+    second = (PARTS * barycentric[:, :1]).round()
+    third = torch.minimum((PARTS * barycentric[:, 1:]).round(), PARTS - second)
+    return faces.to(kind), torch.cat([second, third], 1).to(torch.uint8)
 
 
 def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor]:

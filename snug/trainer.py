@@ -24,6 +24,7 @@ from snug.parallel import ALONE, Group, GroupError
 from snug.recipe import Recipe
 from snug.regressor import Regressor
 from snug.skinning import skin
+from snug.state_memory import StateMemory
 from snug.stopwatch import Stopwatch
 from snug.swing import SwingTeacher
 from snug.trained_model import find_kind, make_network
@@ -32,6 +33,7 @@ from snug.training_set import CPU, Batch, TrainingError, TrainingSet
 
 DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
 MOST_MIXED = 20_000  # frames: each keeps its body and its anchors, 0.1 MB at 1000 vertices and more above
+EVEN = 20  # parts of an epoch that each pass over all motions
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -92,6 +94,7 @@ class Trainer:
         self.teacher: SwingTeacher | None = None
         self.rehearsed = 0.0  # s
         self._be_taught(motions, trajectories)
+        self.memory = self._state_memory()
         self.guard = Guard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
 
@@ -110,11 +113,19 @@ class Trainer:
             self.dressed.cloth, recipe, dt=data.dt, device=self.device, kernels=self.kernels
         )
         self.contact = self.contact_of(data)
+        if self.contact:
+            self.contact.search_first(self.weights)
         if how.teacher:
             self.teacher = how.teacher(data, motions, trajectories, self.weights, recipe)
             begun = time.perf_counter()
             self.teacher.start(self.network, steps=recipe.rehearsal, sigma=recipe.h0_sigma, seed=self.seed)
             self.rehearsed = time.perf_counter() - begun
+
+    def _state_memory(self) -> StateMemory | None:
+        start = self.network.random_state(1, 0.0, torch.Generator())
+        if not (self.loss and self.recipe.remembered and isinstance(start, Tensor)):
+            return None
+        return StateMemory(self.data.first, (start.shape[0], start.shape[-1]), self.device)
 
     def contact_of(self, data: TrainingSet) -> TrainingContact | None:
         """Anchors for the frames of a set; None where the recipe has no collision."""
@@ -130,9 +141,17 @@ class Trainer:
         )
 
     def draw(self) -> np.ndarray:
-        """The next windows: every sub-sequence once, in random order, before any comes again."""
+        """The next windows: every sub-sequence once, in random order, before any comes again.
+
+        Each part of an epoch takes every twentieth frame of all motions: by chance alone a hard pose may come
+        so late that the network, by then sure of itself, meets it with joules.
+        """
         while len(self.order) < self.windows:
-            self.order = np.concatenate([self.order, self.random.permutation(len(self.data.starts))])
+            parts = [
+                self.random.permutation(np.arange(offset, len(self.data.starts), EVEN))
+                for offset in self.random.permutation(EVEN)
+            ]
+            self.order = np.concatenate([self.order, *parts])
             self.epoch += 1
         drawn, self.order = self.order[: self.windows], self.order[self.windows :]
         return drawn
@@ -150,6 +169,8 @@ class Trainer:
             mine = self.group.part(len(windows))
             state = self.start_state(len(windows), mine)
             batch = self.data.batch(windows[mine], None if betas is None else betas[mine])
+            if self.memory:
+                state = state + self.memory.at(batch.frames[:, 0])
         if self.loss is None:
             assert self.targets is not None
             with self.clock.part("forward"):
@@ -161,22 +182,27 @@ class Trainer:
 
     def _physics_step(self, number: int, windows: np.ndarray, batch: Batch, state: Any) -> dict[str, float]:
         assert self.loss is not None
-        x, offsets = self.predict(batch, state)
+        x, offsets, after = self.predict(batch, state)
         planes = posed = None
         if self.contact:
             with self.clock.part("contact"):
                 posed = self.contact.posed(batch)
-                planes = self.contact.planes(batch, posed)
+                planes = self.contact.planes(batch, posed, x)
         with self.clock.part("energies"):
             terms = self.loss(x, batch.ahead, planes)
             if self.contact and posed and self._searched_for_high(number, windows, posed, x, terms):
                 terms = self.loss(x, batch.ahead, self.contact.planes(batch, posed))
             if self.teacher:
                 terms["swing"] = self.teacher.swing(offsets, batch)
+        frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
+        if self.contact:
+            self.contact.share(frames)
         means, trusted = self._update(number, windows, terms)
+        if trusted and self.memory:
+            self.memory.keep(batch.frames[:, -1], after, self.group)
         if trusted and self.contact and posed:
             with self.clock.part("renewal"):
-                self.contact.renew(self.data.starts[windows][:, None] + np.arange(self.data.window), posed, x)
+                self.contact.renew(frames, posed, x)
         return means
 
     def _searched_for_high(
@@ -185,7 +211,7 @@ class Trainer:
         """Search the anchors of windows above the spike limit at once; whether there were any.
 
         An anchor from the T-pose, or of a garment that has moved on, can claim a contact that is none; so can
-        one that stood for being roughly right, hence they are forgotten. Not where most windows are high:
+        one that stood for being roughly right, hence the search is exact. Not where most windows are high:
         then it is the network that is lost, and its vertices are no guide.
         """
         assert self.contact is not None
@@ -197,7 +223,7 @@ class Trainer:
             return False
         frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
         places = (high[:, None] * self.data.window + np.arange(self.data.window)).ravel()
-        self.contact.search(places, frames, posed, x, forget=True)
+        self.contact.search(places, frames, posed, x, exact=True)
         return True
 
     def start_state(self, count: int, mine: slice) -> Any:
@@ -208,13 +234,15 @@ class Trainer:
         state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
         return None if state is None else state[:, mine]
 
-    def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Tensor]:
-        """Vertices relative to the pelvis, and offsets of the unposed garment, both (N, T, V, 3) [m]."""
+    def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Tensor, Any]:
+        """Vertices relative to the pelvis and offsets of the unposed garment, both (N, T, V, 3) [m], and the
+        state after them.
+        """
         with self.clock.part("forward"):
-            offsets, _ = self._callable(batch.features, state)
+            offsets, after = self._callable(batch.features, state)
         with self.clock.part("skinning"):
             posed_by = FastSkin.apply if self.kernels else skin
-            return posed_by(batch.rest + offsets, self.weights, batch.transforms), offsets
+            return posed_by(batch.rest + offsets, self.weights, batch.transforms), offsets, after
 
     def _set_rate(self, number: int) -> None:
         recipe, share = self.recipe, 1.0
@@ -254,6 +282,8 @@ class Trainer:
         """Everything that the next step depends on: tensors, and plain facts for a JSON header."""
         tensors = {name: tensor.detach() for name, tensor in live_tensors(self.network, self.optimiser)}
         tensors["order"], tensors["noise"] = torch.as_tensor(self.order.copy()), self.noise.get_state()
+        if self.memory:
+            tensors["memory"] = self.memory.states
         if self.teacher:
             tensors |= {f"teacher.{key}": tensor for key, tensor in self.teacher.state().items()}
         facts: dict[str, Any] = {"epoch": self.epoch, "random": self.random.bit_generator.state}
@@ -273,6 +303,8 @@ class Trainer:
             found = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
             self.optimiser.state[parameter] = {key: tensor.to(self.device) for key, tensor in found.items()}
         self.network.load_state_dict(part_of(tensors, "network"))
+        if self.memory:
+            self.memory.states.copy_(tensors["memory"])
         if self.teacher:
             self.teacher.resume(part_of(tensors, "teacher"))
         self.guard.resume(part_of(tensors, "guard"), facts["guard"])

@@ -83,6 +83,6 @@ class Validator:
         planes = None
         if self.contact:
             posed = self.contact.posed(batch)
-            self.contact.search(np.arange(batch.frames.size), batch.frames, posed, x, forget=True)
+            self.contact.search(np.arange(batch.frames.size), batch.frames, posed, x, exact=True)
             planes = self.contact.planes(batch, posed)
         return trainer.loss(x, batch.ahead, planes)

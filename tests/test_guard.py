@@ -119,7 +119,7 @@ def test_a_high_window_has_its_anchors_searched_before_it_is_judged(monkeypatch)
     searched, whole = [], anchors.renew
 
     def renew(frame, *rest, **how):
-        assert how["forget"], "the anchors of a high window are no guide"
+        assert how["exact"], "the anchors of a high window are no guide"
         searched.append(frame)
         whole(frame, *rest, **how)
 

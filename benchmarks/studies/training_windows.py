@@ -1,8 +1,9 @@
 """Does a network do in a whole roll-out what it was trained to do in windows of three frames?
 
-A window starts from a random state; a roll-out carries one state from the first frame of a motion on. Windows
-of every training motion are predicted both ways, and the training's own loss judges both: the same frames and
-terms (a window of three has one inertia), contact searched anew for every frame.
+A window starts from noise, added to the state of a roll-out where the recipe remembers that; a roll-out
+carries one state from the first frame of a motion on. Windows of every training motion are predicted both
+ways, and the training's own loss judges both: the same frames and terms (a window of three has one inertia),
+contact searched anew for every frame.
 
     train/window, train/roll_out   mean J per frame
     train/high_windows             windows above the recipe's limit once the training had settled
@@ -73,7 +74,7 @@ def _judged(
 
 
 def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any]) -> tuple[float, float]:
-    """Mean loss of windows from random states, and of the same frames of whole roll-outs [J per frame]."""
+    """Mean loss of windows as training starts them, and of the same frames of roll-outs [J per frame]."""
     import numpy as np
     import torch
 
@@ -87,7 +88,11 @@ def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any
     data = trainer.data
     with torch.no_grad():
         batch = data.batch(np.arange(len(data.starts)), None)
-        offsets, _ = model.network(batch.features, trainer.start_state(len(batch.frames), slice(None)))
+        state = trainer.start_state(len(batch.frames), slice(None))
+        if trainer.memory:
+            _roll_past(trainer)
+            state = state + trainer.memory.at(batch.frames[:, 0])
+        offsets, _ = model.network(batch.features, state)
         windows = skin(batch.rest + offsets, trainer.weights, batch.transforms)
         whole = []
         for first, end in zip(data.first[:-1], data.first[1:]):
@@ -95,6 +100,18 @@ def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any
             whole.append(skin(data.rest + offsets[0], trainer.weights, data.transforms[first:end]))
         roll_outs = torch.cat(whole)[torch.as_tensor(batch.frames)]
         return _loss(trainer, batch, windows), _loss(trainer, batch, roll_outs)
+
+
+def _roll_past(trainer: Any) -> None:
+    """Let the network remember its state after each frame of a roll-out."""
+    import numpy as np
+
+    data = trainer.data
+    for first, end in zip(data.first[:-1], data.first[1:]):
+        state = None
+        for frame in range(first, end):
+            _, state = trainer.network(data.features[None, frame : frame + 1], state)
+            trainer.memory.keep(np.array([frame]), state)
 
 
 def _loss(trainer: Any, batch: Batch, x: Tensor) -> float:
@@ -108,7 +125,7 @@ def _loss(trainer: Any, batch: Batch, x: Tensor) -> float:
     if trainer.contact:
         posed = trainer.contact.posed(batch)
         everywhere = np.arange(batch.frames.size)
-        trainer.contact.search(everywhere, batch.frames, posed, x, forget=True)  # the exact search
+        trainer.contact.search(everywhere, batch.frames, posed, x, exact=True)  # the exact search
         planes = trainer.contact.planes(batch, posed)
     terms = trainer.loss(x, batch.ahead, planes)
     return float(torch.stack(list(terms.values())).sum(0).mean())

@@ -1,0 +1,94 @@
+"""Contact anchors of a training set: first searches, lending, and sliding in between."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+from dressing import swaying, tube_dress
+
+from snug.contact import Anchors
+from snug.recipe import DEFAULT
+from snug.sliding import beyond_sides
+from snug.trainer import EVEN, Trainer
+from snug.training_contact import FIRST_LENT, LENT
+
+MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
+PLAIN = replace(DEFAULT, mixed=0.0)
+
+
+def made(motions=MOTIONS, **options):
+    return Trainer("snug", tube_dress(), motions, steps=9, seed=0, recipe=replace(PLAIN, **options))
+
+
+def test_across_a_side_lies_the_face_that_shares_it():
+    faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]])
+    assert beyond_sides(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
+
+
+def test_first_anchors_are_those_of_a_search_nearby():
+    trainer = made()
+    assert trainer.contact is not None
+    anchors, patch = trainer.contact.anchors, trainer.contact.patch
+    at_rest = Anchors(patch, 1).faces[0]
+    searched = []
+    for frame in range(41):
+        first, end = (0, 30) if frame < 30 else (30, 41)
+        middles = [min(m, end - 1) for m in range(first + FIRST_LENT, end + FIRST_LENT, 2 * FIRST_LENT + 1)]
+        middle = [m for m in middles if abs(m - frame) <= FIRST_LENT][-1]
+        assert (anchors.faces[frame] == anchors.faces[middle]).all()
+        searched.append(middle)
+        assert (anchors.faces[frame] != at_rest).any()
+    assert len(set(searched)) == 3 and (anchors.age == 0).all()
+
+
+def test_what_is_searched_is_lent_around_it_but_to_no_other_motion(monkeypatch):
+    trainer = made(contact_refresh=1 / 48)  # one frame a step
+    contact = trainer.contact
+    assert contact is not None
+    renewed = []
+    renew = contact.anchors.renew
+
+    def marked(frame, *rest, **how):
+        renew(frame, *rest, **how)
+        renewed.append(frame)
+        contact.anchors.faces[frame] = 7
+
+    monkeypatch.setattr(contact.anchors, "renew", marked)
+    trainer.order = np.array(
+        [27, 28, *[0] * 14]
+    )  # of 28 windows of the first motion; then those of the other
+    trainer.step(0)
+    assert renewed == [28]
+    lent = np.flatnonzero((contact.anchors.faces == 7).all(1))
+    assert lent.tolist() == [25, 26, 27, 28, 29] if LENT == 3 else True
+
+
+def test_anchors_slide_while_training_and_are_in_its_state():
+    trainer = made(contact_refresh=0.0)
+    contact = trainer.contact
+    assert contact is not None
+    with torch.no_grad():  # into the skin
+        trainer.network.offsets.bias.view(-1, 3)[:, 2] = -0.8
+    before, everywhere = contact.anchors.faces.copy(), contact._changed.copy()
+    contact._changed[:] = False
+    trainer.step(0)
+    moved = (contact.anchors.faces != before).any(1)
+    assert everywhere.all() and moved.any() and (contact._changed[moved]).all()
+    assert not contact._changed.all() or moved.sum() > 0
+    tensors, facts = contact.state()
+    other = made(contact_refresh=0.0)
+    assert other.contact is not None
+    other.contact.anchors.faces[:] = before
+    other.contact.resume(tensors, facts)
+    assert (other.contact.anchors.faces == contact.anchors.faces).all()
+
+
+def test_each_part_of_an_epoch_passes_over_all_motions():
+    trainer = made([swaying(402)])
+    count = len(trainer.data.starts)
+    drawn = np.concatenate([trainer.draw() for _ in range(count // trainer.windows)])
+    assert len(np.unique(drawn)) == len(drawn) == count
+    part = np.sort(drawn[: count // EVEN])
+    assert (np.diff(part) == EVEN).all()
