@@ -17,7 +17,7 @@ ABLATIONS = {
     "snug-no-strain": "without strain",
     "snug-no-gravity": "without gravity",
     "snug-no-inertia": "without inertia",
-    "snug-no-noise": "without noise in the first state",
+    "snug-no-noise": "with first states of zero",
     "snug-window6": "with windows of 6",
     "snug-window12": "with windows of 12",
     "snug-springs": "with springs instead of StVK",

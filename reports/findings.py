@@ -55,7 +55,7 @@ def claims() -> tuple[Claim, ...]:
         Claim(f"{smooth} SNUG: mean curvature", "curvature/mean", "supervised", SNUG),
         Claim(f"{smooth} the simulation: mean curvature", "curvature/mean", "supervised", "simulation"),
         Claim("SNUG has less curvature error than supervised", "curvature/error", SNUG, "supervised"),
-        Claim("Noise in the first state means less drift", "roll_out/drift", SNUG, QUIET, ROLL_OUTS),
+        Claim("First states other than zero mean less drift", "roll_out/drift", SNUG, QUIET, ROLL_OUTS),
         Claim("and less energy at the end", "roll_out/last", SNUG, QUIET, ROLL_OUTS),
     )
 

@@ -129,6 +129,7 @@ class TrainingContact:
                 self.anchors.renew(frame, self._samples(x[0, 0]), positions[rows[0]], exact=True)
                 self._lend(frame, FIRST_LENT)
                 last = frame
+        self._changed[:] = False  # a resumed run makes these anchors again
 
     def renew(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
         """Search a few windows of a batch anew, those that were left alone for longest.
@@ -194,7 +195,7 @@ class TrainingContact:
             self.group.sent(torch.as_tensor(table[frame]).view(torch.uint8), owner)
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
-        """What a resumed run needs: anchors that ever changed, ages of all, a search not yet due."""
+        """What a resumed run needs: anchors that changed in training, ages of all, a search not yet due."""
         changed = torch.as_tensor(np.flatnonzero(self._changed))
         faces, barycentric = (torch.as_tensor(t) for t in (self.anchors.faces, self.anchors.barycentric))
         there = changed.to(faces.device)

@@ -87,11 +87,14 @@ def test_torch_search_is_no_worse_than_the_walk():
     assert list(walk.age) == list(brute.age) and (brute.faces[0].numpy() == walk.faces[0]).all()
 
 
-def test_anchors_slide_to_the_closest_skin_by_torch_and_by_kernels():
-    """From the anchors of another pose: on one smooth sheet a slide ends where a search ends."""
+@pytest.mark.parametrize("region", [0.2, 0.06])
+def test_anchors_slide_to_the_closest_skin_by_torch_and_by_kernels(region):
+    """From the anchors of another pose: on one smooth sheet a slide ends where a search ends, unless the rule
+    of regions is so narrow that it stops the slide.
+    """
     dressed, motion = tube_dress(), swaying()
     contact, body = ContactPenalty(dressed.cloth), dressed.body
-    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
+    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces, region=region)
     weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
     transforms = dressed.transforms(motion.poses[[2, 9]])
     positions = skin(torch.as_tensor(patch.rest), weights, transforms)
@@ -115,11 +118,13 @@ def test_anchors_slide_to_the_closest_skin_by_torch_and_by_kernels():
     slow.faces, slow.barycentric = slow.faces.numpy(), slow.barycentric.numpy()
     off = {name: np.abs(distance(anchors) - distance(searched))[moved]
            for name, anchors in (("still", still), ("fast", fast), ("slow", slow))}  # fmt: skip
-    assert moved.mean() > 0.2 and np.mean(off["still"] < 1e-4) < 0.05
-    assert np.mean(off["fast"] < 1e-4) > 0.9 and np.mean(np.abs(off["fast"] - off["slow"]) < 1e-5) > 0.99
-    # What a slide allows itself the rule of regions allows.
-    home = patch.sample_rest - patch.centroids[fast.faces]
-    assert (np.linalg.norm(home, axis=-1)[fast.faces != still.faces] < patch.region).all()
+    assert moved.mean() > 0.1 and np.mean(off["still"] < 1e-4) < 0.2
+    if region > 0.1:
+        assert np.mean(off["fast"] < 1e-4) > 0.9
+    assert np.mean(np.abs(off["fast"] - off["slow"]) < 1e-5) > 0.99
+    for anchors in (fast, slow):
+        home = np.linalg.norm(patch.sample_rest - patch.centroids[anchors.faces], axis=-1)
+        assert (home[anchors.faces != still.faces] < region).all()
 
 
 def test_torch_planes_are_the_kernels_planes():

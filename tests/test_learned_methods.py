@@ -77,7 +77,9 @@ def test_each_ablation_differs_from_the_default_in_what_its_name_says():
         }
         for recipe in ABLATIONS
     }  # fmt: skip
-    assert changes["no-noise"] == {"h0_sigma": 0.0} and changes["springs"] == {"material": "springs"}
+    assert changes["no-noise"] == {"h0_sigma": 0.0, "remembered": False} and changes["springs"] == {
+        "material": "springs"
+    }
     for term in ("bending", "strain", "gravity", "inertia"):
         assert set(TERMS) - set(changes[f"no-{term}"]["terms"]) == {term}
     for frames in (6, 12):
