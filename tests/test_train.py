@@ -14,7 +14,7 @@ from snug.mixing import lap_clearance, mirrored, mixed_motions
 from snug.motion import Motion, arm_clearance, make_motion
 from snug.recipe import DEFAULT, PAPER, Recipe
 from snug.rollout import roll_out
-from snug.skeleton import joint_positions
+from snug.skeleton import JOINT, joint_positions
 from snug.train import train, untrained_model
 from snug.trained_model import ModelFileError, TrainedModel
 from snug.trainer import Trainer
@@ -219,6 +219,16 @@ def test_mixed_thighs_stay_off_the_belly():
     mixed = mixed_motions(clips, 3000, turn=0.1, seed=3)
     nearest = [np.rad2deg(lap_clearance(clip).min()) for clip in [*clips, *mixed]]
     assert min(nearest) > 55.0 and max(nearest) > 70.0  # 25 where nothing opens the hips
+
+
+def test_mixed_legs_come_from_clips_of_their_own():
+    standing = Motion("standing", np.zeros((60, 24, 3)), np.zeros((60, 3)))
+    poses = standing.poses.copy()
+    poses[:, [JOINT["left_hip"], JOINT["right_hip"]], 0] = -1.0
+    mixed = mixed_motions([standing, replace(standing, name="sitting", poses=poses)], 1200, turn=0.0, seed=0)
+    lifted = np.array([clip.poses[0, [JOINT["left_hip"], JOINT["right_hip"]], 0] < -0.5 for clip in mixed])
+    for legs in ([True, False], [False, True], [True, True], [False, False]):
+        assert (lifted == legs).all(1).any(), legs
 
 
 def test_mixed_motions_join_the_training_set():
