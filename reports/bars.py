@@ -38,7 +38,7 @@ def bars() -> tuple[Bar, ...]:
         Bar("Roll-outs on training motions, above windows", "%", 3.0, _roll_out_above_windows),
         Bar("Windows above 2 J once training has settled", "1", 0.0, _trained("train/high_windows")),
         Bar("One training step of 16 windows, on a core", "ms", 20.0, _trained("train/step")),
-        Bar("The whole training", "s", 120.0, _of("cost/train", "snug")),
+        Bar("All training steps", "s", 120.0, _of("cost/train", "snug")),
         Bar("One frame", "ms", 0.5, _of("cost/frame", "snug")),
         Bar("Tunic that stops: A of the dynamic recipe", "1", 0.5, _swing("dynamics/amplitude"),
             at_least=True),

@@ -120,7 +120,7 @@ def kept(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[n
 
 
 class Anchors:
-    """One anchor per frame and sample, and when each frame's were last searched."""
+    """One anchor per frame and sample, and when each frame's were last searched, or lent."""
 
     def __init__(self, patch: Patch, frames: int) -> None:
         faces, barycentric = kept(*patch.search(patch.sample_rest, patch.rest, exact=True), len(patch.faces))
@@ -281,13 +281,12 @@ def _energy(
             along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, face, parts[s])
             if along >= reach:
                 continue
-            if slide:
+            if slide and along < reach:  # not a sample that is no number
                 face, v, w = slid(x0, x1, x2, face, skin, faces, beyond, centroids, homes[s], region, corners)
-                if v + w <= np.float32(2.0):  # a number
-                    anchors[s] = face
-                    parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))
-                    third = np.rint(np.float32(PARTS) * w)
-                    parts[s, 1] = np.uint8(min(third, np.float32(PARTS) - np.float32(parts[s, 0])))
+                anchors[s] = face
+                parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))
+                third = np.rint(np.float32(PARTS) * w)
+                parts[s, 1] = np.uint8(min(third, np.float32(PARTS) - np.float32(parts[s, 0])))
                 along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, np.uint32(anchors[s]), parts[s])
             length = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + np.float32(1e-30)
             depth = margin - along / length

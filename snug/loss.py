@@ -11,8 +11,9 @@ three holds three static terms and one inertia. Its gradient reaches all three f
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
 kernels (snug.lanes, or those beside the definition) give the same values and gradients in a small part of
 the time, so autograd is told to use those. On a GPU the definitions run as they are.
-The contact planes are the one difference: training keeps an anchor for each sample and takes the skin's
-normal there, where the simulator searches anew in every step and takes the direction to the closest point.
+The contact planes are the one difference: training keeps an anchor for each sample, which slides along, and
+takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the
+closest point.
 """
 
 from __future__ import annotations

@@ -28,8 +28,8 @@ PARTS: tuple[tuple[str, ...], ...] = (
 )
 SCALE = dict.fromkeys((1, 2, 3), (0.6, 1.3))  # of legs and spine; an arm swung further might enter the torso
 CLEARANCE = 30.0  # degrees between upper arm and spine: nearer, a sleeve is pinched and no shape is good
-# Degrees between thigh and spine, about those of the deepest squat that is given. Legs of a squat under the
-# spine of a bow came to 40: thighs enter the belly, and the hem between them is in contact whatever it does.
+# Degrees between thigh and spine, a little above those of the deepest squat that is given (66). Legs of a
+# squat under the spine of a bow came to 40: thighs enter the belly, and no hem between them is free.
 LAP = 70.0
 # Turn of each joint, relative to the recipe's; the collar bone turns little.
 TURNED = {

@@ -2,7 +2,8 @@
 
 Every process makes the same data and draws the same random numbers for the whole batch, then works on its own
 windows. Gradients are averaged by DistributedDataParallel; the energies of all windows are gathered, so that
-every process judges the same batch; contact anchors that one process found anew are sent to the others. So
+every process judges the same batch; contact anchors that one process moved or found anew, and states that it
+remembers, are sent to the others. So
 the run is that of a single process with the same batch up to the rounding of float32 sums, which are taken in
 another order: it repeats bit for bit with the same number of processes, and not across numbers.
 """
@@ -50,8 +51,9 @@ class Group:
         """The tensors of all processes, one after another along the first axis."""
         if self.size == 1:
             return tensor
+        tensor = tensor.contiguous()
         parts = [torch.empty_like(tensor) for _ in range(self.size)]
-        torch.distributed.all_gather(parts, tensor.contiguous())
+        torch.distributed.all_gather(parts, tensor)
         return torch.cat(parts)
 
     def sent(self, tensor: Tensor, owner: int) -> Tensor:

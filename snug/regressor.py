@@ -3,7 +3,7 @@
     M(beta, phi) = W(T + R(beta, phi), J(beta), theta, W_G)                      (paper, eq. 1 and 2)
 
 Four gated recurrent units of 256 with tanh and one linear layer to 3V offsets (paper, section 3.5). The state
-at the start is zero at run time and N(0, sigma) in training, sigma being a recipe's choice.
+at the start is zero at run time; in training N(0, sigma) is added to it, sigma being a recipe's choice.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Regressor(nn.Module):
         return flat.unflatten(-1, (self.vertices, 3)), state
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
-        """(layers, batch, hidden) drawn from N(0, sigma): the noise that makes long roll-outs hold."""
+        """(layers, batch, hidden) drawn from N(0, sigma): so that long roll-outs hold."""
         shape = (self.gru.num_layers, batch, self.gru.hidden_size)
         device = self.input_mean.device
         return sigma * torch.randn(shape, generator=generator, device=generator.device).to(device)

@@ -30,10 +30,11 @@ def beyond_sides(faces: np.ndarray) -> np.ndarray:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def slid(x0, x1, x2, face, skin, faces, beyond, centroids, home, region, corners):
+def slid(x0, x1, x2, face, skin, faces, beyond, centroids, home, reach, corners):
     """Face, and weights of its second and third corner, where an anchor comes to rest for a sample at x.
 
-    centroids (Q, 3), home (3,), region [m]: the rule of regions, squared. corners (1, 3, 3): room to work in.
+    centroids (Q, 3) and home (3,) [m] at rest, reach [m^2]: the rule of regions, squared. corners (1, 3, 3):
+    room to work in.
     """
     last, zero, one = face, np.float32(0.0), np.float32(1.0)
     for _ in range(CROSSINGS):
@@ -62,7 +63,7 @@ def slid(x0, x1, x2, face, skin, faces, beyond, centroids, home, region, corners
             centroids[other, 1] - home[1],
             centroids[other, 2] - home[2],
         )
-        if d0 * d0 + d1 * d1 + d2 * d2 > region:
+        if d0 * d0 + d1 * d1 + d2 * d2 > reach:
             break
         last, face = face, np.uint32(other)
     for corner in range(3):

@@ -35,5 +35,8 @@ class StateMemory:
 
     def keep(self, frames: np.ndarray, states: Tensor, group: Group = ALONE) -> None:
         """Remember states (L, N, H) after frames (N,); those of all processes of a group, each its own."""
-        rows = group.gathered(torch.as_tensor(frames, device=self.before.device))
-        self.states[:, rows] = group.gathered(states.detach().transpose(0, 1)).transpose(0, 1)
+        rows = group.gathered(torch.as_tensor(frames, device=self.before.device)).cpu().numpy()
+        # Of a frame that comes twice the first: which of two writes lands last is not a GPU's to choose.
+        once = torch.as_tensor(np.unique(rows, return_index=True)[1], device=states.device)
+        after = group.gathered(states.detach().transpose(0, 1)).transpose(0, 1)
+        self.states[:, torch.as_tensor(rows, device=states.device)[once]] = after[:, once]

@@ -23,7 +23,8 @@ FORBIDDEN = (
 
 
 class TensorAnchors:
-    """One anchor per frame and sample, on `device`; when each was last searched is remembered on the CPU."""
+    """One anchor per frame and sample, on `device`; when each was last searched or lent is remembered on the
+    CPU."""
 
     def __init__(self, patch: Patch, frames: int, device: torch.device) -> None:
         start = Anchors(patch, 1)
@@ -74,6 +75,13 @@ class TensorAnchors:
         """Anchors of frames (N,) go to where snug.sliding.slid takes them for samples (N, S, 3): those of
         samples less than `reach` and SLACK above their planes. positions, normals: see `planes`.
         """
+        # A frame that comes twice slides once: which of two writes lands last is not a GPU's to choose.
+        once = np.sort(np.unique(frames, return_index=True)[1])
+        samples, frames, rows = (
+            samples[torch.as_tensor(once, device=samples.device)],
+            frames[once],
+            rows[once],
+        )
         points, directions = self.planes(frames, rows, positions, normals)
         near = ((samples - points) * directions).sum(-1) < reach + SLACK
         place, sample = near.nonzero(as_tuple=True)
@@ -92,10 +100,8 @@ class TensorAnchors:
             last, face = torch.where(moving, face, last), torch.where(moving, other, face)
         a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
         v, w = closest_on_triangle(b - a, c - a, x - a)
-        kept = v + w <= 2.0  # numbers
-        faces, parts = in_parts(face[kept], torch.stack([v, w], -1)[kept], self.faces.dtype)
-        self.faces[chosen[kept], sample[kept]] = faces
-        self.barycentric[chosen[kept], sample[kept]] = parts
+        faces, parts = in_parts(face, torch.stack([v, w], -1), self.faces.dtype)
+        self.faces[chosen, sample], self.barycentric[chosen, sample] = faces, parts
 
     def _foot(self, face: Tensor, row: Tensor, positions: Tensor, x: Tensor) -> tuple[Tensor, Tensor]:
         """Weights of the second and third corner at the foot of each point on the plane of its face."""

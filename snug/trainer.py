@@ -167,20 +167,22 @@ class Trainer:
                 shapes = self.dressed.body.shape_count
                 betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
             mine = self.group.part(len(windows))
-            state = self.start_state(len(windows), mine)
             batch = self.data.batch(windows[mine], None if betas is None else betas[mine])
-            if self.memory:
-                state = state + self.memory.at(batch.frames[:, 0])
+            state = self.start_state(len(windows), mine, batch)
         if self.loss is None:
             assert self.targets is not None
             with self.clock.part("forward"):
                 terms = self.targets.terms(self.network, batch, state)
             means, _ = self._update(number, windows, terms)
         else:
-            means = self._physics_step(number, windows, batch, state)
+            frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
+            means = self._physics_step(number, windows, frames, batch, state)
         return {"loss": sum(means.values()), **means}
 
-    def _physics_step(self, number: int, windows: np.ndarray, batch: Batch, state: Any) -> dict[str, float]:
+    def _physics_step(
+        self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Any
+    ) -> dict[str, float]:
+        """windows (N,), frames (N, T): of all processes; batch: of this one."""
         assert self.loss is not None
         x, offsets, after = self.predict(batch, state)
         planes = posed = None
@@ -190,49 +192,50 @@ class Trainer:
                 planes = self.contact.planes(batch, posed, x)
         with self.clock.part("energies"):
             terms = self.loss(x, batch.ahead, planes)
-            if self.contact and posed and self._searched_for_high(number, windows, posed, x, terms):
+            if self.contact and posed and self._searched_for_high(number, frames, posed, x, terms):
                 terms = self.loss(x, batch.ahead, self.contact.planes(batch, posed))
             if self.teacher:
                 terms["swing"] = self.teacher.swing(offsets, batch)
-        frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
-        if self.contact:
-            self.contact.share(frames)
         means, trusted = self._update(number, windows, terms)
         if trusted and self.memory:
             self.memory.keep(batch.frames[:, -1], after, self.group)
-        if trusted and self.contact and posed:
+        if self.contact and posed:
             with self.clock.part("renewal"):
-                self.contact.renew(frames, posed, x)
+                self.contact.settle(frames, trusted=trusted)
+                if trusted:
+                    self.contact.renew(frames, posed, x)
         return means
 
     def _searched_for_high(
-        self, number: int, windows: np.ndarray, posed: Posed, x: Tensor, terms: dict[str, Tensor]
+        self, number: int, frames: np.ndarray, posed: Posed, x: Tensor, terms: dict[str, Tensor]
     ) -> bool:
-        """Search the anchors of windows above the spike limit at once; whether there were any.
+        """Search the anchors of windows (N, T) above the spike limit at once; whether there were any.
 
-        An anchor from the T-pose, or of a garment that has moved on, can claim a contact that is none; so can
-        one that stood for being roughly right, hence the search is exact. Not where most windows are high:
-        then it is the network that is lost, and its vertices are no guide.
+        An anchor of another frame, or of a garment that has moved on, can claim a contact that is none; so
+        can one that stood for being roughly right, hence the search is exact. Not where most windows are
+        high: then it is the network that is lost, and its vertices are no guide.
         """
         assert self.contact is not None
         if number < SETTLING:
             return False
         joules = torch.stack(list(terms.values())).detach().sum(0).mean(1)
         high = np.flatnonzero(self.group.gathered(joules > self.recipe.spike).cpu().numpy())
-        if not 0 < len(high) <= MOSTLY_FINE * len(windows):
+        if not 0 < len(high) <= MOSTLY_FINE * len(frames):
             return False
-        frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
         places = (high[:, None] * self.data.window + np.arange(self.data.window)).ravel()
         self.contact.search(places, frames, posed, x, exact=True)
         return True
 
-    def start_state(self, count: int, mine: slice) -> Any:
-        """What windows start from: noise of the recipe's sigma, or a network's own masks.
+    def start_state(self, count: int, mine: slice, batch: Batch) -> Any:
+        """What the windows of a batch start from: noise of the recipe's sigma, added to what is remembered,
+        or a network's own masks.
 
-        Drawn for all windows of the batch; only those of this process are kept.
+        Noise is drawn for all `count` windows of the step; only that of this process is kept.
         """
         state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
-        return None if state is None else state[:, mine]
+        if state is None:
+            return None
+        return state[:, mine] + self.memory.at(batch.frames[:, 0]) if self.memory else state[:, mine]
 
     def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Tensor, Any]:
         """Vertices relative to the pelvis and offsets of the unposed garment, both (N, T, V, 3) [m], and the

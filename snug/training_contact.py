@@ -31,7 +31,7 @@ class TrainingContact:
     """Anchors of all training frames. With `kernels` in numpy and numba, else in torch on the set's device.
 
     refresh: see Recipe.contact_refresh. one_shape: all on the mean body; the kernels then pose it once for
-    all frames. A group shares the searching, and every process of it keeps all anchors.
+    all frames. A group shares the work, and every process of it keeps all anchors.
     """
 
     def __init__(
@@ -62,6 +62,7 @@ class TrainingContact:
         if one_shape and kernels:
             self._mean_shape = self._posed_everywhere()
         self._changed = np.zeros(frames, bool)
+        self._before: tuple[Any, ...] | None = None
         self._credit = 0.0
 
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
@@ -95,11 +96,13 @@ class TrainingContact:
         """What the loss takes: of the remembered anchors, points and normals (N, T, S, 3), or, with kernels,
         the energy itself.
 
-        x (N, T, V, 3): vertices that the anchors first slide to; None where they have just been searched.
+        x (N, T, V, 3): vertices that the anchors first slide to, until `settle` says whether for good; None
+        where they have just been searched.
         """
         flat, slide = batch.frames.ravel(), x is not None
         if slide:
-            self._changed[flat] = True
+            rows = np.unique(flat)
+            self._before = rows, self._tables()[0][rows], self._tables()[1][rows]
         if isinstance(self.anchors, Anchors):
             anchors = self.anchors
             return lambda vertices: anchors.energy(self.contact, vertices, flat, *posed, slide=slide)
@@ -144,7 +147,7 @@ class TrainingContact:
         middle = frames[:, window // 2]
         oldest = self.anchors.oldest(middle, count)
         self.search(oldest * window + window // 2, frames, posed, x)
-        for frame in middle[oldest]:
+        for frame in np.unique(middle[oldest]):
             self._lend(int(frame), LENT)
 
     def _lend(self, frame: int, reach: int) -> None:
@@ -152,18 +155,29 @@ class TrainingContact:
         first = self.data.first
         motion = int(np.searchsorted(first, frame, side="right")) - 1
         around = slice(max(frame - reach, first[motion]), min(frame + reach + 1, first[motion + 1]))
-        for table in (self.anchors.faces, self.anchors.barycentric):
+        for table in self._tables():
             table[around] = table[frame]
         self.anchors.age[around], self._changed[around] = 0, True
 
-    def share(self, frames: np.ndarray) -> None:
-        """Give the anchors that slid here to the other processes, and take theirs. frames: see `renew`."""
+    def settle(self, frames: np.ndarray, *, trusted: bool) -> None:
+        """Keep where anchors slid to since `planes`, or, where a prediction is no guide, put them back; then
+        every process gives its own to the others. frames: see `renew`.
+        """
+        if self._before and not trusted:
+            rows, *before = self._before
+            for table, held in zip(self._tables(), before):
+                table[rows] = held
+        self._before = None
+        flat = frames.ravel()
+        self._changed[flat] = True
         if self.group.size == 1:
             return
-        flat = frames.ravel()
-        share = len(flat) // self.group.size
-        for place, frame in enumerate(flat):
-            self._send(int(frame), place // share)
+        mine = flat[self.group.part(len(flat))]
+        for table in self._tables():
+            # As bytes, for not every backend sends integers of two; row by row, for a frame may come twice.
+            given = torch.as_tensor(table[mine]).view(torch.uint8)
+            for frame, row in zip(flat, self.group.gathered(given)):
+                torch.as_tensor(table[frame]).view(torch.uint8).copy_(row)  # shares memory
 
     def search(
         self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor, *, exact: bool = False
@@ -184,13 +198,17 @@ class TrainingContact:
             self._send(int(flat[place]), owner)
 
     def _samples(self, vertices: Tensor) -> Any:
-        """Contact samples (..., S, 3) of vertices (..., V, 3)."""
+        """Contact samples (S, 3) of vertices (V, 3); of tensors also (..., S, 3) of (..., V, 3)."""
         if self.kernels:
             return (self.contact.sample_matrix @ vertices.numpy()).astype(np.float32)
         return (vertices[..., self.stencils, :] * self.sample_weights[..., None]).sum(-2)
 
+    def _tables(self) -> tuple[Any, Any]:
+        """Faces (F, S) and barycentric coordinates (F, S, 2) of all anchors."""
+        return self.anchors.faces, self.anchors.barycentric
+
     def _send(self, frame: int, owner: int) -> None:
-        for table in (self.anchors.faces, self.anchors.barycentric):
+        for table in self._tables():
             # Shares memory with the row; as bytes, for not every backend sends integers of two.
             self.group.sent(torch.as_tensor(table[frame]).view(torch.uint8), owner)
 

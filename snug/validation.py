@@ -1,6 +1,6 @@
 """How well a network does on motions held out of its training: full roll-outs from a state of zero.
 
-Windows see the three frames after a random state; what a user sees is a roll-out. So held-out motions are
+Windows see three frames at a time; what a user sees is a roll-out. So held-out motions are
 rolled out whole, and their mean energy a frame is the value that early stopping watches. Contact anchors are
 searched anew at every validation: those of an earlier one claim contacts that are none, by up to a fifth of
 the value, and the first validation, which has none, would look best. Nothing is random.

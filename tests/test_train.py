@@ -218,7 +218,7 @@ def test_mixed_thighs_stay_off_the_belly():
     clips = [make_motion(name) for name in ("squat", "bow")]  # together: a squat's legs under a bowed spine
     mixed = mixed_motions(clips, 3000, turn=0.1, seed=3)
     nearest = [np.rad2deg(lap_clearance(clip).min()) for clip in [*clips, *mixed]]
-    assert min(nearest) > 55.0 and max(nearest) > 70.0  # 25 where nothing opens the hips
+    assert min(nearest) > 60.0 and max(nearest) > 70.0  # 25 where nothing opens the hips
 
 
 def test_mixed_legs_come_from_clips_of_their_own():

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import torch
 from dressing import swaying, tube_dress
 
 from snug.contact import Anchors
 from snug.recipe import DEFAULT
+from snug.skinning import skin
 from snug.sliding import beyond_sides
 from snug.trainer import EVEN, Trainer
 from snug.training_contact import FIRST_LENT, LENT
@@ -41,6 +43,36 @@ def test_first_anchors_are_those_of_a_search_nearby():
         searched.append(middle)
         assert (anchors.faces[frame] != at_rest).any()
     assert len(set(searched)) == 3 and (anchors.age == 0).all()
+    body = trainer.contact._mean_shape
+    for middle in set(searched):
+        template = skin(trainer.data.rest, trainer.weights, trainer.data.transforms[middle])
+        samples = (trainer.contact.contact.sample_matrix @ template.numpy()).astype(np.float32)
+        faces, _ = patch.search(samples, body[0][middle], exact=True)
+        assert (anchors.faces[middle] == faces).all()
+
+
+@pytest.mark.parametrize("kernels", [True, False])
+def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
+    trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=PLAIN, kernels=kernels)
+    contact = trainer.contact
+    assert contact is not None
+    before = [
+        torch.as_tensor(table).clone() for table in (contact.anchors.faces, contact.anchors.barycentric)
+    ]
+
+    def kept():
+        now = (contact.anchors.faces, contact.anchors.barycentric)
+        return [torch.equal(torch.as_tensor(table), held) for table, held in zip(now, before)]
+
+    batch = trainer.data.batch(np.arange(4), None)
+    posed = contact.posed(batch)
+    x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.08])
+    for vertices, trusted, moved in ((torch.nan * x, True, False), (x, False, False), (x, True, True)):
+        assert trainer.loss is not None
+        trainer.loss(vertices, batch.ahead, contact.planes(batch, posed, vertices))
+        assert all(kept()) == (vertices is not x)
+        contact.settle(batch.frames, trusted=trusted)
+        assert all(kept()) == (not moved)
 
 
 def test_what_is_searched_is_lent_around_it_but_to_no_other_motion(monkeypatch):

@@ -37,13 +37,15 @@ def test_a_network_that_lives_on_its_state_does_not():
     assert abs(window - roll_out) > 1e-3 * window
 
 
-def test_windows_that_start_from_a_remembered_roll_out_go_on_as_it_does():
+def test_windows_that_remember_the_one_before_go_on_as_a_roll_out_but_for_their_noise():
     recipe = replace(DEFAULT, h0_sigma=0.0)
     model = untrained_model("snug", tube_dress(), MOTIONS, seed=0, recipe=recipe)
     with torch.no_grad():
         model.network.offsets.weight.normal_()
     window, roll_out = both_losses(model, tube_dress(), MOTIONS)
     assert window == pytest.approx(roll_out, rel=1e-5)
+    model.recipe = replace(recipe, h0_sigma=0.3)
+    assert both_losses(model, tube_dress(), MOTIONS)[0] != pytest.approx(roll_out, rel=1e-3)
     model.recipe = replace(recipe, remembered=False)
     assert both_losses(model, tube_dress(), MOTIONS)[0] != pytest.approx(roll_out, rel=1e-3)
 

@@ -1,9 +1,10 @@
 """Does a network do in a whole roll-out what it was trained to do in windows of three frames?
 
-A window starts from noise, added to the state of a roll-out where the recipe remembers that; a roll-out
-carries one state from the first frame of a motion on. Windows of every training motion are predicted both
-ways, and the training's own loss judges both: the same frames and terms (a window of three has one inertia),
-contact searched anew for every frame.
+A window starts from noise, added to what the window before left behind where the recipe remembers that (such
+windows are close to a roll-out by the way they are trained); a roll-out carries one state from the first
+frame of a motion on. Windows of every training motion are predicted both ways, and the training's own loss
+judges both: the same frames and terms (a window of three has one inertia), contact searched anew for every
+frame.
 
     train/window, train/roll_out   mean J per frame
     train/high_windows             windows above the recipe's limit once the training had settled
@@ -82,17 +83,15 @@ def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any
     from snug.trainer import Trainer
 
     # Mixed motions, and bodies of other shapes, are no motions that were given.
-    recipe = replace(model.recipe, mixed=0.0, window_stride=STRIDE, shape_range=0.0)
+    window = model.recipe.window
+    recipe = replace(model.recipe, mixed=0.0, window_stride=window, shape_range=0.0)
     trainer = Trainer(model.kind, dressed, motions, steps=1, seed=model.seed, recipe=recipe)
     trainer.network = model.network
     data = trainer.data
     with torch.no_grad():
-        batch = data.batch(np.arange(len(data.starts)), None)
-        state = trainer.start_state(len(batch.frames), slice(None))
-        if trainer.memory:
-            _roll_past(trainer)
-            state = state + trainer.memory.at(batch.frames[:, 0])
-        offsets, _ = model.network(batch.features, state)
+        chosen = np.arange(0, len(data.starts), max(1, STRIDE // window))
+        batch = data.batch(chosen, None)
+        offsets = torch.cat([_offsets(trainer, number) for number in range(len(data.starts))])[chosen]
         windows = skin(batch.rest + offsets, trainer.weights, batch.transforms)
         whole = []
         for first, end in zip(data.first[:-1], data.first[1:]):
@@ -102,16 +101,15 @@ def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any
         return _loss(trainer, batch, windows), _loss(trainer, batch, roll_outs)
 
 
-def _roll_past(trainer: Any) -> None:
-    """Let the network remember its state after each frame of a roll-out."""
+def _offsets(trainer: Any, number: int) -> Tensor:
+    """Offsets (1, T, V, 3) [m] of one window, after which the next one begins."""
     import numpy as np
 
-    data = trainer.data
-    for first, end in zip(data.first[:-1], data.first[1:]):
-        state = None
-        for frame in range(first, end):
-            _, state = trainer.network(data.features[None, frame : frame + 1], state)
-            trainer.memory.keep(np.array([frame]), state)
+    batch = trainer.data.batch(np.array([number]), None)
+    offsets, state = trainer.network(batch.features, trainer.start_state(1, slice(None), batch))
+    if trainer.memory:
+        trainer.memory.keep(batch.frames[:, -1], state)
+    return offsets
 
 
 def _loss(trainer: Any, batch: Batch, x: Tensor) -> float:
