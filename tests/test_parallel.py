@@ -25,7 +25,7 @@ STEPS = 12
 
 def trained(recipe, group, where):
     """The weights and anchors after a few steps, and the losses."""
-    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=STEPS, seed=0, recipe=recipe, group=group)
+    trainer = Trainer("snug", tube_dress(), [swaying(144)], steps=STEPS, seed=0, recipe=recipe, group=group)
     losses = [trainer.step(number)["loss"] for number in range(STEPS)]
     tensors, _ = trainer.state()
     write_tensors(where, tensors, {"losses": losses})
