@@ -23,8 +23,7 @@ FORBIDDEN = (
 
 
 class TensorAnchors:
-    """One anchor per frame and sample, on `device`; when each was last searched or lent is remembered on the
-    CPU."""
+    """One anchor per frame and sample, on `device`; on the CPU, when each was last searched or lent."""
 
     def __init__(self, patch: Patch, frames: int, device: torch.device) -> None:
         start = Anchors(patch, 1)
@@ -91,7 +90,8 @@ class TensorAnchors:
         face = self.faces[chosen, sample].long()
         last, moving = face, torch.ones_like(face, dtype=torch.bool)
         for _ in range(CROSSINGS):
-            v, w = self._foot(face, row, positions, x)
+            a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
+            v, w, _ = foot(b - a, c - a, x - a)
             weights = torch.stack([1 - v - w, v, w], -1)
             side = weights.argmin(-1)
             other = self.beyond[face, side]
@@ -102,15 +102,6 @@ class TensorAnchors:
         v, w = closest_on_triangle(b - a, c - a, x - a)
         faces, parts = in_parts(face, torch.stack([v, w], -1), self.faces.dtype)
         self.faces[chosen, sample], self.barycentric[chosen, sample] = faces, parts
-
-    def _foot(self, face: Tensor, row: Tensor, positions: Tensor, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Weights of the second and third corner at the foot of each point on the plane of its face."""
-        a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
-        s, t, r = b - a, c - a, x - a
-        ss, tt, st = (s * s).sum(-1), (t * t).sum(-1), (s * t).sum(-1)
-        sr, tr = (s * r).sum(-1), (t * r).sum(-1)
-        determinant = ss * tt - st * st
-        return (tt * sr - st * tr) / determinant, (ss * tr - st * sr) / determinant
 
     def renew(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame. Brute force has no
@@ -147,6 +138,16 @@ def in_parts(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Ten
     return faces.to(kind), torch.cat([second, third], 1).to(torch.uint8)
 
 
+def foot(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Weights v, w where the plane of a triangle comes closest to a point, and the squared area of its
+    parallelogram [m^4]; s, t, r as for `closest_on_triangle`.
+    """
+    aa, cc, m = (s * s).sum(-1), (t * t).sum(-1), (s * t).sum(-1)
+    d, e = (s * r).sum(-1), (t * r).sum(-1)
+    determinant = aa * cc - m * m
+    return (cc * d - m * e) / determinant, (aa * e - m * d) / determinant, determinant
+
+
 def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor]:
     """Weights v, w of the second and third corner where a triangle comes closest to a point.
 
@@ -154,8 +155,7 @@ def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor
     """
     aa, cc, m = (s * s).sum(-1), (t * t).sum(-1), (s * t).sum(-1)
     d, e = (s * r).sum(-1), (t * r).sum(-1)
-    determinant = aa * cc - m * m
-    v, w = (cc * d - m * e) / determinant, (aa * e - m * d) / determinant
+    v, w, determinant = foot(s, t, r)
     inside = (determinant > 0) & (v >= 0) & (w >= 0) & (v + w <= 1)
     # Where the foot is outside: the nearest of the three edges, each clamped to its ends.
     zero = torch.zeros_like(d)

@@ -102,7 +102,7 @@ class TrainingContact:
         flat, slide = batch.frames.ravel(), x is not None
         if slide:
             rows = np.unique(flat)
-            self._before = rows, self._tables()[0][rows], self._tables()[1][rows]
+            self._before = rows, *(table[rows] for table in self._tables())
         if isinstance(self.anchors, Anchors):
             anchors = self.anchors
             return lambda vertices: anchors.energy(self.contact, vertices, flat, *posed, slide=slide)
@@ -194,7 +194,7 @@ class TrainingContact:
             if owner == self.group.rank:
                 samples = self._samples(vertices[mine])
                 self.anchors.renew(int(flat[place]), samples, positions[rows[mine]], exact=exact)
-            self._changed[flat[place]], self.anchors.age[flat[place]] = True, 0
+            self.anchors.age[flat[place]] = 0
             self._send(int(flat[place]), owner)
 
     def _samples(self, vertices: Tensor) -> Any:
@@ -215,7 +215,7 @@ class TrainingContact:
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """What a resumed run needs: anchors that changed in training, ages of all, a search not yet due."""
         changed = torch.as_tensor(np.flatnonzero(self._changed))
-        faces, barycentric = (torch.as_tensor(t) for t in (self.anchors.faces, self.anchors.barycentric))
+        faces, barycentric = (torch.as_tensor(table) for table in self._tables())
         there = changed.to(faces.device)
         return {
             "changed": changed, "faces": faces[there], "barycentric": barycentric[there],
@@ -226,7 +226,7 @@ class TrainingContact:
         """The inverse of `state`."""
         changed = tensors["changed"].numpy()
         self._changed[changed] = True
-        for table, name in ((self.anchors.faces, "faces"), (self.anchors.barycentric, "barycentric")):
+        for table, name in zip(self._tables(), ("faces", "barycentric")):
             held = torch.as_tensor(table)  # shares memory
             held[torch.as_tensor(changed, device=held.device)] = tensors[name].to(held.device)
         self.anchors.age[:] = tensors["age"].numpy()

@@ -123,7 +123,7 @@ def _loss(trainer: Any, batch: Batch, x: Tensor) -> float:
     if trainer.contact:
         posed = trainer.contact.posed(batch)
         everywhere = np.arange(batch.frames.size)
-        trainer.contact.search(everywhere, batch.frames, posed, x, exact=True)  # the exact search
+        trainer.contact.search(everywhere, batch.frames, posed, x, exact=True)
         planes = trainer.contact.planes(batch, posed)
     terms = trainer.loss(x, batch.ahead, planes)
     return float(torch.stack(list(terms.values())).sum(0).mean())
