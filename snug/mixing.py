@@ -3,9 +3,10 @@
 Self-supervision needs no simulation, so a training set is not bound to what was recorded. Fourteen clips show
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
 clip takes the root, the spine, each leg and each arm from six random places of the training clips (mirrored
-half of the time), scales legs and spine, adds to each joint of the trunk a slow turn about a random axis, and
-spreads the arms and opens the hips where limbs come too near to the torso. Legs that always come as a pair
-show no kick and no lunge. Every part stays continuous in time, so velocities keep their meaning.
+half of the time), scales legs and spine, adds to each joint of the trunk a slow turn about a random axis,
+lifts some thighs, and spreads the arms and opens the hips where limbs come too near to the torso. Legs that
+always come as a pair show no lunge; and a hem that never met a thigh as high as this one lets it through.
+Every part stays continuous in time, so velocities keep their meaning.
 """
 
 from __future__ import annotations
@@ -28,26 +29,32 @@ PARTS: tuple[tuple[str, ...], ...] = (
 )
 SCALE = dict.fromkeys((1, 2, 3), (0.6, 1.3))  # of legs and spine; an arm swung further might enter the torso
 CLEARANCE = 30.0  # degrees between upper arm and spine: nearer, a sleeve is pinched and no shape is good
-# Degrees between thigh and spine, a little above those of the deepest squat that is given (66). Legs of a
-# squat under the spine of a bow came to 40: thighs enter the belly, and no hem between them is free.
-LAP = 70.0
+# Degrees between thigh and spine: a hip bends by about 120 and no further. At 40, as a squat under the spine
+# of a bow has it, thighs enter the belly, and no hem between them is free.
+LAP = 60.0
+LIFT = 90.0  # degrees, at most: a lifted thigh comes up and goes down again by a random part of it
 # Turn of each joint, relative to the recipe's; the collar bone turns little.
 TURNED = {
     "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,
     "left_shoulder": 1.2, "right_shoulder": 1.2, "left_collar": 0.4, "right_collar": 0.4,
 }  # fmt: skip
-RATE = (0.2, 1.0)  # Hz, of the slow turns
+RATE = (0.2, 1.0)  # Hz, of the slow turns and lifts
 FRAMES = 60  # of a mixed clip
+HIPS, SIDEWAYS = (JOINT["left_hip"], JOINT["right_hip"]), np.array([1.0, 0.0, 0.0])
+OPENINGS = 5  # leave less than a degree missing, almost always
 
 
-def mixed_motions(motions: Sequence[Motion], frames: int, *, turn: float, seed: int) -> list[Motion]:
+def mixed_motions(
+    motions: Sequence[Motion], frames: int, *, turn: float, lifted: float, seed: int
+) -> list[Motion]:
     """About `frames` frames of mixed clips, named mixed_0, mixed_1, ...; deterministic for a seed.
 
     turn: standard deviation of the added turns, per axis [rad]; half of it stays, half comes and goes.
+    lifted: share of the thighs that are lifted.
     """
     random = np.random.default_rng(seed)
     count = max(1, round(frames / FRAMES)) if frames > 0 else 0
-    return [_mixed(motions, random, turn, f"mixed_{number}") for number in range(count)]
+    return [_mixed(motions, random, turn, lifted, f"mixed_{number}") for number in range(count)]
 
 
 def mirrored(motion: Motion) -> Motion:
@@ -69,7 +76,9 @@ def _other_side(name: str) -> str:
     return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
 
 
-def _mixed(motions: Sequence[Motion], random: np.random.Generator, turn: float, name: str) -> Motion:
+def _mixed(
+    motions: Sequence[Motion], random: np.random.Generator, turn: float, lifted: float, name: str
+) -> Motion:
     poses = np.zeros((FRAMES, len(JOINT), 3))
     translations = np.zeros((FRAMES, 3))
     fps = motions[0].fps
@@ -91,8 +100,12 @@ def _mixed(motions: Sequence[Motion], random: np.random.Generator, turn: float, 
         phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
         added = rotation_matrices(stays + swings * np.sin(phase))
         poses[:, JOINT[joint]] = axis_angles(rotation_matrices(poses[:, JOINT[joint]]) @ added)
-    mixed = Motion(name, poses, translations, fps=fps, kind="mixed")
-    mixed = opened_hips(mixed, np.maximum(0.0, LAP - np.rad2deg(lap_clearance(mixed).min(axis=0))))
+    for joint in HIPS:
+        height = random.uniform(0.0, np.deg2rad(LIFT)) * (random.random() < lifted)
+        phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
+        forward = rotation_matrices(-0.5 * height * (1 + np.sin(phase)) * SIDEWAYS)
+        poses[:, joint] = axis_angles(forward @ rotation_matrices(poses[:, joint]))
+    mixed = opened_hips(Motion(name, poses, translations, fps=fps, kind="mixed"))
     return spread_arms(mixed, max(0.0, CLEARANCE - float(np.rad2deg(arm_clearance(mixed).min()))))
 
 
@@ -113,10 +126,16 @@ def lap_clearance(motion: Motion) -> np.ndarray:
     return np.arccos(np.clip(np.stack(cosines, axis=1), -1.0, 1.0))
 
 
-def opened_hips(motion: Motion, degrees: np.ndarray) -> Motion:
-    """Left and right thigh turned back by angles (2,) in all frames, about the axis through the hips."""
-    poses = motion.poses.copy()
-    for joint, angle in zip((JOINT["left_hip"], JOINT["right_hip"]), np.deg2rad(degrees)):
-        back = rotation_matrices(np.array([angle, 0.0, 0.0]))
-        poses[:, joint] = axis_angles(back @ rotation_matrices(poses[:, joint]))
-    return replace(motion, poses=poses)
+def opened_hips(motion: Motion) -> Motion:
+    """Each thigh turned back, in the frames where it is nearer to the spine than LAP, until it is not.
+
+    It turns about the axis through the hips, which a thigh to the side is not square to: hence repeatedly.
+    """
+    for _ in range(OPENINGS):
+        missing = np.maximum(0.0, np.deg2rad(LAP) - lap_clearance(motion))
+        poses = motion.poses.copy()
+        for joint, angles in zip(HIPS, missing.T):
+            back = rotation_matrices(angles[:, None] * SIDEWAYS)
+            poses[:, joint] = axis_angles(back @ rotation_matrices(poses[:, joint]))
+        motion = replace(motion, poses=poses)
+    return motion

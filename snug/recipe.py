@@ -43,7 +43,7 @@ class Recipe:
     contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most one
         of each window; in between anchors slide with the cloth.
     mixed: frames of mixed motions (snug.mixing) for each frame of a training motion, up to 20,000; not for
-        what learns simulated vertices. mixed_turn: see there [rad].
+        what learns simulated vertices. mixed_turn [rad], mixed_lift: see there.
     terms: energies in the loss; leaving one out is an ablation, and it is then never evaluated.
     material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
         (edges, hinges, uniform mass and squared contact of PBNS, see snug.baselines.springs; it has its own
@@ -77,6 +77,7 @@ class Recipe:
     contact_refresh: float = 0.01
     mixed: float = 12.0
     mixed_turn: float = 0.1
+    mixed_lift: float = 0.25
     terms: tuple[str, ...] = TERMS
     material: str = "stvk"
     detached: bool = False
@@ -107,8 +108,8 @@ class Recipe:
             )
         if self.swing_components < 1:
             raise RecipeError(f"recipe option swing_components={self.swing_components}: use at least 1")
-        sizes = ("mixed", "mixed_turn", "smoothing", "h0_sigma", "shape_range", "contact_refresh")
-        for option in ("swing", "rehearsal", *sizes):
+        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "swing", "rehearsal")
+        for option in ("mixed", "mixed_turn", "mixed_lift", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):

@@ -68,7 +68,8 @@ class Trainer:
         if how.physics:
             given = sum(len(motion.poses) for motion in motions)
             frames = min(round(recipe.mixed * given), MOST_MIXED)
-            mixed = mixed_motions(motions, frames, turn=recipe.mixed_turn, seed=seed)
+            options = {"turn": recipe.mixed_turn, "lifted": recipe.mixed_lift, "seed": seed}
+            mixed = mixed_motions(motions, frames, **options)
         self.data = TrainingSet(
             dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
         )

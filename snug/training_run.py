@@ -18,7 +18,7 @@ from snug.trainer import Trainer, part_of
 from snug.training_set import TrainingError
 from snug.validation import Validation, Validator
 
-FORMAT = "snug-checkpoint-3"
+FORMAT = "snug-checkpoint-4"
 Log = Callable[[dict[str, float]], None]
 
 
