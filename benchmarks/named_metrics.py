@@ -26,7 +26,7 @@ UNITS = {
     "gap": "1", "gap/energy": "J", "gradient": "1", "exact": "m",
     "time_error/curvature": "1/m", "time_error/order": "1", "time_error": "J",
     "cost/frame": "ms", "cost/batch": "ms", "cost/spread": "%", "cost/peak": "MB",
-    "cost/data": "s", "cost/train": "s", "cost/memory": "MB",
+    "cost/data": "s", "cost/setup": "s", "cost/train": "s", "cost/memory": "MB",
 } | {f"gap/found_by_{finder}": "frames" for finder in FINDERS}  # fmt: skip
 
 

@@ -53,6 +53,7 @@ DEVIATIONS = (
     Deviation("higher rate, by a cosine", ("learning_rate", "schedule")),
     Deviation("remembered states, less noise", ("remembered", "h0_sigma")),
     Deviation("overlapping windows", ("window_stride",)),
+    Deviation("even epochs", ("even",)),
     Deviation("mean body alone", ("shape_range",)),
     Deviation("contact of the simulator", ("contact_samples", "contact_stiffness", "contact_margin")),
     Deviation("mixed motions", ("mixed",)),

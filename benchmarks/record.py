@@ -81,8 +81,9 @@ class Record:
         """results.csv with the rows so far. Of all that is measured training alone uses an accelerator."""
         everything = provenance.hardware_line(self.hardware)
         processor = provenance.hardware_line(self.hardware | {"accelerator": None})
+        of_training = ("cost/setup", "cost/train")
         self.rows = [
-            dataclasses.replace(row, hardware=everything if row.metric == "cost/train" else processor)
+            dataclasses.replace(row, hardware=everything if row.metric in of_training else processor)
             for row in with_provenance(self.rows, preset=self.plan.preset.name, commit=self.commit)
         ]
         self.folder.write_rows(self.rows)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 
 def model_costs(trained: Trained | None, data_seconds: float | None) -> dict[str, float]:
-    """cost/data, cost/train and cost/memory of a method that uses this network; nothing without one.
+    """cost/data, cost/setup, cost/train and cost/memory of a method that uses this network; nothing without
+    one.
 
     data_seconds: None where nobody knows them any more; then there is no cost/data.
     """
@@ -28,7 +29,8 @@ def model_costs(trained: Trained | None, data_seconds: float | None) -> dict[str
         return {}
     data = data_seconds if learns_from_simulation(trained.kind) else 0.0
     known = {} if data is None else {"cost/data": data}
-    return known | {"cost/train": trained.seconds, "cost/memory": trained.megabytes}
+    times = {"cost/setup": trained.setup_seconds, "cost/train": trained.seconds}
+    return known | times | {"cost/memory": trained.megabytes}
 
 
 def clock_costs(outcome: Outcome) -> dict[str, float]:

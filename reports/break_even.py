@@ -39,7 +39,7 @@ def cost_of(measured: Measurements, method: str, scenes: Sequence[str]) -> Cost 
     frame = measured.value(method, TIME, scenes)
     if frame is None:
         return None
-    before = [measured.value(method, f"cost/{what}", scenes) or 0.0 for what in ("data", "train")]
+    before = [measured.value(method, f"cost/{what}", scenes) or 0.0 for what in ("data", "setup", "train")]
     return Cost(method, sum(before), frame / 1e3)
 
 

@@ -140,6 +140,7 @@ def cost(rows: Sequence[Row]) -> Table | None:
         rows,
         [
             ("cost/data", Column("data_generation", "Data generation", "s")),
+            ("cost/setup", Column("making_ready", "Making ready", "s")),
             ("cost/train", Column("training", "Training", "s")),
             ("cost/frame", Column("run_time", "Frame", "ms")),
             ("cost/batch", Column("batch", "In batch", "ms")),

@@ -100,11 +100,11 @@ def _mixed(
         phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
         added = rotation_matrices(stays + swings * np.sin(phase))
         poses[:, JOINT[joint]] = axis_angles(rotation_matrices(poses[:, JOINT[joint]]) @ added)
-    for joint in HIPS:
+    for hip in HIPS:
         height = random.uniform(0.0, np.deg2rad(LIFT)) * (random.random() < lifted)
         phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
         forward = rotation_matrices(-0.5 * height * (1 + np.sin(phase)) * SIDEWAYS)
-        poses[:, joint] = axis_angles(forward @ rotation_matrices(poses[:, joint]))
+        poses[:, hip] = axis_angles(forward @ rotation_matrices(poses[:, hip]))
     mixed = opened_hips(Motion(name, poses, translations, fps=fps, kind="mixed"))
     return spread_arms(mixed, max(0.0, CLEARANCE - float(np.rad2deg(arm_clearance(mixed).min()))))
 
@@ -134,8 +134,8 @@ def opened_hips(motion: Motion) -> Motion:
     for _ in range(OPENINGS):
         missing = np.maximum(0.0, np.deg2rad(LAP) - lap_clearance(motion))
         poses = motion.poses.copy()
-        for joint, angles in zip(HIPS, missing.T):
+        for hip, angles in zip(HIPS, missing.T):
             back = rotation_matrices(angles[:, None] * SIDEWAYS)
-            poses[:, joint] = axis_angles(back @ rotation_matrices(poses[:, joint]))
+            poses[:, hip] = axis_angles(back @ rotation_matrices(poses[:, hip]))
         motion = replace(motion, poses=poses)
     return motion

@@ -33,10 +33,13 @@ class Recipe:
         at the last step), `epochs` (a tenth after `drop_after_epochs` epochs) or `constant`.
     h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
     remembered: that noise is added to the state which the network last had after the frame before (see
-        snug.state_memory), instead of to nothing. Not for what learns simulated vertices; of little use where
-        `window_stride` is no divisor of `window`, for then few frames before a window ever end one.
+        snug.state_memory), instead of to nothing. Not for what learns simulated vertices, nor where
+        `shape_range` gives a sub-sequence another body each time; of little use where `window_stride` is no
+        divisor of `window`, for then few frames before a window ever end one.
     window, batch: frames of a sub-sequence, sub-sequences of a step.
     window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
+    even: parts of an epoch that each pass over all motions, taking every so manieth sub-sequence: by chance
+        alone (1) a hard pose may come so late that the network, by then sure of itself, meets it with joules.
     shape_range: each sub-sequence gets shape numbers from U(-r, r).
     contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
@@ -70,6 +73,7 @@ class Recipe:
     window: int = 3
     batch: int = 16
     window_stride: int = 1
+    even: int = 20
     shape_range: float = 0.0
     contact_samples: str = "all"
     contact_stiffness: float | None = None
@@ -100,8 +104,8 @@ class Recipe:
         unknown = [term for term in self.terms if term not in TERMS]
         if unknown:
             raise RecipeError(f"recipe option terms: unknown energy {unknown[0]!r}; known are {TERMS}")
-        if self.window < 1 or self.batch < 1 or self.window_stride < 1:
-            raise RecipeError("recipe options window, batch and window_stride must be at least 1")
+        if min(self.window, self.batch, self.window_stride, self.even) < 1:
+            raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
         if "inertia" in self.terms and self.window < 3:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
@@ -131,10 +135,10 @@ class Recipe:
 
 
 DEFAULT = Recipe()
-# Two things are not the text's: d(x) is taken to remembered points of the skin, which slide with the cloth
+# Three things are not the text's: d(x) is taken to remembered points of the skin, which slide with the cloth
 # and of which `contact_refresh` searches a few anew in a step (the text computes it anew; searching all 48
-# frames would take several times as long as the rest of a step), and only to skin that the rule of regions
-# allows.
+# frames would take several times as long as the rest of a step); only to skin that the rule of regions
+# allows; and the garment that the offsets are added to follows the shape of the body.
 PAPER = Recipe(
     name="paper",
     pose_input="axis_angle",
@@ -147,6 +151,7 @@ PAPER = Recipe(
     h0_sigma=0.1,
     remembered=False,
     window_stride=3,
+    even=1,
     shape_range=3.0,
     contact_samples="vertices",
     contact_stiffness=250.0,
@@ -203,6 +208,7 @@ def _without(term: str) -> Recipe:
 ABLATIONS = (
     *(_without(term) for term in ("bending", "strain", "gravity", "inertia")),
     replace(DEFAULT, name="no-noise", h0_sigma=0.0, remembered=False),
+    replace(DEFAULT, name="noise-alone", h0_sigma=0.1, remembered=False),  # as the paper has it
     replace(DEFAULT, name="window6", window=6, batch=8),
     replace(DEFAULT, name="window12", window=12, batch=4),
     replace(DEFAULT, name="springs", material="springs"),

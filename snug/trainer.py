@@ -33,7 +33,6 @@ from snug.training_set import CPU, Batch, TrainingError, TrainingSet
 
 DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
 MOST_MIXED = 20_000  # frames: each keeps its body and its anchors, 0.1 MB at 1000 vertices and more above
-EVEN = 20  # parts of an epoch that each pass over all motions
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -60,6 +59,8 @@ class Trainer:
             raise TrainingError(f"steps={steps}: training needs at least one step")
         if not motions:
             raise TrainingError("no motions to train on")
+        if kernels and device.type != "cpu":
+            raise TrainingError(f"kernels=True, device={device}: the kernels run on a CPU alone")
         how = find_kind(kind)
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
         self.device, self.group, self.clock = device, group, Stopwatch(device)
@@ -68,8 +69,8 @@ class Trainer:
         if how.physics:
             given = sum(len(motion.poses) for motion in motions)
             frames = min(round(recipe.mixed * given), MOST_MIXED)
-            options = {"turn": recipe.mixed_turn, "lifted": recipe.mixed_lift, "seed": seed}
-            mixed = mixed_motions(motions, frames, **options)
+            turn, lifted = recipe.mixed_turn, recipe.mixed_lift
+            mixed = mixed_motions(motions, frames, turn=turn, lifted=lifted, seed=seed)
         self.data = TrainingSet(
             dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
         )
@@ -124,7 +125,8 @@ class Trainer:
 
     def _state_memory(self) -> StateMemory | None:
         start = self.network.random_state(1, 0.0, torch.Generator())
-        if not (self.loss and self.recipe.remembered and isinstance(start, Tensor)):
+        remembered = self.recipe.remembered and not self.shaped  # a state belongs to one body
+        if not (self.loss and remembered and isinstance(start, Tensor)):
             return None
         return StateMemory(self.data.first, (start.shape[0], start.shape[-1]), self.device)
 
@@ -142,15 +144,12 @@ class Trainer:
         )
 
     def draw(self) -> np.ndarray:
-        """The next windows: every sub-sequence once, in random order, before any comes again.
-
-        Each part of an epoch takes every twentieth frame of all motions: by chance alone a hard pose may come
-        so late that the network, by then sure of itself, meets it with joules.
-        """
+        """The next windows: every sub-sequence once, in random order, before any comes again."""
+        even = self.recipe.even
         while len(self.order) < self.windows:
             parts = [
-                self.random.permutation(np.arange(offset, len(self.data.starts), EVEN))
-                for offset in self.random.permutation(EVEN)
+                self.random.permutation(np.arange(offset, len(self.data.starts), even))
+                for offset in self.random.permutation(even)
             ]
             self.order = np.concatenate([self.order, *parts])
             self.epoch += 1
@@ -236,7 +235,8 @@ class Trainer:
         state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
         if state is None:
             return None
-        return state[:, mine] + self.memory.at(batch.frames[:, 0]) if self.memory else state[:, mine]
+        state = state[:, mine].contiguous()  # as cuDNN wants it
+        return state + self.memory.at(batch.frames[:, 0]) if self.memory else state
 
     def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Tensor, Any]:
         """Vertices relative to the pelvis and offsets of the unposed garment, both (N, T, V, 3) [m], and the

@@ -1,8 +1,9 @@
 """Contact planes of batches of a training set, from anchors that are renewed as the network learns.
 
 Anchors slide with their samples in every step (snug.sliding). Searched, for skin that no slide would find,
-are the middle frames of a few windows in a step, and what is found there is lent to the frames around it,
-which show almost the same pose.
+are the middle frames of a few windows in a step, and what is found there is lent to the frames around it that
+show almost the same pose: an anchor from where the thigh was elsewhere claims a contact that is none, or none
+where a thigh stands in the hem.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from snug.training_set import Batch, TrainingSet
 # rows (N T,) into the positions and normals (R, P, 3) that follow: the body's patch in the frames of a batch.
 Posed = tuple[np.ndarray, Any, Any]
 TOGETHER = 64  # frames whose bodies are posed by one matrix product
-LENT, FIRST_LENT = 3, 7  # frames before and after a searched one that take over its anchors; at the start
+LENT, FIRST_LENT = 3, 7  # frames before and after a searched one that may take over its anchors; at the start
+NEAR, FIRST_NEAR = 0.03, 0.07  # m: if no mark of the body lies farther off in them; at the start
+MARKED = 25  # of so many vertices one is a mark
 
 
 class TrainingContact:
@@ -61,6 +64,7 @@ class TrainingContact:
         self._mean_shape: tuple[np.ndarray, np.ndarray] | None = None
         if one_shape and kernels:
             self._mean_shape = self._posed_everywhere()
+        self._marks = self._posed_marks()
         self._changed = np.zeros(frames, bool)
         self._before: tuple[Any, ...] | None = None
         self._credit = 0.0
@@ -78,6 +82,12 @@ class TrainingContact:
             posed = (spread @ columns).view(len(spread), len(transforms), 3)
             positions[start : start + TOGETHER] = posed.transpose(0, 1).numpy()
         return positions, self.patch.normals(positions)
+
+    def _posed_marks(self) -> np.ndarray:
+        """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]."""
+        rest, weights = self.template[::MARKED], self.weights[::MARKED]
+        parts = self.data.transforms.split(TOGETHER)
+        return np.concatenate([skin(rest, weights, part).cpu().numpy() for part in parts])
 
     def posed(self, batch: Batch) -> Posed:
         """The body where the frames of a batch have it."""
@@ -116,22 +126,22 @@ class TrainingContact:
     def search_first(self, weights: Tensor) -> None:
         """Search where the skinned template touches, in as many frames as lend to all others.
 
-        weights (V, 24): skinning weights of the garment. Exact, for an anchor may stand for long; and now: a
-        thigh that is found in the hem only later meets, with joules, a network that has long since settled.
+        weights (V, 24): skinning weights of the garment. Now, for a thigh that is found in the hem only later
+        meets, with joules, a network that has long since settled.
         """
-        data, last = self.data, 0
-        for first, end in zip(data.first[:-1], data.first[1:]):
-            for middle in range(first + FIRST_LENT, end + FIRST_LENT, 2 * FIRST_LENT + 1):
-                frame = min(middle, int(end) - 1)
-                place = torch.as_tensor([[frame]], device=data.device)
-                tensors = (data.features[place], data.rest, data.transforms[place], data.ahead[place])
-                batch = Batch(np.array([[frame]]), *tensors)
-                x = skin(data.rest, weights, batch.transforms)
-                rows, positions, _ = self.posed(batch)
-                self.anchors.faces[frame] = self.anchors.faces[last]  # a good place to begin
-                self.anchors.renew(frame, self._samples(x[0, 0]), positions[rows[0]], exact=True)
-                self._lend(frame, FIRST_LENT)
-                last = frame
+        data, frame, lent = self.data, 0, 0
+        while lent < data.frames:
+            last, frame = frame, self._near(lent, FIRST_LENT, FIRST_NEAR).stop - 1
+            place = torch.as_tensor([[frame]], device=data.device)
+            tensors = (data.features[place], data.rest, data.transforms[place], data.ahead[place])
+            batch = Batch(np.array([[frame]]), *tensors)
+            x = skin(data.rest, weights, batch.transforms)
+            rows, positions, _ = self.posed(batch)
+            self.anchors.faces[frame] = self.anchors.faces[last]  # a good place to begin
+            self.anchors.renew(frame, self._samples(x[0, 0]), positions[rows[0]])
+            end = self._near(frame, FIRST_LENT, FIRST_NEAR).stop
+            self._lend(frame, np.arange(lent, end))
+            lent = end
         self._changed[:] = False  # a resumed run makes these anchors again
 
     def renew(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
@@ -147,17 +157,28 @@ class TrainingContact:
         middle = frames[:, window // 2]
         oldest = self.anchors.oldest(middle, count)
         self.search(oldest * window + window // 2, frames, posed, x)
-        for frame in np.unique(middle[oldest]):
-            self._lend(int(frame), LENT)
+        searched = np.unique(middle[oldest])
+        for frame in searched:
+            around = self._near(int(frame), LENT, NEAR)
+            self._lend(int(frame), np.setdiff1d(np.arange(around.start, around.stop), searched))
 
-    def _lend(self, frame: int, reach: int) -> None:
-        """To as many frames before and after it, of the same motion."""
+    def _near(self, frame: int, reach: int, near: float) -> slice:
+        """The frames around it, of the same motion and at most `reach` off, up to where a mark has moved by
+        `near` [m].
+        """
         first = self.data.first
         motion = int(np.searchsorted(first, frame, side="right")) - 1
-        around = slice(max(frame - reach, first[motion]), min(frame + reach + 1, first[motion + 1]))
+        start, stop = max(frame - reach, int(first[motion])), min(frame + reach + 1, int(first[motion + 1]))
+        moved = np.linalg.norm(self._marks[start:stop] - self._marks[frame], axis=2).max(axis=1)
+        far = (start + np.flatnonzero(moved > near)).tolist()
+        before, after = (f + 1 for f in far if f < frame), (f for f in far if f > frame)
+        return slice(max([start, *before]), min([stop, *after]))
+
+    def _lend(self, frame: int, others: np.ndarray) -> None:
+        """The anchors of a frame to others (n,), as if they had been searched."""
         for table in self._tables():
-            table[around] = table[frame]
-        self.anchors.age[around], self._changed[around] = 0, True
+            table[others] = table[[frame]]  # a copy: torch writes no tensor onto itself
+        self.anchors.age[others], self._changed[others] = 0, True
 
     def settle(self, frames: np.ndarray, *, trusted: bool) -> None:
         """Keep where anchors slid to since `planes`, or, where a prediction is no guide, put them back; then

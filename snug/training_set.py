@@ -16,6 +16,7 @@ from snug.skinning import joint_transforms
 
 CPU = torch.device("cpu")
 STD_FLOOR = 0.05  # an input that hardly moved in training must not explode on a motion where it does
+CONSTANT = 1e-5  # spread below which an input did not move at all, but for rounding
 
 
 class TrainingError(ValueError):
@@ -88,9 +89,14 @@ class TrainingSet:
         return f"motion {self.names[motion]!r} frame {frame - self.first[motion]}"
 
     def input_statistics(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and spread (D,) of the inputs; of the shape numbers those of the recipe's U(-r, r)."""
-        mean, std = self.features.mean(0).cpu().numpy(), self.features.std(0).cpu().numpy()
-        std = np.maximum(std, STD_FLOOR)
+        """Mean and spread (D,) of the inputs; of the shape numbers those of the recipe's U(-r, r).
+
+        An input that never varies has an infinite spread, so that what it does later goes to no weight: those
+        are as random as they began.
+        """
+        mean = self.features.mean(0).cpu().numpy()
+        std = self.features.std(0, correction=0).cpu().numpy()
+        std = np.where(std < CONSTANT, np.inf, np.maximum(std, STD_FLOOR))
         shapes = self.dressed.body.shape_count
         if self.recipe.shape_range and self._ends_in_shape:
             mean[-shapes:], std[-shapes:] = 0.0, self.recipe.shape_range / np.sqrt(3.0)

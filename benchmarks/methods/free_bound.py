@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from reference_sim import Cloth, Potential, Trajectory
-from reference_sim.energies import ContactPenalty, Inertia
+from reference_sim.energies import ContactPenalty, Gravity, Inertia
 from reference_sim.minimise import make_minimiser
 
 from ..scene import BuiltScene
@@ -80,6 +80,10 @@ class FreeBound:
             ClipInertia(self.cloth, scene.dt, frames),
         ]
         self.sums: list[float] = []
+        # What the pelvis's own height adds to gravity: large, the same for all, and no measure of a fall.
+        gravity = next(term for term in scene.energies if isinstance(term, Gravity))
+        heights = np.zeros(frames) if scene.origin_heights is None else scene.origin_heights
+        self.carried = float(gravity.weights.sum() * (heights - gravity.origin_height).sum())
 
     def run(self) -> Trajectory:
         clock = time.perf_counter()
@@ -98,7 +102,7 @@ class FreeBound:
                 break
             x = result.positions
             self.sums.append(result.energy)
-            settled = before - result.energy < FALL * abs(result.energy)
+            settled = before - result.energy < FALL * abs(result.energy - self.carried)
             if settled:
                 break
         status, reason = "ok", ""

@@ -85,7 +85,7 @@ def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
     frames = np.arange(len(static), dtype=np.float64)
     moving = moving - moving.mean()
     best = (np.inf, 0.0, 0.0)
-    for lag in np.arange(-MAX_LAG, MAX_LAG + 0.005, 0.01):
+    for lag in np.arange(-100 * MAX_LAG, 100 * MAX_LAG + 1) / 100:
         shifted = np.interp(frames - lag, frames, static)
         shifted = shifted - shifted.mean()
         power = float(shifted @ shifted)
