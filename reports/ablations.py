@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from benchmarks.results import Row
-from reports.scatter import scatter
+from reports.scatter import differ
 from reports.summary import TSHIRT, Measurements, suite_rows, wardrobe
 from reports.table import Cell, Column, Table
 
@@ -18,6 +18,7 @@ ABLATIONS = {
     "snug-no-gravity": "without gravity",
     "snug-no-inertia": "without inertia",
     "snug-no-noise": "with first states of zero",
+    "snug-noise-alone": "with first states of noise, none remembered",
     "snug-window6": "with windows of 6",
     "snug-window12": "with windows of 12",
     "snug-springs": "with springs instead of StVK",
@@ -31,9 +32,12 @@ COLUMNS = {
     "energy/total": Column("total", "Total", "J"),
     "curvature/error": Column("error", "Curvature error", "1/m"),
     "penetration/vertices": Column("vertices", "Below skin", "%"),
+    "dynamics/amplitude": Column("amplitude", "A"),
+    "dynamics/correlation": Column("correlation", "Correlation"),
     "roll_out/drift": Column("drift", "Drift", "mm"),
 }
-# A term that is left out of the loss is of course larger: these measures are nobody's own loss.
+# A term that is left out of the loss is of course larger; the total is the full recipe's own loss, curvature
+# error (the paper's measure) is nobody's.
 JUDGED = {
     "energy/total": "total energy",
     "curvature/error": "curvature error",
@@ -113,6 +117,6 @@ def _judged(method: str, source: Source) -> tuple[dict[str, str], dict[str, str]
     for metric, words in JUDGED.items():
         measured, scenes = source[metric]
         full, own = measured.pair(FULL, method, metric, scenes)
-        if full is not None and own is not None and abs(full.value - own.value) > scatter(full, own):
+        if full is not None and own is not None and differ(full, own):
             (worse if own.value > full.value else better)[words] = own.fewer
     return worse, better

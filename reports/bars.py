@@ -25,6 +25,7 @@ class Bar:
     bound: float
     value: Callable[[Measurements, Measurements], Mean | None]
     at_least: bool = False
+    each: bool = False  # seed has to meet it
 
 
 def bars() -> tuple[Bar, ...]:
@@ -36,7 +37,8 @@ def bars() -> tuple[Bar, ...]:
         Bar("Strain beside PBNS", "%", -20.0, _share("energy/strain", "snug", "pbns")),
         Bar("Vertices below the skin", "%", 5.0, _of("penetration/vertices", "snug")),
         Bar("Roll-outs on training motions, above windows", "%", 3.0, _roll_out_above_windows),
-        Bar("Windows above 2 J once training has settled", "1", 0.0, _trained("train/high_windows")),
+        Bar("Windows above 2 J once training has settled", "1", 0.0, _trained("train/high_windows"),
+            each=True),
         Bar("One training step of 16 windows, on a core", "ms", 20.0, _trained("train/step")),
         Bar("All training steps", "s", 120.0, _of("cost/train", "snug")),
         Bar("One frame", "ms", 0.5, _of("cost/frame", "snug")),
@@ -69,7 +71,12 @@ def table(rows: Sequence[Row]) -> Table | None:
 
 
 def met(bar: Bar, found: Mean) -> str:
-    """In words; a number nearer to its bound than seeds scatter is said to be."""
+    """In words; a number nearer to its bound than seeds scatter is said to be, where it is a mean that has to
+    meet it.
+    """
+    if bar.each:
+        worst = (min if bar.at_least else max)(found.by_seed)
+        found = replace(found, value=worst, spread=None)
     exact = Mean(bar.bound, None, found.scenes, seeds=1, complete=True, seeded=False)
     if found.spread and abs(found.value - bar.bound) <= scatter(found, exact):
         return "within the scatter of seeds"

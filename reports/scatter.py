@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import statistics
+from dataclasses import replace
 
 from reports.summary import Mean
 
@@ -28,6 +30,38 @@ def scatter(one: Mean, other: Mean) -> float:
     if min(one.seeds, other.seeds) > 1:
         freedom = (first + second) ** 2 / (first**2 / (one.seeds - 1) + second**2 / (other.seeds - 1))
     return float(stdtrit(freedom, LEVEL)) * math.sqrt(first + second)
+
+
+def apart(one: Mean, other: Mean) -> tuple[float, float] | None:
+    """How far the first is above the second, and how far seeds alone may put it there, as shares of the
+    second: they differ where the one is larger than the other. None beside a second that is zero.
+
+    Where every seed of both has a positive number, their logarithms are tested: what came out a thousand
+    times as large, or a million times with another seed, is told apart from one, though its spread is larger
+    than its mean.
+    """
+    if other.value == 0.0:
+        return None
+    first, second = _in_logarithms(one), _in_logarithms(other)
+    if first and second and spreads_of(first, second):
+        factor = first.value - second.value
+        return math.expm1(factor), abs(math.expm1(math.copysign(scatter(first, second), factor)))
+    size = abs(other.value)
+    return (one.value - other.value) / size, scatter(one, other) / size
+
+
+def differ(one: Mean, other: Mean) -> bool:
+    """Whether two means differ by more than their seeds scatter."""
+    shares = apart(one, other) or apart(other, one)
+    return shares is not None and abs(shares[0]) > shares[1]
+
+
+def _in_logarithms(mean: Mean) -> Mean | None:
+    if not mean.by_seed or min(mean.by_seed) <= 0.0:
+        return None
+    logs = [math.log(value) for value in mean.by_seed]
+    spread = statistics.stdev(logs) if len(logs) > 1 else None
+    return replace(mean, value=statistics.fmean(logs), spread=spread)
 
 
 def spreads_of(one: Mean, other: Mean) -> tuple[float, float] | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from benchmarks.results import Row
 from reports import palette
@@ -29,7 +29,8 @@ class Mean:
 
     `complete` says that every seed has every scene asked for; otherwise the mean is over fewer cells
     than its neighbours in a table, and the table must say so. `stalled` says that a solver left some
-    frames of some cell unconverged, `seeded` that another seed would give another value.
+    frames of some cell unconverged, `seeded` that another seed would give another value. `by_seed`: the mean
+    over scenes of each seed; empty for what was derived from other means.
     """
 
     value: float
@@ -39,6 +40,7 @@ class Mean:
     complete: bool
     stalled: bool = False
     seeded: bool = True
+    by_seed: tuple[float, ...] = field(default=(), compare=False)
 
     @property
     def fewer(self) -> str:
@@ -74,6 +76,10 @@ class Measurements:
         """Value by seed, empty where nothing usable was measured."""
         return self._values.get((scene, method, metric), {})
 
+    def diverged(self, method: str) -> bool:
+        """Whether that is what became of the method somewhere."""
+        return any(row.method == method and row.status == "diverged" for row in self.rows)
+
     def mean(self, method: str, metric: str, scenes: Sequence[str] | None = None) -> Mean | None:
         """Mean over the scenes (all by default) and seeds that have the metric, None if there are none."""
         by_seed: dict[int, list[float]] = {}
@@ -90,7 +96,8 @@ class Measurements:
         complete = all(len(values) == len(asked) for values in by_seed.values())
         stalled = any((scene, method) in self._stalled for scene in used)
         seeded = palette.is_seeded(method)
-        return Mean(statistics.fmean(means), spread, len(used), len(means), complete, stalled, seeded)
+        counts = len(used), len(means)
+        return Mean(statistics.fmean(means), spread, *counts, complete, stalled, seeded, tuple(means))
 
     def shared(
         self, methods: Iterable[str], metric: str, scenes: Sequence[str] | None = None

@@ -15,6 +15,7 @@ from reports import palette
 from reports.canvas import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
 
 LARGEST_HEADER = 64_000_000  # bytes; a longer one is a broken file
+PHYSICS = "physics loss [J per frame]"
 
 
 class ModelHeaderError(ValueError):
@@ -29,9 +30,10 @@ class History:
     rows: list[dict[str, float]]
 
     @property
-    def by_vertices(self) -> bool:
-        """Whether the loss is a distance to simulated vertices [cm^2], not an energy [J]."""
-        return bool(self.rows) and "vertices" in self.rows[0]
+    def panel(self) -> str:
+        """What its loss is, by the terms of it that were logged: each kind has a panel of its own."""
+        terms = {"vertices": "vertex loss [cm²]", "low": "vertex loss of two bands [cm]"}
+        return next((title for term, title in terms.items() if term in self.rows[0]), PHYSICS)
 
     def column(self, name: str) -> np.ndarray:
         return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
@@ -56,7 +58,7 @@ def read_history(path: Path) -> History | None:
 
 
 def training_curves(folder: Path, models: Path, problems: list[str]) -> list[Picture]:
-    """Loss against training time: energies in one panel, vertex distances in another."""
+    """Loss against training time: energies in one panel, distances of vertices in others."""
     histories = []
     for path in sorted(models.glob("*.safetensors")):
         try:
@@ -68,14 +70,8 @@ def training_curves(folder: Path, models: Path, problems: list[str]) -> list[Pic
             histories.append(history)
     shown = palette.leading({history.method for history in histories})
     histories = [history for history in histories if history.method in shown]
-    panels = [
-        (title, kept)
-        for title, kept in (
-            ("physics loss [J per frame]", [h for h in histories if not h.by_vertices]),
-            ("vertex loss [cm²]", [h for h in histories if h.by_vertices]),
-        )
-        if kept
-    ]
+    titles = sorted({history.panel for history in histories}, key=lambda title: (title != PHYSICS, title))
+    panels = [(title, [h for h in histories if h.panel == title]) for title in titles]
     return [_draw(folder, panels)] if panels else []
 
 

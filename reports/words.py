@@ -12,7 +12,7 @@ from reports.ablations import JUDGED, judged_ablations
 from reports.answers import answers
 from reports.numbers import number, with_spread
 from reports.palette import NETWORKS, REFERENCE
-from reports.scatter import TIE, scatter
+from reports.scatter import TIE, differ
 from reports.summary import TERMS, Measurements, dressed_scenes, only, suite_rows
 
 PAPER_TERMS = ("strain", "bending", "gravity", "inertia")
@@ -86,7 +86,7 @@ def against(measured: Measurements, rival: str) -> str:
             continue
         told, fewer = told or own.spread is not None or other.spread is not None, own.fewer or fewer
         a, b = own.value, other.value
-        if abs(a - b) <= scatter(own, other):
+        if not differ(own, other):
             groups["equal in"].append(term)
         else:
             groups["lower in" if a < b else "higher in"].append(f"{term} ({change(a, b)})")

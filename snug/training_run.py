@@ -15,7 +15,6 @@ from torch import Tensor
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.trained_model import TrainedModel
 from snug.trainer import Trainer, part_of
-from snug.training_set import TrainingError
 from snug.validation import Validation, Validator
 
 FORMAT = "snug-checkpoint-4"
@@ -136,7 +135,7 @@ class TrainingRun:
             self.best = {name: tensor.clone() for name, tensor in weights.items()}
 
     def _out_of_patience(self) -> bool:
-        waited = self.done - max(self.best_step, 0)
+        waited = self.done - self.best_step
         return self.patience > 0 and waited >= self.patience * self.validated_every
 
     def _checkpoint_due(self) -> bool:
@@ -214,8 +213,6 @@ class TrainingRun:
 
     def _finished(self) -> TrainedModel:
         trainer = self.trainer
-        if not self.history:
-            raise TrainingError("the checkpoint is of a finished run")
         summary = {**trainer.guard.summary, "epochs": trainer.epoch, "training_frames": trainer.data.frames}
         if self.validator:
             if self.best:

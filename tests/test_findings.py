@@ -79,7 +79,17 @@ def test_recipes_keep_their_order_and_their_dashes():
     table = recipes(rows)
     assert [line[0] for line in table.rows] == ["default", "paper", "default, no zero start"]
     assert table.rows[1][1].value == 9.0 and table.rows[1][1].seeds == 2 and table.rows[1][2] is None
-    assert table.rows[1][-1].value == 7.0 and table.rows[1][1].complete
+    assert table.rows[1][-2].value == 7.0 and table.rows[1][1].complete and table.rows[1][-1] is None
+
+
+def test_what_diverged_is_the_worse_one_and_not_a_dash():
+    rows = [row("snug", "energy/total", 1.0)]
+    words = "Full SNUG has less total energy than without strain"
+    assert told(rows)[words][-1] is None
+    diverged = Row(
+        "garments", "dressed/kick", "snug-no-strain", 0, "cost/frame", "ms", None, "diverged", "nan"
+    )
+    assert told([*rows, diverged])[words][2:] == (None, "J", None, None, "reproduced: the second diverged")
 
 
 def test_the_page_shows_what_was_judged_and_counts_the_rest():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from report_folder import row
 from scipy import stats
@@ -12,7 +13,7 @@ from benchmarks.methods import METHODS
 from reports import bars, words
 from reports.ablations import ABLATIONS, ablations, ablations_judged
 from reports.document import document
-from reports.scatter import TIE, scatter
+from reports.scatter import TIE, apart, differ, scatter
 from reports.summary import Mean, Measurements, dressed_scenes, wardrobe
 from reports.tables import make_tables
 from reports.throughput import throughput, throughput_bars
@@ -46,6 +47,30 @@ def test_the_scatter_is_the_threshold_of_welchs_test(shift):
 def test_where_no_seeds_tell_it_the_scatter_is_a_share():
     assert scatter(mean_of((1.0,)), mean_of((-2.0,), "pbns")) == pytest.approx(2.0 * TIE)
     assert scatter(mean_of((1.0, 1.0)), mean_of((2.0, 2.0))) == 0.0
+
+
+def test_positive_numbers_are_told_apart_by_their_factors():
+    sound, broken = mean_of((0.36, 0.35, 0.37)), mean_of((1e7, 2e3, 6e6), "pbns")
+    assert abs(sound.value - broken.value) < scatter(sound, broken)  # the spread of what broke hides it
+    assert differ(sound, broken) and differ(broken, sound)
+    logs = [np.log(mean.by_seed) for mean in (sound, broken)]
+    factor = logs[0].mean() - logs[1].mean()
+    assert stats.ttest_ind(*logs, equal_var=False).pvalue < 0.05
+    share, least = apart(sound, broken)
+    assert share == pytest.approx(np.exp(factor) - 1) and 0 < least < 1 and abs(share) > least
+    for shift in (0.05, 0.1, 0.2, 0.3, 0.4, 0.5):
+        one, other = mean_of(ONE), mean_of((0.9 + shift, 1.5 + shift, 1.0 + shift), "pbns")
+        p = stats.ttest_ind(np.log(one.by_seed), np.log(other.by_seed), equal_var=False).pvalue
+        assert differ(one, other) == (p < 0.05)
+
+
+def test_other_numbers_are_told_apart_by_their_difference():
+    one, other = mean_of((-0.1, 0.1, 0.0)), mean_of((1.0, 1.2, 1.1), "pbns")
+    assert differ(one, other)
+    assert apart(one, other) == pytest.approx((-1.0, scatter(one, other) / 1.1))
+    nothing = mean_of((0.0,), "simulation")
+    assert apart(other, nothing) is None and differ(other, nothing) and not differ(one, nothing)
+    assert apart(mean_of((1.0,)), mean_of((1.04,), "pbns"))[1] == pytest.approx(TIE)
 
 
 @pytest.mark.parametrize("entry", METHODS, ids=lambda entry: entry.name)
@@ -135,6 +160,8 @@ def test_bars_are_met_missed_or_too_near_to_tell():
     ends = [("train/roll_out", (1.04, 1.04)), ("train/window", (1.0, 1.0)), ("train/high_windows", (0.0,))]
     rows += [r for name, v in ends for r in seeds_of("snug", name, v, suite="roll-outs", scene="training")]
     found = met(rows)
+    high = seeds_of("snug", "train/high_windows", (0.0, 1.0, 17.0), suite="roll-outs", scene="training")
+    assert met(high)["Windows above 2 J once training has settled"] == (6.0, "missed")  # by two of three
     assert found["Roll-outs on training motions, above windows"] == (pytest.approx(4.0), "missed")
     assert found["Windows above 2 J once training has settled"] == (0.0, "met")
 

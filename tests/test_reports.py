@@ -160,8 +160,10 @@ def test_with_opengl_or_without_there_is_a_picture(made, tmp_path):
 
 def test_histories_come_from_the_models_headers(made):
     history = training.read_history(made.models / "snug-seed0.safetensors")
-    assert history is not None and history.method == "snug" and not history.by_vertices
+    assert history is not None and history.method == "snug" and history.panel == training.PHYSICS
     assert history.column("loss").tolist() == [2.0, 1.0, 0.5]
+    taught = [training.History("m", [{"loss": 1.0, term: 1.0}]) for term in ("vertices", "low", "strain")]
+    assert len({history.panel for history in taught}) == 3
 
 
 def test_the_command_answers_without_loading_anything_heavy():
