@@ -128,6 +128,8 @@ class Agenda:
         inputs: dict[str, Any] = {"preset": preset_values(self.plan.preset, code), "machine": self.machine}
         if any(path.startswith("snug/") for path in code):
             inputs["files"] = _data_files()
+            if self.plan.body:
+                inputs["body"] = digest_of_file(self.plan.body)
         return inputs
 
     def motion(self, name: str) -> str:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from .clips import SUFFIX
+from .meetings import default_suites
+from .method import MethodEntry
 from .methods import METHODS
-from .presets import PRESETS
+from .presets import PRESETS, find_preset
 from .scenes import SMALL_SCENES, WORN
 from .studies import STUDIES
 from .suites import SUITES
@@ -24,8 +27,14 @@ def listing() -> str:
     ]
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),
-        ("scenes", [*((s.name, s.description) for s in SMALL_SCENES), *dressed]),
-        ("methods", ((m.name, m.description) for m in METHODS)),
+        (
+            f"scenes; of a dressed body also its liveliest part, as {dressed[0][0]}{SUFFIX}",
+            [*((s.name, s.description) for s in SMALL_SCENES), *dressed],
+        ),
+        (
+            "methods, and the suites in which they take part without being named",
+            ((m.name, f"{m.description} {_where(m)}") for m in METHODS),
+        ),
         ("training motions", ((name, "") for name in TRAIN)),
         ("training motions of garments that swing", ((name, "") for name in SWING_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
@@ -34,6 +43,11 @@ def listing() -> str:
         ("studies", ((s.name, f"{s.suite}: {s.description}") for s in STUDIES)),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
+
+
+def _where(method: MethodEntry) -> str:
+    suites = default_suites(method.name, find_preset("quick"))
+    return f"[{', '.join(suites)}]" if suites else "[when named]"
 
 
 def _map(name: str) -> tuple[str, str]:

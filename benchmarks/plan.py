@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import importlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from snug.recipe import learns_from_simulation
 
+from .meetings import meetings, named
 from .methods import METHODS, find_method
 from .presets import Preset
 from .scene import Scene
@@ -26,8 +26,6 @@ from .suites.validation import METHOD as VALIDATION_METHOD
 
 if TYPE_CHECKING:
     from snug.motion import Motion
-
-MEETINGS = ("garments", "speed")  # suites in which scenes meet methods
 
 
 class PlanError(ValueError):
@@ -65,7 +63,7 @@ class Network:
 class Plan:
     """Everything to be done. train and test are names of motions; files holds those read from files.
 
-    swing_train, swing_test: the same for garments that swing.
+    swing_train, swing_test: the same for garments that swing. body: file of an own one; None: the package's.
     only: states of the folder's records in which a piece of work is done again; fresh: all records are
     forgotten first. workers: processes side by side where nothing is timed against another.
     """
@@ -81,6 +79,7 @@ class Plan:
     swing_train: tuple[str, ...] = ()
     swing_test: tuple[str, ...] = ()
     files: dict[str, Motion] = field(default_factory=dict)
+    body: Path | None = None
     seeds: tuple[int, ...]
     device: str
     folder: Path
@@ -210,36 +209,25 @@ def choose_cells(
 ) -> tuple[tuple[Cell, ...], tuple[Check, ...], tuple[Case, ...]]:
     """Cells, checks and cases that the request names. Raises PlanError for a word that names nothing.
 
-    scenes and methods are names or patterns; empty means all. Naming scenes reaches all of each suite.
+    scenes and methods: see benchmarks.meetings.
     """
     declared = all_scenes(motions.test, motions.swing_test)
     rows = [item.name for group in (CHECKS, CASES, STUDIES) for item in group]
     _check_words("scene", scenes, [*declared, *rows])
     _check_words("method", methods, [entry.name for entry in METHODS])
-    full, further = full or bool(scenes), bool(scenes) or preset.further
 
     found: dict[tuple[str, str, int], Cell] = {}
-    for suite in suites:
-        if suite not in MEETINGS:
-            continue
-        module = importlib.import_module(f"benchmarks.suites.{suite}")
-        for scene in module.scenes(motions.test, motions.swing_test, full=full, further=further):
-            others = module.FURTHER if methods or preset.further else ()
-            # Networks for a second garment double the training: only for whoever names its scenes.
-            plain = not further and declared[scene].garment not in ("", TSHIRT)
-            for method in (*module.methods(preset.newton_cuts), *others):
-                if not (_named(scene, scenes) and _named(method, methods)):
-                    continue
-                if plain and find_method(method).trained:
-                    continue
-                for seed in seeds if find_method(method).seeded else (0,):
-                    key = (scene, method, seed)
-                    before = found[key].suites if key in found else ()
-                    found[key] = Cell(declared[scene], method, seed, (*before, suite))
+    for suite, scene, method in meetings(
+        suites, declared, full=full, preset=preset, motions=motions, scenes=scenes, methods=methods
+    ):
+        for seed in seeds if find_method(method).seeded else (0,):
+            key = (scene, method, seed)
+            before = found[key].suites if key in found else ()
+            found[key] = Cell(declared[scene], method, seed, (*before, suite))
     known = [check for check in CHECKS if check.smoke or scenes or preset.name != "smoke"]
-    checks = _matching(known, scenes, "validation" in suites and _named(VALIDATION_METHOD, methods))
+    checks = _matching(known, scenes, "validation" in suites and named(VALIDATION_METHOD, methods))
     hard = [case for case in CASES if case.smoke or scenes or preset.name != "smoke"]
-    cases = _matching(hard, scenes, "extremes" in suites and _named(EXTREMES_METHOD, methods))
+    cases = _matching(hard, scenes, "extremes" in suites and named(EXTREMES_METHOD, methods))
     if not (found or checks or cases or choose_studies(suites, scenes, methods)):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
     # The reference first: an error against it can be said as soon as another cell is done.
@@ -252,7 +240,7 @@ def choose_cells(
 def choose_studies(suites: Sequence[str], scenes: Sequence[str], methods: Sequence[str]) -> tuple[Study, ...]:
     """The studies of the suites, chosen by name as scenes are."""
     known = [study for study in STUDIES if study.suite in suites]
-    return _matching(known, scenes, _named(STUDIES_METHOD, methods))
+    return _matching(known, scenes, named(STUDIES_METHOD, methods))
 
 
 def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
@@ -266,11 +254,7 @@ def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
 
 
 def _matching(items, patterns: Sequence[str], wanted: bool):
-    return tuple(item for item in items if wanted and _named(item.name, patterns))
-
-
-def _named(name: str, patterns: Sequence[str]) -> bool:
-    return not patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
+    return tuple(item for item in items if wanted and named(item.name, patterns))
 
 
 def _check_words(what: str, patterns: Sequence[str], names: Sequence[str]) -> None:

@@ -15,8 +15,8 @@ from datetime import datetime
 from pathlib import Path
 
 from .clock import one_thread
+from .meetings import MEETINGS
 from .plan import (
-    MEETINGS,
     Motions,
     Plan,
     PlanError,
@@ -41,6 +41,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run --motions clips/ --test-motions 01_01
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
+  python -m benchmarks.run --body mine.npz --suite garments
 
 motions: without --motions the embedded library, which has its own test set. With --motions the files
   replace the library; "library" among the paths keeps it. --test-motions names those to test on, all
@@ -87,6 +88,11 @@ def make_parser() -> argparse.ArgumentParser:
     add("--motions", action="append", default=[], metavar="PATH",
         help="motion file or folder (.amc with its .asf, .npz), or the word library; repeatable")  # fmt: skip
     add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
+    add(
+        "--body",
+        metavar="FILE",
+        help="an own body, .npz in SMPL's layout, in place of the package's; garments are made for it",
+    )
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
@@ -177,6 +183,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         swing_train=motions.swing_train,
         swing_test=motions.swing_test,
         files=motions.files,
+        body=choose_body(options.body),
         seeds=seeds,
         device=options.device,
         folder=folder,
@@ -185,6 +192,16 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         workers=workers,
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
+
+
+def choose_body(path: str | None) -> Path | None:
+    """The file of an own body, once read. Raises snug.body.BodyError for one that is none."""
+    if path is None:
+        return None
+    from snug.body import Body
+
+    Body.from_file(path)
+    return Path(path)
 
 
 def split(values: Sequence[str]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .scenes import TSHIRT
@@ -50,8 +51,15 @@ class Wardrobe:
         return self.body.vertices(motion.poses, motion.translations) if ready is None else ready
 
 
-def open_wardrobe(preset: Preset, motions: Iterable[Motion], garments: Iterable[str] = (TSHIRT,)) -> Wardrobe:
-    """Load the body, tailor these garments and no other; motions are cut to the preset's length.
+def open_wardrobe(
+    preset: Preset,
+    motions: Iterable[Motion],
+    garments: Iterable[str] = (TSHIRT,),
+    *,
+    body: Path | None = None,
+) -> Wardrobe:
+    """Load the body, or that of a file, tailor these garments and no other; motions are cut to the preset's
+    length.
 
     The liveliest part of each is there too, under a name of its own: see clips.
     """
@@ -60,11 +68,13 @@ def open_wardrobe(preset: Preset, motions: Iterable[Motion], garments: Iterable[
 
     from .clips import clip
 
-    body = Body.load()
-    tailored = {name: find_pattern(name).tailor(body, vertices=preset.garment_vertices) for name in garments}
+    wearer = Body.from_file(body) if body else Body.load()
+    tailored = {
+        name: find_pattern(name).tailor(wearer, vertices=preset.garment_vertices) for name in garments
+    }
     whole = [motion.cut(0, preset.frames) for motion in motions]
-    clips = [clip(body, motion, preset.clip_frames) for motion in whole]
-    return Wardrobe(body, tailored, {motion.name: motion for motion in (*whole, *clips)})
+    clips = [clip(wearer, motion, preset.clip_frames) for motion in whole]
+    return Wardrobe(wearer, tailored, {motion.name: motion for motion in (*whole, *clips)})
 
 
 def embedded_motions(names: Iterable[str]) -> list[Motion]:

@@ -128,7 +128,7 @@ def _run(options: argparse.Namespace) -> int:
     stop = _StopRequest()
     group, device = join_group(device)
     try:
-        body = Body.load()
+        body = Body.from_file(options.body) if options.body else Body.load()
         for pattern in patterns:
             out = Path(options.out)
             if len(patterns) > 1:

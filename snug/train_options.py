@@ -34,6 +34,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--garment", metavar="NAME", action="append", default=[],
         help="tshirt, tunic or skirt; repeat for one model each (default: tshirt)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
+    add("--body", metavar="FILE", help="an own body, .npz in SMPL's layout (default: that of the package)")
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
     add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
     add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")

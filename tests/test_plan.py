@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks import plan
 from benchmarks.plan import Motions, PlanError, choose_cells, choose_motions
 from benchmarks.presets import find_preset
 from benchmarks.suites import extremes
@@ -58,6 +59,45 @@ def test_patterns_choose_scenes_methods_checks_and_cases():
     assert cases == extremes.MAPS["map_sheet"]
     _, checks, cases = cells(("validation", "extremes"), methods=["sim*"])
     assert len(checks) >= 10 and len(cases) >= 8
+
+
+def swinging(suites, **chosen):
+    motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
+    options = {"full": False, "preset": find_preset("quick"), "seeds": (0,), "scenes": (), "methods": ()}
+    return choose_cells(suites, motions=motions, **(options | chosen))[0]
+
+
+def test_what_no_suite_lists_is_met_by_its_whole_name():
+    both = ("garments", "speed")
+    plain = {(cell.scene.name, cell.suites) for cell in swinging(both, scenes=["tunic/*"])}
+    assert plain == {("tunic/twist_stop", ("garments",))}
+    clip, whole = "tunic/twist_stop@clip", "dressed/twist_stop"
+    met = {(cell.scene.name, cell.suites) for cell in swinging(both, scenes=[clip, whole])}
+    assert met == {(clip, ("speed",)), (whole, ("garments",))}
+    assert not {clip, whole} & {cell.scene.name for cell in swinging(both)}
+
+
+def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
+    from benchmarks import meetings, methods, scenes
+    from benchmarks.method import MethodEntry
+    from benchmarks.scene import Scene
+
+    mine = Scene(name="my_scene", description="", module="my_scene")
+    monkeypatch.setattr(scenes, "SMALL_SCENES", (*scenes.SMALL_SCENES, mine))
+    entries = (*methods.METHODS, MethodEntry(name="my-method", description="", module="my_method"))
+    for module in (methods, meetings, plan):
+        monkeypatch.setattr(module, "METHODS", entries)
+    found = swinging(("garments", "speed"), scenes=["my_scene"], methods=["simulation", "my-method"])
+    assert [(c.scene, c.method, c.suites) for c in found] == [
+        (mine, "simulation", ("speed",)),
+        (mine, "my-method", ("speed",)),
+    ]
+    worn = swinging(("garments", "speed"), scenes=["dressed/kick"], methods=["my-method"])
+    assert [(c.scene.name, c.suites) for c in worn] == [("dressed/kick", ("garments",))]
+    for choice in ({}, {"scenes": ["*"]}, {"methods": ["*"]}):
+        assert not {"my_scene", "my-method"} & {
+            name for c in swinging(("speed",), **choice) for name in (c.scene.name, c.method)
+        }
 
 
 def test_motions_are_divided_as_help_says(tmp_path):

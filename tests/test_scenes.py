@@ -12,7 +12,7 @@ from benchmarks import agenda
 from benchmarks.agenda import Agenda
 from benchmarks.clips import clip, joint_speeds
 from benchmarks.methods import find_method
-from benchmarks.plan import choose_suites
+from benchmarks.plan import choose_suites, network_of
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.run import main
 from benchmarks.scenes import SMALL_SCENES, all_scenes, dressed_scene
@@ -157,6 +157,26 @@ def test_suite_speed_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
     for name in plan.train_of("tshirt"):  # its strides are those of `walk`, its heading is nobody's
         nearest = np.abs(walk.poses[:, None] - make_motion(name).poses).max(axis=(2, 3)).min(axis=1)
         assert nearest.mean() > np.radians(10), name
+
+
+def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_path):
+    body = Body.load()
+    path, table = tmp_path / "tall.npz", np.stack([np.maximum(body.parents, 0), np.arange(24)])
+    arrays = {"v_template": body.template, "shapedirs": body.shape_directions, "f": body.faces}
+    arrays |= {"J_template": body.joint_template, "J_shapedirs": body.joint_directions}
+    tall = {key: 1.1 * array if key != "f" else array for key, array in arrays.items()}
+    np.savez(path, weights=body.skinning_weights, kintree_table=table, **tall)
+    plain, own = (plan_of("--suite", "garments", *more) for more in ((), ("--body", str(path))))
+    cell = next(cell for cell in own.cells if cell.method == "snug")
+    keys = [
+        (Agenda(plan).network(network_of(cell)).key, Agenda(plan).cell(cell).key) for plan in (plain, own)
+    ]
+    assert not set(keys[0]) & set(keys[1])
+    low, high = (open_wardrobe(TINY, [make_motion("walk")], body=file) for file in (None, path))
+    heights = [np.ptp(wardrobe.garment.rest_positions[:, 1]) for wardrobe in (low, high)]
+    assert 1.05 < heights[1] / heights[0] < 1.15
+    scene = dressed_scene("walk").build(TINY, high)
+    assert scene.dressed is not None and scene.dressed.body is high.body
 
 
 def plan_of(*words):
