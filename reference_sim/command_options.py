@@ -121,7 +121,7 @@ def _add_contact_and_time(parser: argparse.ArgumentParser) -> None:
     contact.add_argument(
         "--barrier",
         action="store_true",
-        help="IPC's barrier in place of the penalty: nothing passes, twenty times the time (needs ipctk)",
+        help="IPC's barrier in place of the penalty: nothing passes, twelve times the time (needs ipctk)",
     )
     contact.add_argument(
         "--self-contact", action="store_true", help="the cloth meets itself too, by the barrier"
