@@ -27,7 +27,7 @@ def model_costs(trained: Trained | None, data_seconds: float | None) -> dict[str
     """
     if trained is None:
         return {}
-    data = data_seconds if learns_from_simulation(trained.kind) else 0.0
+    data = data_seconds if learns_from_simulation(trained.name) else 0.0
     known = {} if data is None else {"cost/data": data}
     times = {"cost/setup": trained.setup_seconds, "cost/train": trained.seconds}
     return known | times | {"cost/memory": trained.megabytes}

@@ -25,7 +25,7 @@ class Trained:
     files: the model, in the run's folder.
     """
 
-    kind: str
+    name: str
     seed: int
     recipe: str
     seconds: float
@@ -85,7 +85,7 @@ def train_network(
         )  # fmt: skip
     model.save(path)
     return Trained(
-        kind=name,
+        name=name,
         seed=seed,
         recipe=model.recipe.name,
         seconds=model.seconds,

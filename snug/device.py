@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import torch
 
+CPU = torch.device("cpu")
+
 
 class DeviceError(ValueError):
     """A device that this machine does not have; the message says what to use instead."""

@@ -37,10 +37,10 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from snug.baselines.springs import SquaredContact, spring_terms
+from snug.device import CPU
 from snug.lanes import lane_kernel
 from snug.recipe import Recipe
 
-CPU = torch.device("cpu")
 STATIC = ("strain", "bending", "gravity")
 Planes = tuple[Any, Any] | Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 

@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from snug.motion import Motion, arm_clearance, spread_arms
+from snug.recipe import Recipe
 from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
 
 PARTS: tuple[tuple[str, ...], ...] = (
@@ -40,8 +41,18 @@ TURNED = {
 }  # fmt: skip
 RATE = (0.2, 1.0)  # Hz, of the slow turns and lifts
 FRAMES = 60  # of a mixed clip
+MOST_MIXED = 20_000  # frames: each keeps its body and its anchors
+MOST_ANCHORS = 2e9  # bytes, of those of mixed frames
+ANCHORS = 24  # bytes of a frame's for each vertex: six samples, four bytes each
 HIPS, SIDEWAYS = (JOINT["left_hip"], JOINT["right_hip"]), np.array([1.0, 0.0, 0.0])
 OPENINGS = 5  # leave less than a degree missing, almost always
+
+
+def mixed_for(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed: int) -> list[Motion]:
+    """The clips that a recipe asks for beside those motions, for a garment of so many vertices."""
+    given = sum(motion.frames for motion in motions)
+    frames = min(round(recipe.mixed * given), MOST_MIXED, int(MOST_ANCHORS / (ANCHORS * vertices)))
+    return mixed_motions(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
 
 
 def mixed_motions(

@@ -15,11 +15,12 @@ import torch
 from torch import Tensor
 
 from snug.baselines.supervised import VertexTargets
+from snug.device import CPU
 from snug.dresser import DressedBody
 from snug.fast_skinning import FastSkin
 from snug.guard import SETTLING, Guard, live_tensors
 from snug.loss import PhysicsLoss
-from snug.mixing import mixed_motions
+from snug.mixing import mixed_for
 from snug.parallel import ALONE, Group, GroupError
 from snug.recipe import Recipe
 from snug.regressor import Regressor
@@ -29,10 +30,9 @@ from snug.stopwatch import Stopwatch
 from snug.swing import SwingTeacher
 from snug.trained_model import find_kind, make_network
 from snug.training_contact import Posed, TrainingContact
-from snug.training_set import CPU, Batch, TrainingError, TrainingSet
+from snug.training_set import Batch, TrainingError, TrainingSet
 
 DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
-MOST_MIXED = 20_000  # frames: each keeps its body and its anchors, 0.1 MB at 1000 vertices and more above
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -65,12 +65,7 @@ class Trainer:
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
-        mixed: list[Any] = []
-        if how.physics:
-            given = sum(len(motion.poses) for motion in motions)
-            frames = min(round(recipe.mixed * given), MOST_MIXED)
-            turn, lifted = recipe.mixed_turn, recipe.mixed_lift
-            mixed = mixed_motions(motions, frames, turn=turn, lifted=lifted, seed=seed)
+        mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
         self.data = TrainingSet(
             dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
         )

@@ -10,11 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from snug.device import CPU
 from snug.dresser import DressedBody
 from snug.recipe import Recipe
 from snug.skinning import joint_transforms
 
-CPU = torch.device("cpu")
 STD_FLOOR = 0.05  # an input that hardly moved in training must not explode on a motion where it does
 CONSTANT = 1e-5  # spread below which an input did not move at all, but for rounding
 

@@ -12,7 +12,7 @@ from torch.overrides import TorchFunctionMode
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from snug.contact import PARTS, Anchors, Patch
-from snug.device import DeviceError, find_device
+from snug.device import CPU, DeviceError, find_device
 from snug.lanes import lane_kernel
 from snug.loss import STATIC, held_on
 from snug.recipe import DEFAULT, PAPER
@@ -22,7 +22,6 @@ from snug.trainer import Trainer
 from snug.training_set import TrainingSet
 
 PLAIN = replace(DEFAULT, mixed=0.0)
-CPU = torch.device("cpu")
 
 
 def made(recipe, *, kernels, kind="snug"):

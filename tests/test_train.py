@@ -10,7 +10,7 @@ import torch
 from dressing import leaning, swaying, tube_dress
 
 from snug.baselines.supervised import TargetError, vertex_loss
-from snug.mixing import lap_clearance, mirrored, mixed_motions
+from snug.mixing import lap_clearance, mirrored, mixed_for, mixed_motions
 from snug.motion import Motion, arm_clearance, make_motion
 from snug.recipe import DEFAULT, PAPER, Recipe
 from snug.rollout import roll_out
@@ -246,6 +246,14 @@ def test_mixed_legs_come_from_clips_of_their_own():
     lifted = np.array([clip.poses[0, [JOINT["left_hip"], JOINT["right_hip"]], 0] < -0.5 for clip in mixed])
     for legs in ([True, False], [False, True], [True, True], [False, False]):
         assert (lifted == legs).all(1).any(), legs
+
+
+def test_mixed_frames_are_as_many_as_asked_for_and_as_memory_holds():
+    clips = [make_motion("walk")]  # of 120 frames
+    recipe = replace(DEFAULT, mixed=3.0)
+    counts = {v: len(mixed_for(clips, recipe, vertices=v, seed=0)) for v in (1000, 500_000, 2_000_000)}
+    assert counts == {1000: 6, 500_000: 3, 2_000_000: 1}
+    assert len(mixed_for(clips, replace(DEFAULT, mixed=500.0), vertices=1000, seed=0)) == 333  # 20,000 frames
 
 
 def test_mixed_motions_join_the_training_set():

@@ -52,5 +52,5 @@ class Network:
 
 
 def make(*, models: Path, seed: int, kind: str) -> Network:
-    """The network of that kind ("snug", "supervised", "pbns" or "untrained") and seed."""
+    """The network of that name, "untrained" or one of snug.recipe.TRAININGS, and seed."""
     return Network(model_path(models, kind, seed))

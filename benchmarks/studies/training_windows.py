@@ -54,7 +54,11 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
         model = TrainedModel.load(path)
         how = find_kind(model.kind)
         if model.steps and how.physics and how.sequences and how.teacher is None:
-            found += _judged(name, seed, model, dressed, motions)
+            try:
+                found += _judged(name, seed, model, dressed, motions)
+            except ValueError as error:  # no given motion has as many frames as a window of this one
+                reason = " ".join(str(error).split())
+                found.append(Row(SUITE, SCENE, name, seed, "train/window", "J", None, "failed", reason))
     return found
 
 

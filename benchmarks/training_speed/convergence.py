@@ -6,6 +6,7 @@ network into the folder; a run that was killed goes on from its last checkpoint 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -59,6 +60,7 @@ def curve(history: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
         left_out += (row["step"] - before) * row.get("seconds/validation", 0.0)
         before = row["step"]
         point = {name: row[name] for name in COLUMNS if name in row}
+        point.setdefault("validation", math.nan)  # it was not finite
         points.append(point | {"seconds": row["seconds"] - left_out})
     return points
 
@@ -75,7 +77,7 @@ def _found(points: Sequence[Mapping[str, float]]) -> list[Row]:
         ("all steps, share of the paper's 2 h", 100 * float(seconds[-1]) / PAPER_SECONDS, "%"),
         ("window loss at the end", points[-1]["loss"], "J"),
         ("validation at the end", float(validation[-1]), "J"),
-        ("validation at its best", float(validation.min()), "J"),
+        ("validation at its best", float(np.nanmin(validation)), "J"),
     ]
     for share in CLOSE:
         there = arrival(validation, share)
