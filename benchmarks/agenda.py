@@ -129,7 +129,7 @@ class Agenda:
         if any(path.startswith("snug/") for path in code):
             inputs["files"] = _data_files()
             if self.plan.body:
-                inputs["body"] = digest_of_file(self.plan.body)
+                inputs["body"] = self.plan.body.digest
         return inputs
 
     def motion(self, name: str) -> str:

@@ -14,7 +14,6 @@ from .presets import Preset
 from .records import Records, Work
 from .results import Row, RunFolder
 from .rows import clock_costs, model_costs, rows_of
-from .training import Trained
 from .wardrobe import Wardrobe
 from .workers import Failure, Job, Tell, run_jobs
 
@@ -69,7 +68,7 @@ def costs_of(cell: Cell, agenda: Agenda, records: Records) -> dict[str, float]:
     data = [records.find(agenda.data(motion, network.garment)) for motion in motions]
     gone = any(found.state == "missing" for found in data)
     seconds = None if gone else sum((found.result or {}).get("seconds", 0.0) for found in data)
-    return model_costs(Trained(**result), seconds)
+    return model_costs(network.name, result, seconds)
 
 
 def jobs_of_scenes(

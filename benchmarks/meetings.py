@@ -32,7 +32,8 @@ def meetings(
     """(suite, scene, method), suite by suite. scenes and methods are names or patterns; empty means all.
 
     Naming scenes reaches all of each suite. A scene that no suite lists is met where its whole name is given:
-    a body in a whole motion in garments, all else in speed. A method that no suite lists is met likewise.
+    a body in a whole motion in garments, all else in speed. A method that no suite lists takes part in each
+    suite where its whole name is given.
     """
     full, further = full or bool(scenes), bool(scenes) or preset.further
     loose_scenes = _unlisted_scenes(declared, motions, scenes)

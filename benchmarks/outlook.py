@@ -47,6 +47,8 @@ class Outlook:
     def made_before_cells(self) -> Iterator[str]:
         """Garment, ground truth and networks."""
         plan, agenda = self.plan, self.agenda
+        if plan.body:
+            yield f"body {plan.body.path}"
         if plan.needs_wardrobe:
             for garment in plan.garments:
                 yield f"{garment} of about {plan.preset.garment_vertices} vertices"

@@ -59,11 +59,19 @@ class Network:
         return f"{self.name} seed {self.seed}" + (f" ({self.garment})" if self.garment != TSHIRT else "")
 
 
+@dataclass(frozen=True)
+class OwnBody:
+    """A user's body: its file, and a digest of what it held when the run was planned."""
+
+    path: Path
+    digest: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class Plan:
     """Everything to be done. train and test are names of motions; files holds those read from files.
 
-    swing_train, swing_test: the same for garments that swing. body: file of an own one; None: the package's.
+    swing_train, swing_test: the same for garments that swing. body: an own one; None: the package's.
     only: states of the folder's records in which a piece of work is done again; fresh: all records are
     forgotten first. workers: processes side by side where nothing is timed against another.
     """
@@ -79,7 +87,7 @@ class Plan:
     swing_train: tuple[str, ...] = ()
     swing_test: tuple[str, ...] = ()
     files: dict[str, Motion] = field(default_factory=dict)
-    body: Path | None = None
+    body: OwnBody | None = None
     seeds: tuple[int, ...]
     device: str
     folder: Path
@@ -123,6 +131,11 @@ class Plan:
         """Garments whose training motions have to be simulated."""
         learning = (network for network in self.networks if learns_from_simulation(network.name))
         return tuple(dict.fromkeys(network.garment for network in learning))
+
+    @property
+    def body_file(self) -> Path | None:
+        """The file of an own body."""
+        return self.body.path if self.body else None
 
     @property
     def needs_wardrobe(self) -> bool:

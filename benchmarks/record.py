@@ -35,7 +35,7 @@ class Record:
             "scenes": [scene.name for scene in plan.scenes],
             "methods": list(dict.fromkeys(cell.method for cell in plan.cells)),
             "motions": {"train": list(plan.train), "test": list(plan.test)} if plan.needs_wardrobe else {},
-            "body": plan.body.name if plan.body else "of the package",
+            "body": [plan.body.path.name, plan.body.digest] if plan.body else "of the package",
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,

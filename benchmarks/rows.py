@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 from snug.recipe import learns_from_simulation
 
@@ -15,22 +15,22 @@ from .methods import find_method
 from .named_metrics import MM, unit_of
 from .results import Row
 
-if TYPE_CHECKING:
-    from .training import Trained
 
-
-def model_costs(trained: Trained | None, data_seconds: float | None) -> dict[str, float]:
+def model_costs(
+    name: str | None, trained: Mapping[str, Any] | None, data_seconds: float | None
+) -> dict[str, float]:
     """cost/data, cost/setup, cost/train and cost/memory of a method that uses this network; nothing without
     one.
 
-    data_seconds: None where nobody knows them any more; then there is no cost/data.
+    trained: what its record says, of whatever version. data_seconds: None where nobody knows them any more;
+    then there is no cost/data.
     """
-    if trained is None:
+    if name is None or not trained:
         return {}
-    data = data_seconds if learns_from_simulation(trained.name) else 0.0
+    data = data_seconds if learns_from_simulation(name) else 0.0
     known = {} if data is None else {"cost/data": data}
-    times = {"cost/setup": trained.setup_seconds, "cost/train": trained.seconds}
-    return known | times | {"cost/memory": trained.megabytes}
+    costs = {"cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes"}
+    return known | {metric: trained[key] for metric, key in costs.items() if key in trained}
 
 
 def clock_costs(outcome: Outcome) -> dict[str, float]:

@@ -18,6 +18,7 @@ from .clock import one_thread
 from .meetings import MEETINGS
 from .plan import (
     Motions,
+    OwnBody,
     Plan,
     PlanError,
     choose_cells,
@@ -91,7 +92,8 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--body",
         metavar="FILE",
-        help="an own body, .npz in SMPL's layout, in place of the package's; garments are made for it",
+        help="an own body, .npz in SMPL's layout, in place of the package's; garments are made for it "
+        "(extreme cases of single steps keep the package's)",
     )
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
@@ -194,14 +196,16 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     )
 
 
-def choose_body(path: str | None) -> Path | None:
-    """The file of an own body, once read. Raises snug.body.BodyError for one that is none."""
+def choose_body(path: str | None) -> OwnBody | None:
+    """An own body, once it has been read. Raises snug.body.BodyError for a file that holds none."""
     if path is None:
         return None
     from snug.body import Body
 
+    from .fingerprint import digest_of_file
+
     Body.from_file(path)
-    return Path(path)
+    return OwnBody(Path(path), digest_of_file(Path(path)))
 
 
 def split(values: Sequence[str]) -> list[str]:

@@ -123,7 +123,7 @@ class Stages:
         motions = [plan.files[name] for name in names if name in plan.files]
         motions += embedded_motions(name for name in names if name not in plan.files)
         try:
-            self.wardrobe = open_wardrobe(plan.preset, motions, plan.garments, body=plan.body)
+            self.wardrobe = open_wardrobe(plan.preset, motions, plan.garments, body=plan.body_file)
         except ValueError as error:  # of all cells only the dressed ones fail
             self.naked = one_line(error)
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from benchmarks.results import Row
-from reports.scatter import differ
+from reports.scatter import difference
 from reports.summary import TSHIRT, Measurements, suite_rows, wardrobe
 from reports.table import Cell, Column, Table
 
@@ -117,6 +117,6 @@ def _judged(method: str, source: Source) -> tuple[dict[str, str], dict[str, str]
     for metric, words in JUDGED.items():
         measured, scenes = source[metric]
         full, own = measured.pair(FULL, method, metric, scenes)
-        if full is not None and own is not None and differ(full, own):
-            (worse if own.value > full.value else better)[words] = own.fewer
+        if full is not None and own is not None and (sign := difference(own, full)):
+            (worse if sign > 0 else better)[words] = own.fewer
     return worse, better

@@ -18,14 +18,17 @@ SWINGING = ("tunic/twist_stop",)  # unseen, of a garment that swings
 
 @dataclass(frozen=True)
 class Bar:
-    """A number that should be at most, or at least, `bound`; `value` finds it in (measured, roll-outs)."""
+    """A number that should be at most, or at least, `bound`; `value` finds it in (measured, roll-outs).
+
+    each: whether every seed has to meet it, and not their mean.
+    """
 
     words: str
     unit: str
     bound: float
     value: Callable[[Measurements, Measurements], Mean | None]
     at_least: bool = False
-    each: bool = False  # seed has to meet it
+    each: bool = False
 
 
 def bars() -> tuple[Bar, ...]:
@@ -71,9 +74,7 @@ def table(rows: Sequence[Row]) -> Table | None:
 
 
 def met(bar: Bar, found: Mean) -> str:
-    """In words; a number nearer to its bound than seeds scatter is said to be, where it is a mean that has to
-    meet it.
-    """
+    """In words. Where a mean is asked for, one nearer to its bound than seeds scatter is said to be."""
     if bar.each:
         worst = (min if bar.at_least else max)(found.by_seed)
         found = replace(found, value=worst, spread=None)
@@ -101,6 +102,7 @@ def ratio(one: Mean | None, other: Mean | None) -> Mean | None:
         seeds=seeds,
         complete=one.complete and other.complete,
         stalled=one.stalled or other.stalled,
+        by_seed=(),
         seeded=one.seeded or other.seeded,
     )
 

@@ -24,7 +24,7 @@ FEW = 3  # networks whose crossings a caption has room for; of more it names SNU
 
 @dataclass(frozen=True)
 class Cost:
-    """What a method costs: before the first frame (data and training) and for each frame [s]."""
+    """What a method costs [s]: before the first frame (data, making ready, training) and for each frame."""
 
     method: str
     before: float

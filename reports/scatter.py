@@ -33,8 +33,8 @@ def scatter(one: Mean, other: Mean) -> float:
 
 
 def apart(one: Mean, other: Mean) -> tuple[float, float] | None:
-    """How far the first is above the second, and how far seeds alone may put it there, as shares of the
-    second: they differ where the one is larger than the other. None beside a second that is zero.
+    """How far the first is above the second, and how far seeds alone may put it there, both as shares of the
+    second. None where the second is zero.
 
     Where every seed of both has a positive number, their logarithms are tested: what came out a thousand
     times as large, or a million times with another seed, is told apart from one, though its spread is larger
@@ -50,10 +50,15 @@ def apart(one: Mean, other: Mean) -> tuple[float, float] | None:
     return (one.value - other.value) / size, scatter(one, other) / size
 
 
-def differ(one: Mean, other: Mean) -> bool:
-    """Whether two means differ by more than their seeds scatter."""
-    shares = apart(one, other) or apart(other, one)
-    return shares is not None and abs(shares[0]) > shares[1]
+def difference(one: Mean, other: Mean) -> int:
+    """1 where the first is larger by more than seeds scatter, -1 where the second is, else 0."""
+    sign = 1
+    shares = apart(one, other)
+    if shares is None:
+        sign, shares = -1, apart(other, one)
+    if shares is None or abs(shares[0]) <= shares[1]:
+        return 0
+    return sign if shares[0] > 0 else -sign
 
 
 def _in_logarithms(mean: Mean) -> Mean | None:

@@ -12,7 +12,7 @@ from reports.ablations import JUDGED, judged_ablations
 from reports.answers import answers
 from reports.numbers import number, with_spread
 from reports.palette import NETWORKS, REFERENCE
-from reports.scatter import TIE, differ
+from reports.scatter import TIE, difference
 from reports.summary import TERMS, Measurements, dressed_scenes, only, suite_rows
 
 PAPER_TERMS = ("strain", "bending", "gravity", "inertia")
@@ -86,11 +86,12 @@ def against(measured: Measurements, rival: str) -> str:
             continue
         told, fewer = told or own.spread is not None or other.spread is not None, own.fewer or fewer
         a, b = own.value, other.value
-        if not differ(own, other):
+        sign = difference(own, other)
+        if sign == 0:
             groups["equal in"].append(term)
         else:
-            groups["lower in" if a < b else "higher in"].append(f"{term} ({change(a, b)})")
-            below |= {term} if a < b else set()
+            groups["lower in" if sign < 0 else "higher in"].append(f"{term} ({change(a, b)})")
+            below |= {term} if sign < 0 else set()
     parts = [f"{word} {_listed(terms)}" for word, terms in groups.items() if terms]
     if not parts:
         return ""

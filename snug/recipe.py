@@ -38,8 +38,8 @@ class Recipe:
         divisor of `window`, for then few frames before a window ever end one.
     window, batch: frames of a sub-sequence, sub-sequences of a step.
     window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
-    even: parts of an epoch that each pass over all motions, taking every so manieth sub-sequence: by chance
-        alone (1) a hard pose may come so late that the network, by then sure of itself, meets it with joules.
+    even: parts of an epoch that each pass over all motions, each taking one sub-sequence of so many: by
+        chance alone (1) a hard pose may come so late that the network, by then settled, meets it with joules.
     shape_range: each sub-sequence gets shape numbers from U(-r, r).
     contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
@@ -116,6 +116,8 @@ class Recipe:
         for option in ("mixed", "mixed_turn", "mixed_lift", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
+        if self.mixed_lift > 1.0:
+            raise RecipeError(f"recipe option mixed_lift={self.mixed_lift}: a share, so at most 1")
         for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")

@@ -2,8 +2,8 @@
 
 Anchors slide with their samples in every step (snug.sliding). Searched, for skin that no slide would find,
 are the middle frames of a few windows in a step, and what is found there is lent to the frames around it that
-show almost the same pose: an anchor from where the thigh was elsewhere claims a contact that is none, or none
-where a thigh stands in the hem.
+show almost the same pose. Lent farther, an anchor from where the thigh was elsewhere claims a contact that is
+none, or misses a thigh that stands in the hem.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ from snug.training_set import Batch, TrainingSet
 Posed = tuple[np.ndarray, Any, Any]
 TOGETHER = 64  # frames whose bodies are posed by one matrix product
 LENT, FIRST_LENT = 3, 7  # frames before and after a searched one that may take over its anchors; at the start
-NEAR, FIRST_NEAR = 0.03, 0.07  # m: if no mark of the body lies farther off in them; at the start
-MARKED = 25  # of so many vertices one is a mark
+# m: how far a mark of the body may have moved from a frame to one that it lends to. At the start a frame lies
+# within FIRST_NEAR of the first and of the last that it lends to; from those between it may be twice as far.
+NEAR, FIRST_NEAR = 0.03, 0.07
+MARKED = 25  # every so many vertices of the patch there is a mark
 
 
 class TrainingContact:
@@ -85,9 +87,10 @@ class TrainingContact:
 
     def _posed_marks(self) -> np.ndarray:
         """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]."""
-        rest, weights = self.template[::MARKED], self.weights[::MARKED]
+        # On the CPU whatever the device, so that processes that share a run lend alike.
+        rest, weights = self.template[::MARKED].cpu(), self.weights[::MARKED].cpu()
         parts = self.data.transforms.split(TOGETHER)
-        return np.concatenate([skin(rest, weights, part).cpu().numpy() for part in parts])
+        return np.concatenate([skin(rest, weights, part.cpu()).numpy() for part in parts])
 
     def posed(self, batch: Batch) -> Posed:
         """The body where the frames of a batch have it."""

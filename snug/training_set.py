@@ -91,8 +91,8 @@ class TrainingSet:
     def input_statistics(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean and spread (D,) of the inputs; of the shape numbers those of the recipe's U(-r, r).
 
-        An input that never varies has an infinite spread, so that what it does later goes to no weight: those
-        are as random as they began.
+        An input that never varies gets an infinite spread: the network then never reads it, for the weights
+        behind it stay as random as they began.
         """
         mean = self.features.mean(0).cpu().numpy()
         std = self.features.std(0, correction=0).cpu().numpy()

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 
+import pytest
 from plans import SMOKE, plan_of
 
 from benchmarks import workers
+from benchmarks.plan import OwnBody
 from benchmarks.results import RunFolder
-from benchmarks.studies import dependence
+from benchmarks.studies import dependence, hard_motions
 from reports import study_tables
 
 
@@ -42,3 +44,24 @@ def test_a_mesh_that_fails_is_a_row(tmp_path, monkeypatch):
     rows = dependence.rows(plan_of(tmp_path), RunFolder(tmp_path), None)
     assert [row.status for row in rows] == ["failed"] * 2
     assert {row.scene for row in rows} == {"dependence/mesh/200", "dependence/mesh/300"}
+
+
+def test_an_own_body_is_the_one_that_is_measured(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(workers, "run_jobs", lambda jobs, *_, **__: asked.extend(jobs) or [[] for _ in jobs])
+    own = OwnBody(tmp_path / "mine.npz", "0")
+    dependence.rows(plan_of(tmp_path, body=own), RunFolder(tmp_path), None)
+    hard_motions.rows(plan_of(tmp_path, body=own), RunFolder(tmp_path), None)
+    assert len(asked) > 2 and all(job.arguments[-1] == own.path for job in asked)
+    opened = []
+
+    def opening(*_, body, **__):
+        opened.append(body)
+        raise ValueError("no such body")
+
+    monkeypatch.setattr("benchmarks.wardrobe.open_wardrobe", opening)
+    monkeypatch.setattr(hard_motions, "_kept", {})
+    for job in (asked[0], asked[-1]):
+        with pytest.raises(ValueError, match="no such body"):
+            job.function(None, lambda _: None, *job.arguments)
+    assert opened == [own.path] * 2

@@ -90,6 +90,21 @@ def test_what_diverged_is_the_worse_one_and_not_a_dash():
         "garments", "dressed/kick", "snug-no-strain", 0, "cost/frame", "ms", None, "diverged", "nan"
     )
     assert told([*rows, diverged])[words][2:] == (None, "J", None, None, "reproduced: the second diverged")
+    pbns = [row("pbns", "energy/strain", 1.0)]
+    broken = Row("garments", "dressed/kick", "snug", 0, "cost/frame", "ms", None, "diverged", "nan")
+    assert told([*pbns, broken])["SNUG is below PBNS in strain"][-1] == "not reproduced: the first diverged"
+    smooth = [row("supervised", "curvature/mean", 1.0), broken]
+    line = "The supervised network is smoother than SNUG: mean curvature"
+    assert told(smooth)[line][-1] is None
+    lost = Row("garments", "dressed/kick", "supervised", 0, "cost/frame", "ms", None, "diverged", "nan")
+    assert told([row("snug", "curvature/mean", 1.0), lost])[line][-1] is None
+
+
+def test_noise_is_judged_beside_zeros_and_not_as_an_ablation():
+    names = {
+        (claim.lower, claim.higher) for claim in claims() if "snug-noise-alone" in (claim.lower, claim.higher)
+    }
+    assert names == {("snug-noise-alone", "snug-no-noise")}
 
 
 def test_the_page_shows_what_was_judged_and_counts_the_rest():

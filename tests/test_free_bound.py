@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from dressing import swaying, tube_dress
@@ -96,3 +98,12 @@ def test_a_bound_that_still_falls_is_no_bound_yet(scene, bound, monkeypatch):
     method.prepare(scene)
     trajectory = method.run()
     assert trajectory.status == "stalled" and "still falling after 1 rounds" in trajectory.reason
+
+
+def test_the_height_of_the_pelvis_counts_for_no_fall(scene):
+    heights = np.linspace(0.9, 1.1, FRAMES)
+    method = FreeBound()
+    method.prepare(dataclasses.replace(scene, origin_heights=heights))
+    assert method.carried == pytest.approx(9.81 * scene.cloth.masses.sum() * heights.sum())
+    method.prepare(scene)
+    assert method.carried == 0.0

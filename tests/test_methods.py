@@ -104,7 +104,10 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(outcomes, 
     for name, (built, found) in outcomes.items():
         recorded = [outcome for outcome in found if outcome.recorded]
         kinds = [find_method(outcome.cell.method).trained for outcome in recorded]
-        costs = [model_costs(trained.get(kind), 7.0) for kind in kinds]
+        costs = [
+            model_costs(kind, dataclasses.asdict(trained[kind]) if kind in trained else None, 7.0)
+            for kind in kinds
+        ]
         metrics = measure_scene(recorded, built, run, gap_samples=2)
         for outcome, measured, cost in zip(recorded, metrics, costs):
             values = measured | clock_costs(outcome) | cost

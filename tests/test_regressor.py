@@ -147,6 +147,9 @@ def test_recipes_survive_a_file(recipe):
         ({"terms": ("strain", "wind")}, "'wind'"),
         ({"window": 2}, "window"),
         ({"learning_rate": 0.0}, "learning_rate"),
+        ({"even": 0}, "even"),
+        ({"mixed_lift": 1.5}, "mixed_lift"),
+        ({"mixed_lift": -0.1}, "mixed_lift"),
     ],
 )
 def test_recipe_refuses_nonsense(options, words):

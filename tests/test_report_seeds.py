@@ -13,7 +13,7 @@ from benchmarks.methods import METHODS
 from reports import bars, words
 from reports.ablations import ABLATIONS, ablations, ablations_judged
 from reports.document import document
-from reports.scatter import TIE, apart, differ, scatter
+from reports.scatter import TIE, apart, difference, scatter
 from reports.summary import Mean, Measurements, dressed_scenes, wardrobe
 from reports.tables import make_tables
 from reports.throughput import throughput, throughput_bars
@@ -52,7 +52,7 @@ def test_where_no_seeds_tell_it_the_scatter_is_a_share():
 def test_positive_numbers_are_told_apart_by_their_factors():
     sound, broken = mean_of((0.36, 0.35, 0.37)), mean_of((1e7, 2e3, 6e6), "pbns")
     assert abs(sound.value - broken.value) < scatter(sound, broken)  # the spread of what broke hides it
-    assert differ(sound, broken) and differ(broken, sound)
+    assert difference(sound, broken) == -1 and difference(broken, sound) == 1
     logs = [np.log(mean.by_seed) for mean in (sound, broken)]
     factor = logs[0].mean() - logs[1].mean()
     assert stats.ttest_ind(*logs, equal_var=False).pvalue < 0.05
@@ -61,15 +61,15 @@ def test_positive_numbers_are_told_apart_by_their_factors():
     for shift in (0.05, 0.1, 0.2, 0.3, 0.4, 0.5):
         one, other = mean_of(ONE), mean_of((0.9 + shift, 1.5 + shift, 1.0 + shift), "pbns")
         p = stats.ttest_ind(np.log(one.by_seed), np.log(other.by_seed), equal_var=False).pvalue
-        assert differ(one, other) == (p < 0.05)
+        assert bool(difference(one, other)) == (p < 0.05)
 
 
 def test_other_numbers_are_told_apart_by_their_difference():
     one, other = mean_of((-0.1, 0.1, 0.0)), mean_of((1.0, 1.2, 1.1), "pbns")
-    assert differ(one, other)
+    assert difference(one, other) == -1
     assert apart(one, other) == pytest.approx((-1.0, scatter(one, other) / 1.1))
     nothing = mean_of((0.0,), "simulation")
-    assert apart(other, nothing) is None and differ(other, nothing) and not differ(one, nothing)
+    assert apart(other, nothing) is None and difference(other, nothing) == 1 and difference(one, nothing) == 0
     assert apart(mean_of((1.0,)), mean_of((1.04,), "pbns"))[1] == pytest.approx(TIE)
 
 

@@ -17,7 +17,7 @@ from benchmarks.plan import Cell, Plan
 from benchmarks.presets import find_preset
 from benchmarks.record import Record
 from benchmarks.results import NOT_FALLING, Row
-from benchmarks.rows import rows_of
+from benchmarks.rows import model_costs, rows_of
 from benchmarks.scenes import SMALL_SCENES, dressed_scene
 from benchmarks.stages import accepted
 from benchmarks.suites import validation
@@ -148,3 +148,12 @@ def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch)
     record.write_rows()
     found = {row.metric: row.hardware for row in record.folder.read_rows()}
     assert found == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
+
+
+def test_what_a_network_has_cost_is_read_from_records_of_any_version():
+    record = {"seconds": 120.0, "megabytes": 9.0, "long_gone": 1}
+    assert model_costs("snug", record, 7.0) == {"cost/data": 0.0, "cost/train": 120.0, "cost/memory": 9.0}
+    whole = model_costs("supervised", record | {"setup_seconds": 20.0}, 7.0)
+    assert whole["cost/data"] == 7.0 and whole["cost/setup"] == 20.0
+    assert "cost/data" not in model_costs("supervised", record, None)
+    assert model_costs(None, record, 7.0) == model_costs("snug", None, 7.0) == {}

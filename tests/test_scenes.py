@@ -114,7 +114,7 @@ def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):
 
 
 def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes():
-    plan = plan_of("--scenes", "tunic/*,dressed/kick", "--methods", "simulation,snug,snug-dynamic")
+    plan = planned("--scenes", "tunic/*,dressed/kick", "--methods", "simulation,snug,snug-dynamic")
     by_garment = {garment: plan.train_of(garment) for garment in plan.garments}
     assert set(by_garment) == {"tshirt", "tunic"} and "twist_1" in by_garment["tunic"]
     assert not set(by_garment["tunic"]) & {*plan.test_of("tunic"), *by_garment["tshirt"]}
@@ -128,7 +128,7 @@ def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes
 
 
 def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not(monkeypatch):
-    plan = plan_of("--scenes", "dressed/kick,hanging_sheet", "--methods", "simulation")
+    plan = planned("--scenes", "dressed/kick,hanging_sheet", "--methods", "simulation")
     parts = (Agenda(plan).cell, Agenda(plan).metrics)
     before = {(part.__name__, cell): part(cell).key for part in parts for cell in plan.cells}
     monkeypatch.setattr(agenda, "DEFAULT", dataclasses.replace(agenda.DEFAULT, smoothing=7))
@@ -137,15 +137,15 @@ def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not(m
 
 
 def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_networks():
-    assert plan_of().garments == ("tshirt",)
-    speed = plan_of("--suite", "speed")
+    assert planned().garments == ("tshirt",)
+    speed = planned("--suite", "speed")
     skirts = [cell for cell in speed.cells if cell.scene.garment == "skirt"]
     assert len({cell.method for cell in skirts}) >= 10
     assert not any(find_method(cell.method).trained for cell in skirts)
 
 
 def test_suite_speed_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
-    plan = plan_of("--suite", "speed")
+    plan = planned("--suite", "speed")
     cells = [cell for cell in plan.cells if cell.scene.name == "dressed/turning_stop@clip"]
     assert {"simulation", "snug", "lbfgs-5"} <= {cell.method for cell in cells}
     assert "turning_stop" in plan.test_of("tshirt") and "turning_stop" not in plan.train_of("tshirt")
@@ -166,7 +166,7 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     arrays |= {"J_template": body.joint_template, "J_shapedirs": body.joint_directions}
     tall = {key: 1.1 * array if key != "f" else array for key, array in arrays.items()}
     np.savez(path, weights=body.skinning_weights, kintree_table=table, **tall)
-    plain, own = (plan_of("--suite", "garments", *more) for more in ((), ("--body", str(path))))
+    plain, own = (planned("--suite", "garments", *more) for more in ((), ("--body", str(path))))
     cell = next(cell for cell in own.cells if cell.method == "snug")
     keys = [
         (Agenda(plan).network(network_of(cell)).key, Agenda(plan).cell(cell).key) for plan in (plain, own)
@@ -179,7 +179,7 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     assert scene.dressed is not None and scene.dressed.body is high.body
 
 
-def plan_of(*words):
+def planned(*words):
     from benchmarks.run import make_parser, make_plan
 
     return make_plan(make_parser().parse_args(list(words)), words)

@@ -9,11 +9,11 @@ import pytest
 from benchmarks.results import Row, RunFolder
 from reports import build, palette
 from reports.answers import answers, by_scene
-from reports.break_even import Cost, break_even, crossing, crossings, rivals
+from reports.break_even import Cost, break_even, cost_of, crossing, crossings, rivals
 from reports.canvas import _columns
 from reports.fronts import Point, fastest, front, hybrids, points_of, solvers
 from reports.profile import performance_profile, staircases, times_to_reach
-from reports.summary import speed_measurements
+from reports.summary import Measurements, speed_measurements
 from reports.work_precision import error_against_time
 
 # method: ms a frame, relative gap, curvature error
@@ -110,6 +110,13 @@ def test_break_even_is_where_the_total_costs_cross():
     assert network.total(frames) == pytest.approx(solver.total(frames))
     assert crossing(solver, network) is None
     assert crossing(Cost("snug", 200.0, 0.2), solver) is None
+
+
+def test_what_comes_before_the_first_frame_is_data_making_ready_and_training():
+    costs = {"cost/data": 5.0, "cost/setup": 20.0, "cost/train": 200.0}
+    rows = [row("dressed/walk", "supervised", metric, value, "s") for metric, value in costs.items()]
+    rows.append(row("dressed/walk", "supervised", "cost/frame", 2.0, "ms"))
+    assert cost_of(Measurements(rows), "supervised", ("dressed/walk",)) == Cost("supervised", 225.0, 0.002)
 
 
 def test_rivals_are_the_fastest_solvers_as_accurate():

@@ -83,3 +83,7 @@ def test_who_has_no_past_or_wants_none_remembers_nothing(kind, recipe):
         trajectories=targets if kind == "supervised" else None,
     )  # fmt: skip
     assert trainer.memory is None and np.isfinite(trainer.step(0)["loss"])
+
+
+def test_nothing_is_remembered_where_each_window_has_another_body():
+    assert made(replace(RECIPE, shape_range=1.0)).memory is None and made().memory is not None

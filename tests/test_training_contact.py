@@ -31,7 +31,7 @@ def test_across_a_side_lies_the_face_that_shares_it():
 
 
 def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
-    searched = []  # and of the vertices not all are marks, so that some may have moved a little farther
+    searched = []
     renew = Anchors.renew
     monkeypatch.setattr(
         Anchors, "renew", lambda self, frame, *rest: (searched.append(frame), renew(self, frame, *rest))
@@ -42,12 +42,12 @@ def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
     anchors, patch = trainer.contact.anchors, trainer.contact.patch
     at_rest = Anchors(patch, 1).faces[0]
     body = trainer.contact._mean_shape[0]
-    for frame in range(41):
+    for frame in range(41):  # marks are not all vertices: some move a little more than twice FIRST_NEAR
         near = [
             other
             for other in searched
             if (other < 30) == (frame < 30) and abs(other - frame) <= FIRST_LENT
-            and np.linalg.norm(body[other] - body[frame], axis=1).max() < 1.3 * FIRST_NEAR
+            and np.linalg.norm(body[other] - body[frame], axis=1).max() < 2.6 * FIRST_NEAR
         ]  # fmt: skip
         assert any((anchors.faces[frame] == anchors.faces[other]).all() for other in near), frame
         assert (anchors.faces[frame] != at_rest).any()
@@ -113,6 +113,24 @@ def test_what_is_searched_is_lent_around_it_but_to_no_other_motion(monkeypatch):
     assert lent(slow, 20, monkeypatch) == [17, 18, 19, 20, 21, 22, 23]
 
 
+def test_what_has_just_been_searched_borrows_nothing(monkeypatch):
+    trainer = made([swaying(41, degrees=1.0)], contact_refresh=2 / 48)
+    contact = trainer.contact
+    assert contact is not None
+    renew = contact.anchors.renew
+
+    def marked(number, *rest, **how):
+        renew(number, *rest, **how)
+        contact.anchors.faces[number] = number
+
+    monkeypatch.setattr(contact.anchors, "renew", marked)
+    trainer.order = np.array([19, 21, *[0] * 14])  # middle frames 20 and 22
+    contact.anchors.age[[20, 22]] = 5
+    trainer.step(0)
+    assert (contact.anchors.faces[[20, 22]] == [[20], [22]]).all()
+    assert (contact.anchors.faces[[18, 24]] == [[20], [22]]).all()
+
+
 def test_nothing_is_lent_to_a_frame_in_which_the_body_is_elsewhere(monkeypatch):
     motion = swaying(41, degrees=1.0)
     motion.poses[19, JOINT["spine1"], 0] += 0.2
@@ -138,6 +156,27 @@ def test_anchors_slide_while_training_and_are_in_its_state():
     twin.resume(tensors, facts)
     assert (twin.anchors.faces == contact.anchors.faces).all()
     assert (twin.anchors.barycentric == contact.anchors.barycentric).all()
+
+
+def test_an_input_that_never_varied_is_not_read():
+    trainer = made([swaying(30)])
+    shapes = trainer.dressed.body.shape_count
+    features = trainer.data.features[None, :9].clone()
+    with torch.no_grad():
+        trainer.network.offsets.weight.normal_()
+        plain, _ = trainer.network(features, None)
+        features[..., -shapes:] = 5.0
+        assert torch.equal(trainer.network(features, None)[0], plain)
+        features[..., int(features.std(1).argmax())] += 0.1
+        assert not torch.equal(trainer.network(features, None)[0], plain)
+    sampled = made([swaying(30)], shape_range=2.0).data.input_statistics()[1]
+    assert np.isfinite(sampled[-shapes:]).all()
+
+
+def test_an_epoch_may_be_left_to_chance():
+    trainer = made([swaying(402)], even=1)
+    drawn = np.concatenate([trainer.draw() for _ in range(len(trainer.data.starts) // trainer.windows)])
+    assert len(np.unique(drawn)) == len(drawn) and set(np.diff(np.sort(drawn[:20]))) != {DEFAULT.even}
 
 
 def test_each_part_of_an_epoch_passes_over_all_motions():

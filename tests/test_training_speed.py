@@ -161,6 +161,16 @@ def test_the_time_of_validations_is_left_out():
     assert [point["seconds"] for point in convergence.curve(history)] == [2.0, 3.0]
 
 
+def test_a_validation_that_is_no_number_is_near_to_nothing():
+    rows = [{"step": 2.0 * k, "seconds": 3.0 * k, "loss": 2.0, "validation": 4.0} for k in (1, 2, 3)]
+    del rows[1]["validation"]
+    values = np.array([point["validation"] for point in convergence.curve(rows)])
+    assert np.isnan(values[1]) and convergence.arrival(values, 0.1) == 2
+    assert convergence.arrival(np.array([4.0, 4.0, np.nan]), 0.1) == 2
+    found = {name: value for name, value, _ in convergence._found(convergence.curve(rows))}
+    assert found["validation at its best"] == 4.0
+
+
 def test_arrival_is_for_good():
     falling = np.array([3.0, 1.02, 1.2, 1.02, 1.005, 1.0])
     assert convergence.arrival(falling, 0.03) == 3  # not 1, for it left again

@@ -98,3 +98,26 @@ def test_a_network_that_is_not_finite_has_diverged(tmp_path):
     states = {row.metric: (row.status, row.value) for row in found}
     assert states["train/window"] == states["train/roll_out"] == ("diverged", None)
     assert states["train/step"][0] == "ok" and all(row.passed or row.reason for row in found)
+
+
+def test_a_network_whose_windows_are_longer_than_every_motion_costs_no_other(tmp_path):
+    dressed, folder = tube_dress(), RunFolder(tmp_path)
+    for seed, window in ((0, 24), (1, 3)):
+        recipe = replace(DEFAULT, window=window, batch=2, mixed=0.0)
+        model = train("snug", dressed, MOTIONS, steps=1, seed=seed, recipe=recipe, progress=False)
+        model.save(model_path(folder.models, "snug", seed))
+    short = [swaying(12)]
+    wardrobe = SimpleNamespace(body=dressed.body, garment=dressed.garment, named=lambda names: short)
+    found = rows(SimpleNamespace(models=(("snug", 0), ("snug", 1)), train=("sway",)), folder, wardrobe)
+    assert {(row.seed, row.status) for row in found} == {(0, "skipped"), (1, "ok")}
+    assert "24 frames" in next(row.reason for row in found if row.seed == 0)
+
+
+def test_high_windows_are_counted_where_high_means_the_same(tmp_path):
+    dressed, folder = tube_dress(), RunFolder(tmp_path)
+    recipe = replace(DEFAULT, spike=9.0, mixed=0.0)
+    model = train("snug", dressed, MOTIONS, steps=1, seed=0, recipe=recipe, progress=False)
+    model.save(model_path(folder.models, "snug", 0))
+    wardrobe = SimpleNamespace(body=dressed.body, garment=dressed.garment, named=lambda names: MOTIONS)
+    found = rows(SimpleNamespace(models=(("snug", 0),), train=("sway", "slow")), folder, wardrobe)
+    assert {row.metric for row in found} == {"train/window", "train/roll_out", "train/step"}

@@ -61,7 +61,12 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     todo: list[tuple[str, int, tuple[int, ...]]] = [(f"mesh/{n}", n, (1,)) for n in others]
     todo.append((f"mesh/{sizes.middle}", sizes.middle, sizes.substeps))
     jobs = [
-        Job(name, of_one_mesh, (dataclasses.replace(preset, garment_vertices=n), steps), n * sum(steps))
+        Job(
+            name,
+            of_one_mesh,
+            (dataclasses.replace(preset, garment_vertices=n), steps, plan.body_file),
+            n * sum(steps),
+        )
         for name, n, steps in sorted(todo, key=lambda job: -job[1] * sum(job[2]))
     ]
     found: list[Row] = []
@@ -77,13 +82,17 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
 
 
 def of_one_mesh(
-    wardrobe: Wardrobe | None, tell: Tell, preset: Preset, all_substeps: tuple[int, ...]
+    wardrobe: Wardrobe | None,
+    tell: Tell,
+    preset: Preset,
+    all_substeps: tuple[int, ...],
+    body: Path | None = None,
 ) -> list[Row]:
     """The rows of the T-shirt of preset.garment_vertices, at each number of steps a frame."""
     from ..scenes import dressed_scene
     from ..wardrobe import embedded_motions, open_wardrobe
 
-    own = open_wardrobe(preset, embedded_motions([MOTION]))
+    own = open_wardrobe(preset, embedded_motions([MOTION]), body=body)
     scene = dressed_scene(MOTION).build(preset, own)
     start = scene.start
     scene = dataclasses.replace(scene, settle=lambda: start)

@@ -102,7 +102,10 @@ class HardStage:
     def betas(self, case: HardMotion) -> np.ndarray | None:
         if not case.betas:
             return None
-        return np.pad(case.betas, (0, self.wardrobe.body.shape_count - len(case.betas)))
+        shapes = self.wardrobe.body.shape_count
+        if shapes < len(case.betas):
+            raise ValueError(f"the body has {shapes} shapes, {case.name} needs {len(case.betas)}")
+        return np.pad(case.betas, (0, shapes - len(case.betas)))
 
     def put_on(self, motion: Motion, betas: np.ndarray) -> np.ndarray:
         """The shirt (V,3) [m] on a body of another shape that stands as in the motion's first frame."""

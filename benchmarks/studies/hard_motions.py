@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,9 +48,10 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
 
     networks = trained(plan, folder)
     cases = [case for case in HARD_MOTIONS if case.smoke or plan.preset.name != "smoke"]
-    jobs = [Job(case.name, do_case, (plan.preset, networks, case.name), 1) for case in cases]
+    shared = (plan.preset, networks)
+    jobs = [Job(case.name, do_case, (*shared, case.name, plan.body_file), 1) for case in cases]
     if networks:
-        jobs.append(Job("long", do_long, (plan.preset, networks), 1))
+        jobs.append(Job("long", do_long, (*shared, plan.body_file), 1))
     found: list[Row] = []
     ended = run_jobs(jobs, wardrobe, title="hard motions", unit="case", workers=plan.workers)
     for job, result in zip(jobs, ended):
@@ -73,11 +75,16 @@ def trained(plan: Plan, folder: RunFolder) -> tuple[Trained, ...]:
 
 
 def do_case(
-    wardrobe: Wardrobe | None, tell: Tell, preset: Preset, networks: tuple[Trained, ...], name: str
+    wardrobe: Wardrobe | None,
+    tell: Tell,
+    preset: Preset,
+    networks: tuple[Trained, ...],
+    name: str,
+    body: Path | None = None,
 ) -> list[Row]:
     """The rows of one case."""
     case = next(case for case in HARD_MOTIONS if case.name == name)
-    stage = _stage(wardrobe, preset, networks)
+    stage = _stage(wardrobe, preset, networks, body)
     scene = stage.scene(case)
     ordinary, worst = stage.ordinary
     roll_outs = stage.roll_outs(case, scene)
@@ -91,10 +98,14 @@ def do_case(
 
 
 def do_long(
-    wardrobe: Wardrobe | None, tell: Tell, preset: Preset, networks: tuple[Trained, ...]
+    wardrobe: Wardrobe | None,
+    tell: Tell,
+    preset: Preset,
+    networks: tuple[Trained, ...],
+    body: Path | None = None,
 ) -> list[Row]:
     """The rows of the long roll-out."""
-    stage = _stage(wardrobe, preset, networks)
+    stage = _stage(wardrobe, preset, networks, body)
     scene, found = stage.scene(ORDINARY_CASE), []
     for network in networks:
         who = network.method, network.seed
@@ -111,14 +122,16 @@ def do_long(
 _kept: dict[str, HardStage] = {}  # of this worker
 
 
-def _stage(wardrobe: Wardrobe | None, preset: Preset, networks: tuple[Trained, ...]) -> HardStage:
+def _stage(
+    wardrobe: Wardrobe | None, preset: Preset, networks: tuple[Trained, ...], body: Path | None
+) -> HardStage:
     """The one of this process: the shirt settles and the ordinary walk is done once."""
     if "stage" not in _kept:
         from snug.motion import make_motion
 
         from ..wardrobe import open_wardrobe
 
-        own = wardrobe or open_wardrobe(preset, [])
+        own = wardrobe or open_wardrobe(preset, [], body=body)
         walk = make_motion(MOTION)
         _kept["stage"] = HardStage(dataclasses.replace(own, motions={MOTION: walk}), preset, walk, networks)
     return _kept["stage"]

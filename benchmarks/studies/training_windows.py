@@ -42,6 +42,7 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     """Those of every network of the run that has a past and learned from the energies alone."""
     from snug.dresser import DressedBody
     from snug.trained_model import TrainedModel, find_kind
+    from snug.training_set import TrainingError
 
     if wardrobe is None or not plan.models:
         return []  # no network of the run: its training motions were not even loaded
@@ -56,9 +57,9 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
         if model.steps and how.physics and how.sequences and how.teacher is None:
             try:
                 found += _judged(name, seed, model, dressed, motions)
-            except ValueError as error:  # no given motion has as many frames as a window of this one
+            except TrainingError as error:  # no given motion has as many frames as a window of this one
                 reason = " ".join(str(error).split())
-                found.append(Row(SUITE, SCENE, name, seed, "train/window", "J", None, "failed", reason))
+                found.append(Row(SUITE, SCENE, name, seed, "train/window", "J", None, "skipped", reason))
     return found
 
 

@@ -60,7 +60,7 @@ def curve(history: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
         left_out += (row["step"] - before) * row.get("seconds/validation", 0.0)
         before = row["step"]
         point = {name: row[name] for name in COLUMNS if name in row}
-        point.setdefault("validation", math.nan)  # it was not finite
+        point.setdefault("validation", math.nan)
         points.append(point | {"seconds": row["seconds"] - left_out})
     return points
 
@@ -89,6 +89,8 @@ def _found(points: Sequence[Mapping[str, float]]) -> list[Row]:
 
 
 def arrival(values: np.ndarray, share: float) -> int:
-    """The first place from which on every value is within that share of the last one."""
-    far = np.flatnonzero(np.abs(values - values[-1]) > share * abs(values[-1]))
-    return int(far[-1]) + 1 if len(far) else 0
+    """The first place from which on every value is within that share of the last one; where that is no
+    number, the last place.
+    """
+    far = np.flatnonzero(~(np.abs(values - values[-1]) <= share * abs(values[-1])))  # so is what is no number
+    return min(int(far[-1]) + 1, len(values) - 1) if len(far) else 0
