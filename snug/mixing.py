@@ -5,9 +5,8 @@ a network few combinations of legs, spine and arms, and on a new kind of motion 
 clip takes the root, the spine, each leg and each arm from six random places of the training clips (mirrored
 half of the time), scales legs and spine, adds to each joint of the trunk a slow turn about a random axis,
 lifts some thighs, and spreads the arms and opens the hips where limbs come too near to the torso. Legs that
-always come as a pair show no lunge; and a network that has met no thigh as high as a kick's lets it through
-the hem.
-Every part stays continuous in time, so velocities keep their meaning.
+always come as a pair show no lunge; and a network that has met no thigh as high as in a squat lets it through
+the hem. Every part stays continuous in time, so velocities keep their meaning.
 """
 
 from __future__ import annotations
