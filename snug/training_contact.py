@@ -8,6 +8,7 @@ none, or misses a thigh that stands in the hem.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,6 @@ class TrainingContact:
         self._mean_shape: tuple[np.ndarray, np.ndarray] | None = None
         if one_shape and kernels:
             self._mean_shape = self._posed_everywhere()
-        self._marks = self._posed_marks()
         self._changed = np.zeros(frames, bool)
         self._before: tuple[Any, ...] | None = None
         self._credit = 0.0
@@ -85,8 +85,9 @@ class TrainingContact:
             positions[start : start + TOGETHER] = posed.transpose(0, 1).numpy()
         return positions, self.patch.normals(positions)
 
-    def _posed_marks(self) -> np.ndarray:
-        """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]."""
+    @cached_property
+    def _marks(self) -> np.ndarray:
+        """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]; only for who lends."""
         # On the CPU whatever the device, so that processes that share a run lend alike.
         rest, weights = self.template[::MARKED].cpu(), self.weights[::MARKED].cpu()
         parts = self.data.transforms.split(TOGETHER)
