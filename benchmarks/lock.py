@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 
@@ -21,23 +21,17 @@ def held(folder: Path) -> Iterator[None]:
     that ended. Where the system or its file system has no such locks nothing is held, and that is said.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    try:
-        import fcntl
-
-        hold = os.open(folder, os.O_RDONLY)
-    except (ImportError, OSError):
-        print(f"{folder}: cannot be locked here; let no other run use it", file=sys.stderr)
-        yield
-        return
-    try:
+    with ExitStack() as closing:
         try:
+            import fcntl
+
+            hold = os.open(folder, os.O_RDONLY)
+            closing.callback(os.close, hold)
             fcntl.flock(hold, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise HeldError(
                 f"--out {folder}: another run is going on there; wait for its end or name another folder"
             ) from None
-        except OSError:
+        except (ImportError, OSError):
             print(f"{folder}: cannot be locked here; let no other run use it", file=sys.stderr)
         yield
-    finally:
-        os.close(hold)

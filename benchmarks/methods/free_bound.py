@@ -25,7 +25,7 @@ from reference_sim.minimise import make_minimiser
 from ..scene import BuiltScene
 from ..scenes.dressed_body import declared_energies
 
-ROUNDS, ITERATIONS, MEMORY = 12, 50, 20
+ROUNDS, ITERATIONS, MEMORY = 40, 50, 20
 FALL = 1e-4  # a round that lowers the sum by a smaller share is the last
 TOLERANCE = 1e-4  # largest component of the gradient, in mean vertex weights
 

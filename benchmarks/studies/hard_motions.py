@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,16 +43,18 @@ NO_NETWORK = "no trained network in this run: run suite garments with this one"
 
 def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     """Every case, some at a time. Without trained networks the simulator and skinning do them alone."""
+    from ..wardrobe import open_wardrobe
     from ..workers import Failure, Job, run_jobs
 
     networks = trained(plan, folder)
     cases = [case for case in HARD_MOTIONS if case.smoke or plan.preset.name != "smoke"]
     shared = (plan.preset, networks)
-    jobs = [Job(case.name, do_case, (*shared, case.name, plan.body_file), 1) for case in cases]
+    jobs = [Job(case.name, do_case, (*shared, case.name), 1) for case in cases]
     if networks:
-        jobs.append(Job("long", do_long, (*shared, plan.body_file), 1))
+        jobs.append(Job("long", do_long, shared, 1))
+    own = wardrobe or open_wardrobe(plan.preset, [], body=plan.body_file)
     found: list[Row] = []
-    ended = run_jobs(jobs, wardrobe, title="hard motions", unit="case", workers=plan.workers)
+    ended = run_jobs(jobs, own, title="hard motions", unit="case", workers=plan.workers)
     for job, result in zip(jobs, ended):
         if isinstance(result, Failure):
             found.append(
@@ -75,16 +76,15 @@ def trained(plan: Plan, folder: RunFolder) -> tuple[Trained, ...]:
 
 
 def do_case(
-    wardrobe: Wardrobe | None,
+    wardrobe: Wardrobe,
     tell: Tell,
     preset: Preset,
     networks: tuple[Trained, ...],
     name: str,
-    body: Path | None = None,
 ) -> list[Row]:
     """The rows of one case."""
     case = next(case for case in HARD_MOTIONS if case.name == name)
-    stage = _stage(wardrobe, preset, networks, body)
+    stage = _stage(wardrobe, preset, networks)
     scene = stage.scene(case)
     ordinary, worst = stage.ordinary
     roll_outs = stage.roll_outs(case, scene)
@@ -97,15 +97,9 @@ def do_case(
     ]
 
 
-def do_long(
-    wardrobe: Wardrobe | None,
-    tell: Tell,
-    preset: Preset,
-    networks: tuple[Trained, ...],
-    body: Path | None = None,
-) -> list[Row]:
+def do_long(wardrobe: Wardrobe, tell: Tell, preset: Preset, networks: tuple[Trained, ...]) -> list[Row]:
     """The rows of the long roll-out."""
-    stage = _stage(wardrobe, preset, networks, body)
+    stage = _stage(wardrobe, preset, networks)
     scene, found = stage.scene(ORDINARY_CASE), []
     for network in networks:
         who = network.method, network.seed
@@ -122,18 +116,15 @@ def do_long(
 _kept: dict[str, HardStage] = {}  # of this worker
 
 
-def _stage(
-    wardrobe: Wardrobe | None, preset: Preset, networks: tuple[Trained, ...], body: Path | None
-) -> HardStage:
+def _stage(wardrobe: Wardrobe, preset: Preset, networks: tuple[Trained, ...]) -> HardStage:
     """The one of this process: the shirt settles and the ordinary walk is done once."""
     if "stage" not in _kept:
         from snug.motion import make_motion
 
-        from ..wardrobe import open_wardrobe
-
-        own = wardrobe or open_wardrobe(preset, [], body=body)
         walk = make_motion(MOTION)
-        _kept["stage"] = HardStage(dataclasses.replace(own, motions={MOTION: walk}), preset, walk, networks)
+        _kept["stage"] = HardStage(
+            dataclasses.replace(wardrobe, motions={MOTION: walk}), preset, walk, networks
+        )
     return _kept["stage"]
 
 
