@@ -1,35 +1,35 @@
 """python -m benchmarks.recipe_effects: what each deviation of the default recipe from the paper's text does.
 
 The default recipe is trained with one deviation undone at a time, the paper's with one added at a time, each
-for the same wall time, one after another in one process. All are judged by roll-outs on training motions that
-were held out; the test motions are never looked at. Writes results.csv and run.json, of which
-`python -m reports.build` makes the table.
+for the same wall time, some side by side. All are judged by roll-outs on training motions that were held
+out; the test motions are never looked at. Writes results.csv and run.json, of which `python -m reports.build`
+makes the table.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from snug.recipe import DEFAULT, PAPER, Recipe
 
-from .results import Row, RunFolder, with_provenance
+from .fingerprint import code_of
+from .lock import held
+from .recipe_trials import HELD_OUT, learned, tried
+from .records import Records, Work
+from .results import Row, RunFolder, cells_to_row, with_provenance
 
-if TYPE_CHECKING:
-    from snug.dresser import DressedBody
-    from snug.trained_model import TrainedModel
+EXAMPLES = """examples:
+  python -m benchmarks.recipe_effects                                    each for a minute
+  python -m benchmarks.recipe_effects --seeds 0,1 --seconds 120
+  python -m benchmarks.recipe_effects --recipes 'default*' -o reports/runs/effects
 
-    from .presets import Preset
-    from .wardrobe import Wardrobe
-
-HELD_OUT = ("brisk_walk", "torso_twist", "lunge")  # of the training motions
-TRIAL_STEPS, TRIAL_PART = 30, 10  # steps of the trial that tells how many fit into the time, and of a log row
-SUITE = "recipes"
+The same command again in the same folder does what is missing there, after an interrupt or a kill."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,8 @@ def parse(words: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.recipe_effects",
         description="Train the recipes between the paper's text and the default for equal times.",
-        epilog=f"{len(variants())} recipes are trained with each seed; held out are {', '.join(HELD_OUT)}.",
+        epilog=f"{len(variants())} recipes, each with each seed; held out are {', '.join(HELD_OUT)}.\n\n{EXAMPLES}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("--seconds", type=float, default=60.0, help="of training, each (default: %(default)s)")
@@ -80,6 +81,8 @@ def parse(words: Sequence[str] | None = None) -> argparse.Namespace:
     add("--vertices", type=int, default=1000, help="of the T-shirt (default: %(default)s)")
     add("--recipes", default="*", metavar="PATTERN", help="only recipes of such names")
     add("--list", action="store_true", help="list the recipes; train nothing")
+    add("--workers", type=int, metavar="N",
+        help="trainings side by side (default 2, or the cores there are)")  # fmt: skip
     add("-o", "--out", default="reports/runs/recipe_effects", help="folder to write (default: %(default)s)")
     return parser.parse_args(words)
 
@@ -93,115 +96,68 @@ def main(words: Sequence[str] | None = None) -> int:
         return 0
     try:
         seeds = [int(word) for word in options.seeds.split(",")]
-        if not chosen or options.seconds <= 0 or min(seeds) < 0:
+        if not chosen or options.seconds <= 0 or min(seeds) < 0 or (options.workers or 1) < 1:
             raise ValueError(
-                "--recipes names none, --seconds is not above 0, or a seed is below 0; see --help"
+                "--recipes names none, --seconds or --workers is not positive, or a seed is negative; see --help"
             )
-        return _run(options, chosen, seeds)
+        with held(Path(options.out)):
+            return _run(options, [(recipe, seed) for recipe in chosen for seed in seeds])
     except ValueError as error:
         print(f"recipe_effects: {error}", file=sys.stderr)
         return 2
 
 
-def _run(options: argparse.Namespace, chosen: Sequence[Recipe], seeds: Sequence[int]) -> int:
-    import torch
-
+def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> int:
     from snug.motion import TRAIN
 
     from . import provenance
     from .presets import find_preset
     from .wardrobe import embedded_motions, open_wardrobe
+    from .workers import Failure, Job, run_jobs
 
-    torch.set_num_threads(1)
     preset = replace(find_preset("quick"), garment_vertices=options.vertices)
-    wardrobe = open_wardrobe(preset, embedded_motions(TRAIN))
-    learned = [name for name in TRAIN if name not in HELD_OUT]
-    folder = RunFolder(options.out)
-    facts = provenance.hardware("cpu")
+    folder, facts, commit = RunFolder(options.out), provenance.hardware("cpu"), provenance.commit()
     folder.write_config({
-        "command": "python -m benchmarks.recipe_effects", "seconds": options.seconds, "seeds": list(seeds),
-        "preset": "quick", "commit": provenance.commit(), "hardware": facts,
-        "versions": provenance.versions(),
-        "motions": {"train": learned, "held_out": list(HELD_OUT)},
+        "command": "python -m benchmarks.recipe_effects", "seconds": options.seconds,
+        "seeds": sorted({seed for _, seed in asked}), "workers": options.workers,
+        "preset": "quick", "commit": commit, "hardware": facts, "versions": provenance.versions(),
+        "motions": {"train": learned(TRAIN), "held_out": list(HELD_OUT)},
     })  # fmt: skip
-    line = provenance.hardware_line(facts)
-    judge = Judge(wardrobe, preset)
+    records, hardware = Records(folder, commit=commit), provenance.hardware_line(facts)
+    works = [_work(recipe, seed, options) for recipe, seed in asked]
+    jobs = [
+        Job(work.name, tried, (preset, recipe, seed, options.seconds), 1, work, records)
+        for work, (recipe, seed) in zip(works, asked)
+        if records.find(work).wanted
+    ]
     rows: list[Row] = []
-    for recipe in chosen:
-        for seed in seeds:
-            found = list(_rows(recipe, seed, options.seconds, wardrobe, learned, judge))
-            rows += with_provenance(found, preset="quick", commit=provenance.commit(), hardware=line)
-            folder.write_rows(rows)
-            print(_said(recipe.name, seed, found), flush=True)
-    print(Path(options.out).resolve())
-    return int(any(not row.passed for row in rows))
-
-
-def _rows(
-    recipe: Recipe, seed: int, seconds: float, wardrobe: Wardrobe, learned: Sequence[str], judge: Judge
-) -> Iterator[Row]:
-    """Train for about that time, roll out, measure. A training that fails is a row with its reason."""
-    from snug.dresser import DressedBody
-    from snug.train import train
-
-    dressed = DressedBody(wardrobe.body, wardrobe.garment)
-    motions = wardrobe.named(learned)
-
-    def trained(steps: int) -> TrainedModel:
-        return train(
-            "snug", dressed, motions, steps=steps, seed=seed, recipe=recipe, progress=False, every=TRIAL_PART
-        )
-
-    def row(scene: str, metric: str, unit: str, value: float) -> Row:
-        return Row(SUITE, scene, recipe.name, seed, metric, unit, value, dtype="float32")
-
     try:
-        model = trained(steps_within(seconds, trained))
-        for scene, metric, unit, value in judge(model, dressed):
-            yield row(scene, metric, unit, value)
-        for metric, unit, value in (
-            ("train/loss", "J", model.history[-1]["loss"]),
-            ("train/steps", "1", float(model.steps)),
-            ("cost/train", "s", model.seconds),
-        ):
-            yield row("training", metric, unit, value)
-    except ValueError as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        yield Row(SUITE, "training", recipe.name, seed, "train/loss", "J", None, "diverged", reason)
+        wardrobe = open_wardrobe(preset, embedded_motions(TRAIN))
+        ended = run_jobs(jobs, wardrobe, title="recipes", unit="training", workers=options.workers)
+    finally:  # an interrupt leaves the rows of all that had ended
+        for found in (records.find(work) for work in works):
+            if found.state == "finished" and found.result:
+                own = [cells_to_row(cells) for cells in found.result["rows"]]
+                rows += with_provenance(own, preset="quick", commit=found.commit, hardware=hardware)
+        folder.write_rows(rows)
+    failures = [result for result in ended if isinstance(result, Failure)]
+    for failure in failures:
+        print(f"recipe_effects: {failure.label}: {failure.reason}", file=sys.stderr)
+    for name, seed in dict.fromkeys((row.method, row.seed) for row in rows):
+        print(_said(name, seed, [row for row in rows if (row.method, row.seed) == (name, seed)]))
+    print(folder.path.resolve())
+    return int(bool(failures) or any(not row.passed for row in rows))
 
 
-def steps_within(seconds: float, trained: Callable[[int], TrainedModel]) -> int:
-    """Steps that take about that time, by a short trial; its first part, with all warm-up, does not count."""
-    history = trained(TRIAL_STEPS).history
-    step = (history[-1]["seconds"] - history[0]["seconds"]) / (history[-1]["step"] - history[0]["step"])
-    return max(TRIAL_PART, round(seconds / step))
-
-
-class Judge:
-    """The held-out scenes, built once; called with a model it gives (scene, metric, unit, value)."""
-
-    def __init__(self, wardrobe: Wardrobe, preset: Preset) -> None:
-        from .scenes import dressed_scene
-
-        self.scenes = [dressed_scene(name).build(preset, wardrobe) for name in HELD_OUT]
-
-    def __call__(self, model: TrainedModel, dressed: DressedBody) -> Iterator[tuple[str, str, str, float]]:
-        from snug.rollout import roll_out
-
-        from .metrics.energy import energy_series, mean_energy
-        from .metrics.geometry import penetration
-
-        for scene in self.scenes:
-            assert scene.dressed is not None and scene.obstacle is not None
-            positions = roll_out(model, dressed, scene.dressed.motion).positions
-            for term, series in energy_series(scene, [positions])[0].items():
-                yield scene.name, f"energy/{term}", "J", mean_energy(series)
-            below = 100.0 * float(penetration([positions], scene.obstacle)[0].share.mean())
-            yield scene.name, "penetration/vertices", "%", below
+def _work(recipe: Recipe, seed: int, options: argparse.Namespace) -> Work:
+    """A training and its judgement. Those beside it share the memory, so how many there are counts."""
+    inputs = {name: getattr(options, name) for name in ("seconds", "vertices", "workers")}
+    inputs |= {"recipe": dataclasses.asdict(recipe), "seed": seed}
+    return Work("recipe", f"{recipe.name}, seed {seed}", inputs, code_of("benchmarks.recipe_trials"))
 
 
 def _said(name: str, seed: int, rows: Sequence[Row]) -> str:
-    """One line of the progress: means over the held-out motions."""
+    """One line of the summary: means over the held-out motions."""
     if any(row.value is None for row in rows):
         return f"{name:<40} seed {seed}  {rows[-1].status}: {rows[-1].reason}"
     numbers: dict[str, list[float]] = {}

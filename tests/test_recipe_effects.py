@@ -7,10 +7,12 @@ import sys
 from dataclasses import fields
 from types import SimpleNamespace
 
+import pytest
 from dressing import swaying, tube_dress
 
-from benchmarks import recipe_effects
-from benchmarks.recipe_effects import DEVIATIONS, HELD_OUT, main, steps_within, variants
+from benchmarks import recipe_trials, workers
+from benchmarks.recipe_effects import DEVIATIONS, main, variants
+from benchmarks.recipe_trials import HELD_OUT, learned, steps_within
 from benchmarks.results import RunFolder
 from benchmarks.wardrobe import Wardrobe
 from reports.findings import recipes
@@ -36,6 +38,7 @@ def test_every_deviation_has_its_line_and_changes_nothing_else():
 
 def test_held_out_motions_are_training_motions():
     assert set(HELD_OUT) < set(TRAIN) and not set(HELD_OUT) & set(TEST)
+    assert sorted([*learned(TRAIN), *HELD_OUT]) == sorted(TRAIN)
 
 
 def test_a_trial_tells_the_steps():
@@ -44,17 +47,67 @@ def test_a_trial_tells_the_steps():
     assert steps_within(0.1, lambda steps: model) == 10
 
 
-def test_the_command_writes_rows_that_the_report_understands(tmp_path, monkeypatch, capsys):
-    dressed = tube_dress()
+@pytest.fixture
+def small(tmp_path, monkeypatch):
+    """The command's words for two recipes on a tube; jobs are done here and now, and counted."""
+    dressed, done = tube_dress(), []
     motions = {name: swaying(12, name=name) for name in TRAIN}
     wardrobe = Wardrobe(dressed.body, {"tshirt": dressed.garment}, motions)
+
+    def at_once(jobs, wardrobe, **_):
+        monkeypatch.setattr(workers, "_wardrobe", wardrobe)
+        monkeypatch.setattr(workers, "_progress", SimpleNamespace(put=done.append))
+        return [workers._call(job) for job in jobs]
+
     monkeypatch.setattr("benchmarks.wardrobe.open_wardrobe", lambda *whatever: wardrobe)
-    monkeypatch.setattr(recipe_effects, "HELD_OUT", HELD_OUT[:1])
-    words = ["--seconds", "0.01", "--recipes", "default*mixed*", "-o", str(tmp_path / "out")]
-    assert main(words) == 0 and "default without mixed motions" in capsys.readouterr().out
-    table = recipes(RunFolder(tmp_path / "out").read_rows())
+    monkeypatch.setattr(workers, "run_jobs", at_once)
+    monkeypatch.setattr(recipe_trials, "HELD_OUT", HELD_OUT[:1])
+    monkeypatch.setattr(recipe_trials, "_kept", {})
+    words = ["--seconds", "0.01", "--recipes", "*without mixed*", "-o", str(tmp_path / "out")]
+    return SimpleNamespace(words=words, done=done, out=tmp_path / "out")
+
+
+def test_the_command_writes_rows_that_the_report_understands(small, capsys):
+    assert main(small.words) == 0 and "default without mixed motions" in capsys.readouterr().out
+    table = recipes(RunFolder(small.out).read_rows())
     assert [line[0] for line in table.rows] == ["default without mixed motions"]
     assert all(cell is not None for cell in table.rows[0])
+
+
+def test_what_has_ended_is_not_done_again(small, monkeypatch):
+    def interrupted(jobs, wardrobe, **_):
+        workers.run_jobs = whole
+        workers.run_jobs(jobs[:1], wardrobe)
+        raise KeyboardInterrupt
+
+    whole = workers.run_jobs
+    monkeypatch.setattr(workers, "run_jobs", interrupted)
+    words = [*small.words, "--seeds", "0,1"]
+    with pytest.raises(KeyboardInterrupt):
+        main(words)
+    before = RunFolder(small.out).read_rows()
+    assert {row.seed for row in before} == {0} and small.done == [1]
+    assert main(words) == 0 and small.done == [1, 1]
+    after = RunFolder(small.out).read_rows()
+    assert {row.seed for row in after} == {0, 1} and after[: len(before)] == before
+    assert main([*words, "--seconds", "0.02"]) == 0 and len(small.done) == 4  # other work
+
+
+def test_a_training_that_fails_is_a_row_and_one_that_is_killed_a_line(small, monkeypatch, capsys):
+    def failing(*_):
+        raise ValueError("no steps")
+
+    monkeypatch.setattr(recipe_trials, "steps_within", failing)
+    assert main(small.words) == 1
+    (row,) = RunFolder(small.out).read_rows()
+    assert (row.status, row.value) == ("diverged", None) and "no steps" in row.reason
+    monkeypatch.setattr(
+        workers, "run_jobs", lambda jobs, *_, **__: [workers.Failure(jobs[0].label, "killed")]
+    )
+    assert main([*small.words, "--seconds", "0.02"]) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "recipe_effects: default without mixed motions, seed 0: killed"
+    ]
 
 
 def test_a_wrong_word_is_one_line_and_the_list_needs_no_torch(capsys):
