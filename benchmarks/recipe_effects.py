@@ -72,7 +72,8 @@ def parse(words: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.recipe_effects",
         description="Train the recipes between the paper's text and the default for equal times.",
-        epilog=f"{len(variants())} recipes, each with each seed; held out are {', '.join(HELD_OUT)}.\n\n{EXAMPLES}",
+        epilog=f"{len(variants())} recipes are trained with each seed. Held out: {', '.join(HELD_OUT)}."
+        f"\n\n{EXAMPLES}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
@@ -98,7 +99,7 @@ def main(words: Sequence[str] | None = None) -> int:
         seeds = [int(word) for word in options.seeds.split(",")]
         if not chosen or options.seconds <= 0 or min(seeds) < 0 or (options.workers or 1) < 1:
             raise ValueError(
-                "--recipes names none, --seconds or --workers is not positive, or a seed is negative; see --help"
+                "--recipes names none, --seconds or --workers is not positive, or a seed is below 0; see --help"
             )
         with held(Path(options.out)):
             return _run(options, [(recipe, seed) for recipe in chosen for seed in seeds])
