@@ -99,7 +99,7 @@ def main(words: Sequence[str] | None = None) -> int:
         seeds = [int(word) for word in options.seeds.split(",")]
         if not chosen or options.seconds <= 0 or min(seeds) < 0 or (options.workers or 1) < 1:
             raise ValueError(
-                "--recipes names none, --seconds or --workers is not positive, or a seed is below 0; see --help"
+                "--recipes names none, --seconds or --workers is not above 0, or a seed is below 0"
             )
         with held(Path(options.out)):
             return _run(options, [(recipe, seed) for recipe in chosen for seed in seeds])
