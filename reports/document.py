@@ -154,7 +154,7 @@ def _size(config: dict[str, Any]) -> str:
     """What the preset says of itself; a smoke test says here that its numbers mean nothing."""
     values = config.get("preset_values")
     words = values.get("description") if isinstance(values, dict) else None
-    return f"This run: {words}." if words else ""
+    return f"Preset {config.get('preset')}: {words}." if words else ""
 
 
 def _figures(pictures: Sequence[Picture], section: str, kind: str) -> list[Block]:

@@ -62,11 +62,11 @@ def lowest_network(measured: Measurements) -> str:
         return ""
     order = sorted(totals, key=lambda method: totals[method].value)
     best = totals[order[0]]
-    text = f"Of the trained networks, {name(order[0])} has the lowest mean total on unseen motions"
-    text += f"{_only(scenes, measured)}: "
-    text += f"{with_spread(best.value, best.spread)} J per frame"
     rest = [f"{name(method)} {number(totals[method].value)} J" for method in order[1:]]
-    text += f" ({', '.join(rest)})." if rest else " (no other one ran)."
+    text = f"Of the trained networks, {name(order[0])} has" if rest else f"{name(order[0])} has"
+    text += f" {'the lowest' if rest else 'a'} mean total on unseen motions{_only(scenes, measured)}: "
+    text += f"{with_spread(best.value, best.spread)} J per frame"
+    text += f" ({', '.join(rest)})." if rest else "."
     others = [
         f"{name(method)} {number(total)} J"
         for method in (REFERENCE, "skinning", "untrained")

@@ -117,6 +117,8 @@ def test_words_compare_means_over_the_scenes_that_both_have():
     assert words.against(measured, "pbns").startswith("SNUG is lower in total (−50 %) (1 scene only).")
     assert words.lowest_network(measured).startswith("Of the trained networks, SNUG has the lowest")
     assert "unseen motions (1 scene only): 1.00 J" in words.lowest_network(measured)
+    alone = Measurements(rows[:2])
+    assert words.lowest_network(alone) == "SNUG has a mean total on unseen motions: 5.00 J per frame."
     rows = [row(s, m, "curvature/error", v) for s, m, v in zip((*SCENES, SCENES[0]), ("snug", "snug", "pbns"),
             (1.0, 9.0, 2.0))]  # fmt: skip
     assert words.curvature(Measurements(rows)) == (
