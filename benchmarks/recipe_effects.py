@@ -1,9 +1,9 @@
 """python -m benchmarks.recipe_effects: what each deviation of the default recipe from the paper's text does.
 
-The default recipe is trained with one deviation undone at a time, the paper's with one added at a time, each
-for the same wall time, some side by side. All are judged by roll-outs on training motions that were held
-out; the test motions are never looked at. Writes results.csv and run.json, of which `python -m reports.build`
-makes the table.
+The default recipe is trained with one deviation undone at a time, the paper's with one added at a time, all
+with steps for the same wall time (making ready comes on top), some side by side. They are judged by roll-outs
+on training motions that were held out; the test motions are never looked at. Writes results.csv and run.json,
+of which `python -m reports.build` makes the table.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 
 from snug.recipe import DEFAULT, PAPER, Recipe
 
+from . import provenance, workers
 from .fingerprint import code_of
 from .lock import held
 from .recipe_trials import HELD_OUT, learned, tried
@@ -101,9 +102,10 @@ def main(words: Sequence[str] | None = None) -> int:
             raise ValueError(
                 "--recipes names none, --seconds or --workers is not above 0, or a seed is below 0"
             )
+        options.workers = options.workers or workers.worker_count()
         with held(Path(options.out)):
             return _run(options, [(recipe, seed) for recipe in chosen for seed in seeds])
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         print(f"recipe_effects: {error}", file=sys.stderr)
         return 2
 
@@ -111,15 +113,14 @@ def main(words: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> int:
     from snug.motion import TRAIN
 
-    from . import provenance
     from .presets import find_preset
     from .wardrobe import embedded_motions, open_wardrobe
-    from .workers import Failure, Job, run_jobs
 
     preset = replace(find_preset("quick"), garment_vertices=options.vertices)
     folder, facts, commit = RunFolder(options.out), provenance.hardware("cpu"), provenance.commit()
     folder.write_config({
         "command": "python -m benchmarks.recipe_effects", "seconds": options.seconds,
+        "recipes": options.recipes, "vertices": options.vertices,
         "seeds": sorted({seed for _, seed in asked}), "workers": options.workers,
         "preset": "quick", "commit": commit, "hardware": facts, "versions": provenance.versions(),
         "motions": {"train": learned(TRAIN), "held_out": list(HELD_OUT)},
@@ -127,21 +128,21 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
     records, hardware = Records(folder, commit=commit), provenance.hardware_line(facts)
     works = [_work(recipe, seed, options) for recipe, seed in asked]
     jobs = [
-        Job(work.name, tried, (preset, recipe, seed, options.seconds), 1, work, records)
+        workers.Job(work.name, tried, (preset, recipe, seed, options.seconds), 1, work, records)
         for work, (recipe, seed) in zip(works, asked)
         if records.find(work).wanted
     ]
     rows: list[Row] = []
     try:
         wardrobe = open_wardrobe(preset, embedded_motions(TRAIN))
-        ended = run_jobs(jobs, wardrobe, title="recipes", unit="training", workers=options.workers)
+        ended = workers.run_jobs(jobs, wardrobe, title="recipes", unit="training", workers=options.workers)
     finally:  # an interrupt leaves the rows of all that had ended
         for found in (records.find(work) for work in works):
             if found.state == "finished" and found.result:
                 own = [cells_to_row(cells) for cells in found.result["rows"]]
                 rows += with_provenance(own, preset="quick", commit=found.commit, hardware=hardware)
         folder.write_rows(rows)
-    failures = [result for result in ended if isinstance(result, Failure)]
+    failures = [result for result in ended if isinstance(result, workers.Failure)]
     for failure in failures:
         print(f"recipe_effects: {failure.label}: {failure.reason}", file=sys.stderr)
     for name, seed in dict.fromkeys((row.method, row.seed) for row in rows):
@@ -153,8 +154,10 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
 def _work(recipe: Recipe, seed: int, options: argparse.Namespace) -> Work:
     """A training and its judgement. Those beside it share the memory, so how many there are counts."""
     inputs = {name: getattr(options, name) for name in ("seconds", "vertices", "workers")}
-    inputs |= {"recipe": dataclasses.asdict(recipe), "seed": seed}
-    return Work("recipe", f"{recipe.name}, seed {seed}", inputs, code_of("benchmarks.recipe_trials"))
+    inputs |= {"recipe": dataclasses.asdict(recipe), "seed": seed, "versions": provenance.versions()}
+    inputs["hardware"] = provenance.hardware_line(provenance.hardware("cpu"))
+    code = code_of("benchmarks.recipe_trials", "benchmarks.scenes.dressed_body")  # the scene by its name
+    return Work("recipe", f"{recipe.name}, seed {seed}", inputs, code)
 
 
 def _said(name: str, seed: int, rows: Sequence[Row]) -> str:

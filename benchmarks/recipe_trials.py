@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -37,12 +38,13 @@ def learned(motions: Iterable[str]) -> list[str]:
 
 
 def tried(wardrobe: Wardrobe, tell: Tell, preset: Preset, recipe: Recipe, seed: int, seconds: float) -> Tried:
-    """Train for about that time, roll out, measure. A training that fails is a row with its reason."""
+    """Train for about that time, roll out, measure. A training that diverges is a row with its reason."""
     import torch
 
     from snug.dresser import DressedBody
     from snug.motion import TRAIN
     from snug.train import train
+    from snug.training_set import TrainingError
 
     torch.set_num_threads(1)
     dressed = DressedBody(wardrobe.body, wardrobe.garment)
@@ -54,17 +56,21 @@ def tried(wardrobe: Wardrobe, tell: Tell, preset: Preset, recipe: Recipe, seed: 
         )
 
     def row(scene: str, metric: str, unit: str, value: float) -> Row:
-        return Row(SUITE, scene, recipe.name, seed, metric, unit, value, dtype="float32")
+        if math.isfinite(value):
+            return Row(SUITE, scene, recipe.name, seed, metric, unit, value, dtype="float32")
+        return Row(SUITE, scene, recipe.name, seed, metric, unit, None, "diverged", "not finite")
 
     try:
         model = trained(steps_within(seconds, trained))
+    except TrainingError as error:
+        reason = " ".join(str(error).split())
+        rows = [Row(SUITE, "training", recipe.name, seed, "train/loss", "J", None, "diverged", reason)]
+    else:
         rows = [row(*found) for found in _judge(wardrobe, preset)(model, dressed)]
         rows.append(row("training", "train/loss", "J", model.history[-1]["loss"]))
         rows.append(row("training", "train/steps", "1", float(model.steps)))
         rows.append(row("training", "cost/train", "s", model.seconds))
-    except ValueError as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        rows = [Row(SUITE, "training", recipe.name, seed, "train/loss", "J", None, "diverged", reason)]
+        rows.append(row("training", "cost/setup", "s", model.setup_seconds))
     tell(1)
     return Tried(tuple(row_to_cells(row) for row in rows))
 

@@ -149,7 +149,9 @@ def recipes(rows: Sequence[Row]) -> Table | None:
         ("penetration/vertices", Column("below", "Below the skin", "%")),
         ("train/steps", Column("steps", "Steps")),
         ("cost/train", Column("training", "Training", "s")),
+        ("cost/setup", Column("ready", "Making ready", "s")),
     ]
+    columns = [(metric, column) for metric, column in columns if metric in measured.metrics]
     order = dict.fromkeys(row.method for row in measured.rows)  # default first, as it was run
     # A training is no scene: each mean is over the scenes that can have its metric.
     scenes = {m: [r.scene for r in measured.rows if r.metric == m] for m, _ in columns}

@@ -102,6 +102,21 @@ def is_hybrid(method: str) -> bool:
     return bool(start and plus and cut and cut.family in _FAMILIES)
 
 
+def is_contestant(method: str) -> bool:
+    """Whether it runs garments: not the reference, its twins, nor the bound."""
+    return method.partition("-")[0] != REFERENCE and method != "free-bound"
+
+
+def kin_of(method: str) -> str:
+    """A name that SNUG shares with its variants and with what is made of them: with equal seeds they begin
+    with the same weights and draw the same windows. Empty where no seed changes anything.
+    """
+    start = method.partition("+")[0]
+    if not is_seeded(method):
+        return ""
+    return "snug" if start.startswith(_VARIANT) else start
+
+
 def is_seeded(method: str) -> bool:
     """Whether what it gives depends on the seed of the run: a network, or what starts from one."""
     start = method.partition("+")[0]

@@ -15,11 +15,16 @@ LEVEL = 0.975  # of each side: 95 % in all
 def scatter(one: Mean, other: Mean) -> float:
     """The threshold of Welch's two-sided 95 % t test, t_{.975, nu} sqrt(s1^2 / n1 + s2^2 / n2) (Welch 1947).
 
+    Where both are of one kin with the same seeds, that of the paired test: t_{.975, n - 1} s / sqrt(n) with s
+    of the differences seed by seed. What two ablations draw alike is no scatter between them.
     Of one seed nothing is known: a network is then taken to have the s of the one beside it, and where
     neither has several seeds, `TIE` of the larger value is the threshold. What no seed changes has s = 0.
     """
     from scipy.special import stdtrit
 
+    if pairs := paired(one, other):
+        apart_by = statistics.stdev(first - second for first, second in pairs)
+        return float(stdtrit(len(pairs) - 1, LEVEL)) * apart_by / math.sqrt(len(pairs))
     spreads = spreads_of(one, other)
     if spreads is None:
         return TIE * max(abs(one.value), abs(other.value))
@@ -61,12 +66,20 @@ def difference(one: Mean, other: Mean) -> int:
     return sign if shares[0] > 0 else -sign
 
 
+def paired(one: Mean, other: Mean) -> list[tuple[float, float]]:
+    """Their values seed by seed, where both are of one kin and have the same seeds, several; else nothing."""
+    if not one.kin or one.kin != other.kin or one.by_seed.keys() != other.by_seed.keys():
+        return []
+    pairs = [(value, other.by_seed[seed]) for seed, value in one.by_seed.items()]
+    return pairs if len(pairs) > 1 else []
+
+
 def _in_logarithms(mean: Mean) -> Mean | None:
-    if not mean.by_seed or min(mean.by_seed) <= 0.0:
+    if not mean.by_seed or min(mean.by_seed.values()) <= 0.0:
         return None
-    logs = [math.log(value) for value in mean.by_seed]
-    spread = statistics.stdev(logs) if len(logs) > 1 else None
-    return replace(mean, value=statistics.fmean(logs), spread=spread)
+    logs = {seed: math.log(value) for seed, value in mean.by_seed.items()}
+    spread = statistics.stdev(logs.values()) if len(logs) > 1 else None
+    return replace(mean, value=statistics.fmean(logs.values()), spread=spread, by_seed=logs)
 
 
 def spreads_of(one: Mean, other: Mean) -> tuple[float, float] | None:

@@ -9,7 +9,7 @@ deviation over seeds (n - 1), absent for a single seed.
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from benchmarks.results import Row
@@ -30,7 +30,9 @@ class Mean:
     `complete` says that every seed has every scene asked for; otherwise the mean is over fewer cells
     than its neighbours in a table, and the table must say so. `stalled` says that a solver left some
     frames of some cell unconverged, `seeded` that another seed would give another value. `by_seed`: the mean
-    over scenes of each seed; empty for what was derived from other means.
+    over scenes of each seed; empty for what was derived from other means. `lost`: seeds of which nothing
+    usable is left, as of a network that diverged. `kin`: means of equal kin and seed began with the same
+    draws; empty for none.
     """
 
     value: float
@@ -40,11 +42,15 @@ class Mean:
     complete: bool
     stalled: bool = False
     seeded: bool = True
-    by_seed: tuple[float, ...] = field(default=(), compare=False)
+    by_seed: Mapping[int, float] = field(default_factory=dict, compare=False)
+    lost: int = 0
+    kin: str = field(default="", compare=False)
 
     @property
     def fewer(self) -> str:
-        """Words for a verdict: over how many scenes, where these are not all."""
+        """Words for a verdict: over how many scenes or seeds, where these are not all."""
+        if self.lost:
+            return f" ({self.seeds} of {self.seeds + self.lost} seeds)"
         return "" if self.complete else only(self.scenes)
 
 
@@ -55,6 +61,7 @@ class Measurements:
         self.rows = tuple(rows)
         self._values: dict[tuple[str, str, str], dict[int, float]] = {}
         self._stalled: set[tuple[str, str]] = set()
+        self._unusable: dict[str, set[tuple[str, int]]] = {}  # method -> scene and seed
         self.units: dict[str, str] = {}
         for row in self.rows:
             if row.status in USABLE and row.value is not None and finite(row.value):
@@ -63,6 +70,8 @@ class Measurements:
                 if row.status == "stalled":
                     self._stalled.add((row.scene, row.method))
                 self.units.setdefault(row.metric, row.unit)
+            elif row.status != "skipped":
+                self._unusable.setdefault(row.method, set()).add((row.scene, row.seed))
         self.scenes = tuple(dict.fromkeys(row.scene for row in self.rows))
         self.methods = tuple(palette.ordered(row.method for row in self.rows if row.method))
         self.metrics = tuple(dict.fromkeys(key[2] for key in self._values))
@@ -91,13 +100,20 @@ class Measurements:
                 used.add(scene)
         if not by_seed:
             return None
-        means = [statistics.fmean(values) for values in by_seed.values()]
-        spread = statistics.stdev(means) if len(means) > 1 else None
-        complete = all(len(values) == len(asked) for values in by_seed.values())
-        stalled = any((scene, method) in self._stalled for scene in used)
-        seeded = palette.is_seeded(method)
-        counts = len(used), len(means)
-        return Mean(statistics.fmean(means), spread, *counts, complete, stalled, seeded, tuple(means))
+        means = {seed: statistics.fmean(values) for seed, values in by_seed.items()}
+        lost = {seed for scene, seed in self._unusable.get(method, ()) if scene in asked} - means.keys()
+        return Mean(
+            value=statistics.fmean(means.values()),
+            spread=statistics.stdev(means.values()) if len(means) > 1 else None,
+            scenes=len(used),
+            seeds=len(means),
+            complete=not lost and all(len(values) == len(asked) for values in by_seed.values()),
+            stalled=any((scene, method) in self._stalled for scene in used),
+            seeded=palette.is_seeded(method),
+            by_seed=means,
+            lost=len(lost),
+            kin=palette.kin_of(method),
+        )
 
     def shared(
         self, methods: Iterable[str], metric: str, scenes: Sequence[str] | None = None
@@ -124,7 +140,8 @@ class Measurements:
         if not both:
             return None, None
         complete = len(both) == len(asked)
-        return replace(first, complete=complete), replace(second, complete=complete)
+        first, second = (replace(m, complete=complete and not m.lost) for m in (first, second))
+        return first, second
 
     def value(self, method: str, metric: str, scenes: Sequence[str] | None = None) -> float | None:
         """The mean alone, or None."""

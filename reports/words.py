@@ -78,12 +78,13 @@ def lowest_network(measured: Measurements) -> str:
 def against(measured: Measurements, rival: str) -> str:
     """SNUG beside another method, term by term, whichever way it comes out."""
     groups: dict[str, list[str]] = {"lower in": [], "higher in": [], "equal in": []}
-    below: set[str] = set()
+    below, compared = set[str](), set[str]()
     told, fewer = False, ""
     for term in TERMS:
         own, other = measured.pair("snug", rival, f"energy/{term}")
         if own is None or other is None:
             continue
+        compared.add(term)
         told, fewer = told or own.spread is not None or other.spread is not None, own.fewer or fewer
         a, b = own.value, other.value
         sign = difference(own, other)
@@ -98,8 +99,9 @@ def against(measured: Measurements, rival: str) -> str:
     within = " within the scatter of seeds" if told else f" within {100.0 * TIE:g} %, for want of more seeds"
     text = f"SNUG is {'; '.join(parts)}{within if groups['equal in'] else ''}{fewer}."
     if rival == "pbns":
-        held = len(below & set(PAPER_TERMS))
-        verdict = "is reproduced" if held == len(PAPER_TERMS) else f"is reproduced in {held} of the 4"
+        asked = compared & set(PAPER_TERMS)
+        held = len(below & asked)
+        verdict = "is reproduced" if held == len(PAPER_TERMS) else f"is reproduced in {held} of {len(asked)}"
         text += f" The paper's finding, SNUG lower in strain, bending, gravity and inertia, {verdict}."
     return text
 
@@ -126,7 +128,7 @@ def change(value: float, other: float) -> str:
 
 def curvature(measured: Measurements) -> str:
     """Who is closest to the simulation's wrinkles, and how wrinkled each is by itself."""
-    others = [method for method in palette.leading(measured.methods) if method != REFERENCE]
+    others = [method for method in palette.leading(measured.methods) if palette.is_contestant(method)]
     scenes = _shared(measured, others, "curvature/error")
     errors = {m: e for m in others if (e := measured.value(m, "curvature/error", scenes)) is not None}
     if not errors:
@@ -145,11 +147,13 @@ def curvature(measured: Measurements) -> str:
 
 def left_out(rows: Sequence[Row]) -> str:
     """How many ablations are worse than the full recipe in each measure, and which in none, by garment."""
+    several = len({row.seed for row in rows}) > 1
+    beyond = "beyond the scatter of seeds" if several else f"by more than {100.0 * TIE:g} %"
     sentences = []
     for garment, own in judged_ablations(rows).items():
         worse = {method: ways[0] for method, ways in own.items()}
         counts = [f"{sum(what in found for found in worse.values())} in {what}" for what in JUDGED.values()]
-        text = f"{garment}, of {len(worse)} ablations worse than full SNUG beyond the scatter of seeds: "
+        text = f"{garment}, of {len(worse)} ablations, worse than full SNUG {beyond}: "
         none = [palette.label(method) for method, found in worse.items() if not found]
         sentences.append(f"{text}{_listed(counts)}{f'; in nothing: {_listed(none)}' if none else ''}.")
     return " ".join(sentences)
@@ -224,7 +228,10 @@ def rising(rows: Sequence[Row]) -> str:
 def trouble(rows: Sequence[Row]) -> str:
     """How many cells of garments and speed failed or were skipped."""
     parts = []
-    kinds = ((False, "failed, stalled or ran out of time"), (True, "skipped for a stated reason"))
+    kinds = (
+        (False, "failed, diverged, stalled or ran out of time or memory"),
+        (True, "skipped for a stated reason"),
+    )
     for skipped, words in kinds:
         cells = {
             (row.scene, row.method, row.seed)

@@ -2,7 +2,7 @@
 
 Three cases, from harmless to grave:
 - a window is above the recipe's `spike`: the gradient of its step is clipped;
-- a window is not finite: the update is left out;
+- a window, or the gradient of a batch, is not finite: the update is left out;
 - `PATIENCE` batches in a row are not finite, or above `RUNAWAY` times the usual energy with a window above
   `spike`: the network is lost. Weights and Adam's moments go back to the last ones seen to be good, and the
   learning rate is halved.
@@ -52,15 +52,8 @@ class Guard:
         """
         bad = ~np.isfinite(joules)
         if bad.any():
-            self._remark(number, bad, joules, name, "update left out")
-            self.summary["skipped_updates"] += 1
-            self._skipped_in_a_row += 1
-            if self._skipped_in_a_row >= GIVE_UP:
-                last = self.summary["named_windows"][-1]["window"]
-                raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {last}")
-            self._count_bad(number, joules, name)
+            self._leave_out(number, bad, joules, name, "update left out")
             return "leave out"
-        self._skipped_in_a_row = 0
         judged = self.spike is not None and number >= SETTLING
         mean = float(joules.mean(dtype=np.float64))
         peaks = joules > self.spike if judged else np.zeros(len(joules), bool)
@@ -76,6 +69,30 @@ class Guard:
         if peaks.any():
             self._remark(number, peaks, joules, name, "gradient clipped")
         return "distrust" if runaway else "clip" if peaks.any() else "update"
+
+    def accepts(
+        self, number: int, gradient_norm: float, joules: np.ndarray, name: Callable[[int], str]
+    ) -> bool:
+        """Whether the gradient of a judged batch may be followed. One that is not finite would ruin the
+        weights, whatever the energies; the highest window is named. Raises TrainingError as `judge` does.
+        """
+        if np.isfinite(gradient_norm):
+            self._skipped_in_a_row = 0
+            return True
+        first = np.arange(len(joules)) == np.argmax(joules)
+        self._leave_out(number, first, joules, name, "gradient not finite, update left out")
+        return False
+
+    def _leave_out(
+        self, number: int, which: np.ndarray, joules: np.ndarray, name: Callable[[int], str], action: str
+    ) -> None:
+        self._remark(number, which, joules, name, action)
+        self.summary["skipped_updates"] += 1
+        self._skipped_in_a_row += 1
+        if self._skipped_in_a_row >= GIVE_UP:
+            last = name(int(np.argmax(which)))
+            raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {last}")
+        self._count_bad(number, joules, name)
 
     def _count_bad(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> bool:
         """One more bad batch; whether that brought good weights back."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from snug.baselines.supervised import VertexTargets
 from snug.device import CPU
@@ -263,17 +263,23 @@ class Trainer:
         whole = self.group.gathered(stacked.detach())
         joules = whole.sum(1).mean(1).cpu().numpy()
         means = dict(zip(terms, whole.mean((0, 2)).tolist()))
-        verdict = self.guard.judge(
-            number, joules, lambda row: self.data.where(self.data.starts[windows[row]])
-        )
+
+        def name(row: int) -> str:
+            return self.data.where(self.data.starts[windows[row]])
+
+        verdict = self.guard.judge(number, joules, name)
         if verdict == "leave out":
             return means, False
         with self.clock.part("backward"):
             self.optimiser.zero_grad(set_to_none=True)
             stacked.sum(1).mean().backward()
         with self.clock.part("optimiser"):
+            parameters = [p for p in self.network.parameters() if p.grad is not None]
+            norm = nn.utils.get_total_norm([p.grad for p in parameters])
+            if not self.guard.accepts(number, float(norm), joules, name):
+                return means, False
             if verdict != "update":
-                torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.gradient_limit)
+                nn.utils.clip_grads_with_norm_(parameters, self.recipe.gradient_limit, norm)
             self.optimiser.step()
         return means, verdict != "distrust"
 

@@ -16,7 +16,7 @@ from dressing import swaying, tube_dress
 from reference_sim import Material
 from snug import tensor_file
 from snug.dresser import DressedBody
-from snug.recipe import DEFAULT, DYNAMIC, PAPER
+from snug.recipe import DEFAULT, DYNAMIC, PAPER, SANTESTEBAN2019, SUPERVISED, TAILORNET
 from snug.tensor_file import TensorFileError, read_tensors
 from snug.train import train
 from snug.trained_model import TrainedModel
@@ -36,7 +36,7 @@ def shaken(motion):
 
 def short(kind="snug", *, steps=24, seed=0, recipe=PLAIN, clips=CLIPS, **options):
     options = {"progress": False, "every": 5, **options}
-    if kind == "dynamic":
+    if kind not in ("snug", "pbns") and "trajectories" not in options:
         options["trajectories"] = {clip.name: shaken(clip) for clip in clips}
     return train(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
 
@@ -63,8 +63,11 @@ def asked_after(steps):
         ("snug", PAPER),
         ("pbns", PLAIN),
         ("dynamic", replace(DYNAMIC, swing_components=6, rehearsal=3)),
+        ("supervised", SUPERVISED),
+        ("santesteban2019", SANTESTEBAN2019),
+        ("tailornet", TAILORNET),
     ],
-    ids=["mixed", "paper", "pbns", "dynamic"],
+    ids=["mixed", "paper", "pbns", "dynamic", "supervised", "santesteban2019", "tailornet"],
 )
 def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path):
     whole = short(kind, recipe=recipe)
@@ -212,3 +215,24 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     assert "8 steps" in shown and "validation" in shown and "ms a step" in shown
     assert [path.name for path in tmp_path.iterdir()] == ["small.safetensors"]
     assert module.main(words) == 0 and "nothing to resume" in capsys.readouterr().out
+
+
+def test_garments_are_trained_one_after_another_and_those_that_ended_stay(tmp_path, monkeypatch, capsys):
+    from snug import train as module
+
+    monkeypatch.setattr(module, "_motions", lambda options: ([swaying(20)], []))
+    words = ["--vertices", "200", "--steps", "3", "-o", str(tmp_path / "mine.safetensors"), "--resume"]
+    words += ["--garment", "tshirt", "--garment", "tunic"]
+    asked = iter([False, False, False, True])  # in the first step of the second
+    monkeypatch.setattr(module._StopRequest, "__call__", lambda self: next(asked))
+    assert module.main(words) == 130
+    shirt = tmp_path / "mine-tshirt.safetensors"
+    before = shirt.read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {shirt.name, "mine-tunic.checkpoint.safetensors"}
+    monkeypatch.setattr(module._StopRequest, "__call__", lambda self: False)
+    assert module.main(words) == 0 and "nothing to resume" in capsys.readouterr().out
+    assert shirt.read_bytes() == before
+    models = {path.name: TrainedModel.load(path) for path in tmp_path.iterdir()}
+    assert set(models) == {shirt.name, "mine-tunic.safetensors"}
+    assert {model.steps for model in models.values()} == {3}
+    assert models[shirt.name].vertices != models["mine-tunic.safetensors"].vertices

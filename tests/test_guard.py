@@ -7,7 +7,7 @@ import pytest
 import torch
 from dressing import swaying, tube_dress
 
-from snug.guard import PATIENCE, SETTLING, SNAPSHOT_EVERY
+from snug.guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
 from snug.recipe import DEFAULT, PAPER
 from snug.trainer import Trainer
 from snug.training_run import TrainingRun
@@ -71,6 +71,31 @@ def test_lost_weights_come_back():
     assert "motion 'sway' frame" in summary["named_windows"][-1]["window"]
     assert trainer.optimiser.param_groups[0]["lr"] == 0.5 * PLAIN.learning_rate
     assert (weights_of(trainer) - before).abs().max() < 0.02  # a few steps of 1e-3, and as many back
+
+
+def test_a_gradient_that_is_not_finite_is_not_followed():
+    """Its energies are fine, so nothing else would tell."""
+    trainer = made()
+    for number in range(3):
+        trainer.step(number)
+    before = weights_of(trainer)
+    spoilt = trainer.network.offsets.weight.register_hook(lambda gradient: gradient * float("nan"))
+    assert np.isfinite(trainer.step(3)["loss"])
+    spoilt.remove()
+    assert torch.equal(weights_of(trainer), before)
+    (named,) = trainer.guard.summary["named_windows"]
+    assert named["action"] == "gradient not finite, update left out" and named["step"] == 3
+    assert "motion 'sway' frame" in named["window"] and trainer.guard.summary["skipped_updates"] == 1
+    trainer.step(4)
+    assert not torch.equal(weights_of(trainer), before) and torch.isfinite(weights_of(trainer)).all()
+
+
+def test_training_gives_up_over_gradients_too():
+    trainer = made()
+    trainer.network.offsets.weight.register_hook(lambda gradient: gradient * float("inf"))
+    with pytest.raises(TrainingError, match=r"100 updates in a row not finite, last motion 'sway' frame"):
+        for number in range(GIVE_UP):
+            trainer.step(number)
 
 
 def test_runaway_energy_brings_good_weights_back():

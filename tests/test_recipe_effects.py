@@ -18,6 +18,7 @@ from benchmarks.wardrobe import Wardrobe
 from reports.findings import recipes
 from snug.motion import TEST, TRAIN
 from snug.recipe import DEFAULT, PAPER, Recipe
+from snug.training_set import TrainingError
 
 
 def differing(a: Recipe, b: Recipe) -> set[str]:
@@ -95,7 +96,7 @@ def test_what_has_ended_is_not_done_again(small, monkeypatch):
 
 def test_a_training_that_fails_is_a_row_and_one_that_is_killed_a_line(small, monkeypatch, capsys):
     def failing(*_):
-        raise ValueError("no steps")
+        raise TrainingError("no steps")
 
     monkeypatch.setattr(recipe_trials, "steps_within", failing)
     assert main(small.words) == 1

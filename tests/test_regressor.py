@@ -13,6 +13,7 @@ from snug.recipe import DEFAULT, PAPER, RECIPES, Recipe, RecipeError, find_recip
 from snug.regressor import Regressor, parameter_megabytes
 from snug.skeleton import axis_angles, rotation_matrices
 from snug.trained_model import make_network
+from snug.training_set import TrainingSet
 
 
 def turned(motion: Motion, angle: float, shift: np.ndarray) -> Motion:
@@ -30,6 +31,12 @@ def test_paper_scale_network_has_the_papers_size():
     assert gru == 3 * 256 * (85 + 256 + 2) + 3 * 3 * 256 * (256 + 256 + 2)
     assert sum(p.numel() for p in network.offsets.parameters()) == (256 + 1) * 3 * 4424
     assert 18.0 < parameter_megabytes(network) < 20.0  # the paper prints 19 MB
+
+
+def test_the_default_network_is_below_twenty_megabytes_at_paper_scale():
+    data = TrainingSet(tube_dress(), [swaying(12)], DEFAULT, features="motion", sequences=True)
+    network = make_network("snug", data.features.shape[1], 4400, DEFAULT, seed=0)
+    assert data.features.shape[1] > 85 and 19.0 < parameter_megabytes(network) < 20.0
 
 
 def test_state_carries_a_sequence_over_a_cut():

@@ -100,7 +100,7 @@ def test_the_answer_follows_the_numbers():
     assert "PBNS has the lowest" in said(2.5, 1.0) and "2.5 times as much" in said(2.5, 1.0)
     assert "SNUG is lower in strain" in said(1.0, 2.5) and "SNUG is higher in strain" in said(2.5, 1.0)
     assert "gravity and inertia, is reproduced." in said(1.0, 1.2)
-    assert "equal in strain" in said(1.0, 1.001) and "reproduced in 0 of the 4" in said(1.0, 1.001)
+    assert "equal in strain" in said(1.0, 1.001) and "reproduced in 0 of 4" in said(1.0, 1.001)
 
 
 def test_a_difference_within_the_spread_of_the_seeds_is_no_difference():

@@ -86,6 +86,27 @@ def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
         assert all(kept()) == (not moved)
 
 
+@pytest.mark.parametrize("kernels", [True, False])
+def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
+    trainer = made(shape_range=3.0)
+    if not kernels:
+        trainer = Trainer(
+            "snug", tube_dress(), MOTIONS, steps=9, seed=0, kernels=False, recipe=trainer.recipe
+        )
+    contact, body, motion = trainer.contact, trainer.dressed.body, MOTIONS[0]
+    assert contact is not None
+    betas = np.random.default_rng(2).uniform(-3, 3, (2, body.shape_count))
+    batch = trainer.data.batch(np.array([4, 17]), betas)  # windows of the first motion begin at every frame
+    rows, positions, _ = contact.posed(batch)
+    assert np.asarray(rows).tolist() == list(range(6))
+    for row, frame in enumerate([4, 5, 6, 17, 18, 19]):
+        own = betas[row // 3]
+        whole = body.vertices(motion.poses[[frame]], motion.translations[[frame]], betas=own)[0]
+        pelvis = body.joints(own)[0] + motion.translations[frame]
+        expected = whole[contact.patch.body_vertices] - pelvis
+        assert np.allclose(np.asarray(positions)[row], expected, atol=1e-4)
+
+
 def lent(motions, frame, monkeypatch):
     """The frames that have the anchors of `frame`, of 41, once it alone has been searched in a step."""
     trainer = made(motions, contact_refresh=1 / 48)  # one frame a step
