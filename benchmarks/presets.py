@@ -62,7 +62,7 @@ PRESETS = (
     ),
     Preset(
         name="quick",
-        description="1000-vertex T-shirt, all embedded motions: under 15 minutes on 2 cores",
+        description="garments of 1000 vertices, all embedded motions; by default under 15 minutes on 2 cores",
         garment_vertices=1000,
         train_motions=None,
         test_motions=None,
@@ -80,7 +80,7 @@ PRESETS = (
     ),
     Preset(
         name="paper",
-        description="4400-vertex T-shirt, all frames of all motions, 60,000 steps of recipe default: hours",
+        description="garments of 4400 vertices, all frames of all motions, 60,000 steps a training: hours",
         garment_vertices=4400,
         train_motions=None,
         test_motions=None,

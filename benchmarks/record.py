@@ -34,7 +34,11 @@ class Record:
             "suites": list(plan.suites),
             "scenes": [scene.name for scene in plan.scenes],
             "methods": list(dict.fromkeys(cell.method for cell in plan.cells)),
-            "motions": {"train": list(plan.train), "test": list(plan.test)} if plan.needs_wardrobe else {},
+            "motions": {
+                f"{what} {garment}": list(names(garment))
+                for garment in plan.garments
+                for what, names in (("train", plan.train_of), ("test", plan.test_of))
+            },
             "body": [plan.body.path.name, plan.body.digest] if plan.body else "of the package",
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},

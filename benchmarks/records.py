@@ -129,7 +129,7 @@ class Records:
             if not path.is_file():
                 return "missing", f"{name} is gone", record | {"result": None}
             if content and digest_of_file(path) != content:
-                return "stale", f"{name} is another", record
+                return "stale", name, record
         if record["key"] != work.key:
             changed = [name for name in work.parts if parts.get(name) != work.parts[name]]
             changed += [name for name in parts if name not in work.parts]

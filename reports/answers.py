@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 from benchmarks.results import Row
@@ -115,8 +116,13 @@ def beaten_by(points: Sequence[Point], own: Point) -> Point | None:
 
 
 def overtaken(point: Point, others: Sequence[Point]) -> bool:
-    """Whether one of the others is no slower and no less accurate."""
-    return any(p.time <= point.time and p.error <= point.error for p in others)
+    """Whether one of the others is no less accurate, and no slower by more than run times scatter."""
+    return any(p.error <= point.error and p.time <= point.time + _scatter(p, point) for p in others)
+
+
+def _scatter(one: Point, other: Point) -> float:
+    """Two standard deviations of the difference of their run times: networks of one size take one time."""
+    return 2.0 * math.hypot(one.time_spread, other.time_spread)
 
 
 def cut_solvers(points: Sequence[Point]) -> list[Point]:

@@ -2,7 +2,8 @@
 
 Recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text but for its
 contact (below), the ablations are the default with one thing changed. None holds a balancing weight between
-the energies: there is none. Imports nothing heavy, so that a command can list recipes without loading torch.
+the energies: there is none (`swing` of `dynamic` weighs what a simulation tells). Imports nothing heavy, so
+that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations

@@ -168,6 +168,18 @@ def test_curves_are_written(tmp_path):
     assert "seconds/forward" in events.Tags()["scalars"]
 
 
+def test_the_command_writes_curves_of_every_garment(tmp_path, monkeypatch):
+    pytest.importorskip("tensorboard")
+    from snug import train as module
+
+    monkeypatch.setattr(module, "_motions", lambda options: ([swaying(20)], []))
+    words = ["--vertices", "200", "--steps", "2", "-o", str(tmp_path / "mine.safetensors")]
+    words += ["--garment", "tshirt", "--garment", "tunic", "--tensorboard", str(tmp_path / "curves")]
+    assert module.main(words) == 0
+    written = {path.parent.name for path in (tmp_path / "curves").rglob("*tfevents*")}
+    assert written == {"mine-tshirt", "mine-tunic"}
+
+
 def test_missing_tensorboard_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     with pytest.raises(LogbookError, match=r"pip install 'neural-garment-benchmark\[tensorboard\]'"):

@@ -220,6 +220,12 @@ def test_the_dynamic_recipe_is_judged_on_the_garment_that_swings():
     assert bars.table([row(method="simulation")]) is None
 
 
+def test_bars_are_of_the_sizes_that_they_were_asked_for():
+    rows = seeds_of("snug", "energy/total", (1.0,)) + seeds_of("free-bound", "energy/total", (1.0,))
+    assert bars.table([dataclasses.replace(row, preset="quick") for row in rows]) is not None
+    assert bars.table([dataclasses.replace(row, preset="smoke") for row in rows]) is None
+
+
 def test_throughput_is_of_the_scenes_that_were_measured_both_ways(tmp_path):
     cost = {"unit": "ms", "method": "snug"}
     rows = [row(metric="cost/frame", value=0.5, **cost), row(metric="cost/batch", value=0.1, **cost)]

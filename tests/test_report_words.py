@@ -121,6 +121,8 @@ def test_words_compare_means_over_the_scenes_that_both_have():
     assert words.lowest_network(alone) == "SNUG has a mean total on unseen motions: 5.00 J per frame."
     rows = [row(s, m, "curvature/error", v) for s, m, v in zip((*SCENES, SCENES[0]), ("snug", "snug", "pbns"),
             (1.0, 9.0, 2.0))]  # fmt: skip
+    # The reference's twin and the bound run no garment, however near they are.
+    rows += [row(SCENES[0], m, "curvature/error", 1e-8) for m in ("simulation-moved", "free-bound")]
     assert words.curvature(Measurements(rows)) == (
         "Smallest mean-curvature error (1 scene only): SNUG, 1.00 1/m (PBNS 2.00)."
     )

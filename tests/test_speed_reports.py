@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.results import Row, RunFolder
 from reports import build, palette
-from reports.answers import answers, by_scene
+from reports.answers import answers, beaten_by, by_scene, overtaken
 from reports.break_even import Cost, break_even, cost_of, crossing, crossings, rivals
 from reports.canvas import _columns
 from reports.fronts import Point, fastest, front, hybrids, points_of, solvers
@@ -133,6 +133,15 @@ def test_the_answers_follow_the_numbers():
     assert "1 of 2 SNUG-started solvers" in said["Network plus solver"]
     assert "after 2,000 frames" in said["When training pays"]
     assert "after 13,000 frames" in said["When training pays"]
+
+
+def test_as_fast_is_within_the_scatter_of_run_times():
+    point, twin = Point("snug", 0.350, 4.2, 0.004), Point("supervised", 0.357, 3.7, 0.003)
+    assert overtaken(point, [twin]) and beaten_by([point, twin], point) is twin
+    assert not overtaken(twin, [point])  # which is less accurate
+    slower = dataclasses.replace(twin, time=0.361)
+    assert not overtaken(point, [slower]) and beaten_by([point, slower], point) is None
+    assert not overtaken(Point("snug", 0.350, 4.2), [Point("supervised", 0.357, 3.7)])  # no repeats: no scatter
 
 
 def test_hybrids_may_lose_to_the_network_itself():

@@ -38,8 +38,7 @@ LEARNED = (
     _network("snug-paper", "SNUG by the paper's text, its closest points remembered"),
     *(_network(f"snug-{recipe.name}", f"ablation: SNUG, recipe {recipe.name}") for recipe in ABLATIONS),
     *hybrids("snug-dynamic", "lbfgs", "snug-dynamic"),
-    _cleaned("snug"),
-    _cleaned("pbns"),
+    *map(_cleaned, ("snug", "pbns", "supervised", "santesteban2019", "tailornet")),
     MethodEntry(
         name="free-bound",
         description="no network: the vertices of a whole clip optimised directly, a lower bound",
