@@ -141,7 +141,9 @@ def test_as_fast_is_within_the_scatter_of_run_times():
     assert not overtaken(twin, [point])  # which is less accurate
     slower = dataclasses.replace(twin, time=0.361)
     assert not overtaken(point, [slower]) and beaten_by([point, slower], point) is None
-    assert not overtaken(Point("snug", 0.350, 4.2), [Point("supervised", 0.357, 3.7)])  # no repeats: no scatter
+    assert not overtaken(
+        Point("snug", 0.350, 4.2), [Point("supervised", 0.357, 3.7)]
+    )  # no repeats: no scatter
 
 
 def test_hybrids_may_lose_to_the_network_itself():
