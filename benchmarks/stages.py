@@ -198,8 +198,8 @@ class Stages:
             if learns_from_simulation(network.name):
                 motions = self.targets.get(network.garment, {})
             steps = plan.preset.steps_of(network.name)
-            arguments = (network, steps, motions, plan.folder, plan.device)
             work = self.agenda.network(network)
+            arguments = (network, steps, motions, plan.folder, plan.device, work.key)
             todo[work] = Job(network.label, training.train_network, arguments, steps)
             networks[work] = network
         results = self.finished(todo, title="training", unit="step")

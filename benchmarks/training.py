@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .workers import Tell
 
 LOG_EVERY = 20  # training steps between two reports of progress
+CHECKPOINT_MINUTES = 5.0  # between two checkpoints: a training of preset quick is over before the first
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,13 @@ def train_network(
     motions: Mapping[str, Path | None],
     folder: Path,
     device: str,
+    key: str,
 ) -> Trained:
     """Train that network (or make an untrained one) and write it where its garment's networks lie.
 
     motions: name -> file of its simulation, which is read where the network learns from one. device: cpu or
-    cuda, for every part of a step.
+    cuda, for every part of a step. key: of the work; a training of the same key that was killed goes on from
+    its last checkpoint, and ends as it would have.
     """
     import torch
 
@@ -56,6 +59,7 @@ def train_network(
     from snug.dresser import DressedBody
     from snug.recipe import TRAININGS
     from snug.train import train, untrained_model
+    from snug.training_run import Saving
 
     from .methods.networks import model_path
 
@@ -63,6 +67,10 @@ def train_network(
     name, seed, run = network.name, network.seed, RunFolder(folder)
     path = model_path(run.models_of(network.garment), name, seed)
     path.unlink(missing_ok=True)  # if this training fails, no study is to take an earlier one's model for it
+    checkpoint = path.with_name(f".{path.stem}.{key}.checkpoint.safetensors")
+    for other in set(path.parent.glob(f".{path.stem}.*.checkpoint.safetensors")) - {checkpoint}:
+        other.unlink()  # of a training that nobody asks for any more
+    saving = Saving(path=checkpoint, minutes=CHECKPOINT_MINUTES, resume=True)
     dressed = DressedBody(wardrobe.body, wardrobe.garments[network.garment])
     clips = wardrobe.named(motions)
     if name == "untrained":
@@ -82,8 +90,10 @@ def train_network(
         model = train(
             training.kind, dressed, clips, steps=steps, seed=seed, trajectories=targets,
             recipe=training.recipe, log=log, progress=False, every=LOG_EVERY, device=device,
+            saving=saving,
         )  # fmt: skip
     model.save(path)
+    saving.done()
     return Trained(
         name=name,
         seed=seed,

@@ -242,4 +242,4 @@ def test_the_harness_hands_the_device_on(tmp_path):
     with pytest.raises(DeviceError, match="--device cuda"):
         check_device("cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
-        train_network(wardrobe, print, Network("snug", 0), 2, {"sway": None}, tmp_path, "cuda")
+        train_network(wardrobe, print, Network("snug", 0), 2, {"sway": None}, tmp_path, "cuda", "0")

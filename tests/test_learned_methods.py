@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import pytest
+import torch
+from dressing import swaying, tube_dress
 
+from benchmarks import training
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
 from benchmarks.methods.networks import model_path
@@ -13,7 +16,9 @@ from benchmarks.results import RunFolder
 from benchmarks.run import make_parser, make_plan
 from benchmarks.suites import garments
 from benchmarks.training import train_network
+from benchmarks.wardrobe import Wardrobe
 from snug.recipe import ABLATIONS, RECIPES, TERMS, TRAININGS
+from snug.trained_model import TrainedModel
 
 
 def plan(*words):
@@ -59,13 +64,46 @@ def test_what_is_cleaned_up_is_a_row_of_its_own_over_the_same_network(tmp_path):
     assert chosen.models == (("snug", 0), ("snug", 1))
 
 
+def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "CHECKPOINT_MINUTES", 1e-9)
+    dressed = tube_dress()
+    wardrobe = Wardrobe(dressed.body, {"tshirt": dressed.garment}, {"sway": swaying(30)})
+
+    def trained(folder, key, tell):
+        return train_network(wardrobe, tell, Network("snug", 0), 60, {"sway": None}, folder, "cpu", key)
+
+    def killed(steps):
+        told.append(steps)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    told, went_on = [], []
+    models = RunFolder(tmp_path).models
+    for key in ("before", "now"):  # the first is another training: of other inputs, or of other code
+        told.clear()
+        with pytest.raises(KeyboardInterrupt):
+            trained(tmp_path, key, killed)
+        assert [path.name for path in models.iterdir()] == [f".snug-seed0.{key}.checkpoint.safetensors"]
+    result = trained(tmp_path, "now", went_on.append)
+    assert sum(went_on) == result.steps == 60 and len(went_on) < 3  # of three reports
+    trained(tmp_path / "unbroken", "now", print)
+    one, other = (
+        TrainedModel.load(model_path(RunFolder(folder).models, "snug", 0)).network.state_dict()
+        for folder in (tmp_path, tmp_path / "unbroken")
+    )
+    assert all(torch.equal(one[name], other[name]) for name in one)
+    assert [path.name for path in models.iterdir()] == ["snug-seed0.safetensors"]
+
+
 def test_a_training_that_fails_leaves_no_earlier_model_behind(tmp_path):
     folder = RunFolder(tmp_path)
     folder.models.mkdir()
     path = model_path(folder.models, "snug", 0)
     path.touch()
     with pytest.raises(AttributeError):
-        train_network(None, print, Network("snug", 0), 2, {}, tmp_path, "cpu")  # there is no body to dress
+        train_network(
+            None, print, Network("snug", 0), 2, {}, tmp_path, "cpu", "0"
+        )  # there is no body to dress
     assert not path.exists()
 
 

@@ -52,7 +52,9 @@ def trained(run, wardrobe):
     assert simulated.whole and simulated.frames == TINY.frames and simulated.seconds > 0
     motions = {TRAIN: run.path / simulated.files[0]}
     networks = {kind: Network(kind, 0) for kind in KINDS}
-    return {k: train_network(wardrobe, silent, n, 2, motions, run.path, "cpu") for k, n in networks.items()}
+    return {
+        k: train_network(wardrobe, silent, n, 2, motions, run.path, "cpu", "0") for k, n in networks.items()
+    }
 
 
 @pytest.fixture(scope="module")
