@@ -104,10 +104,7 @@ class Patch:
         A byte is enough (0.3 degrees): planes interpolate them and make the result unit length again. With
         thousands of frames remembered, memory counts.
         """
-        normals = np.empty(positions.shape, np.int8)
-        for frame, x in enumerate(positions):
-            normals[frame] = np.rint(np.float32(127.0) * vertex_normals(x, self.faces))
-        return normals
+        return _byte_normals(positions, self.faces)
 
 
 def kept(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
@@ -211,6 +208,14 @@ def _samples(contact: ContactPenalty) -> tuple[np.ndarray, np.ndarray, np.ndarra
     """Stencils, weights, stiffness and margin in the types of the kernel."""
     weights, stiffness = contact.weights.astype(np.float32), contact.stiffness.astype(np.float32)
     return contact.stencils.astype(np.uint32), weights, stiffness, np.float32(contact.margin)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _byte_normals(positions, faces):
+    normals = np.empty(positions.shape, np.int8)
+    for frame in range(len(positions)):
+        normals[frame] = np.rint(np.float32(127.0) * vertex_normals(positions[frame], faces))
+    return normals
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
