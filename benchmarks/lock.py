@@ -10,17 +10,20 @@ from pathlib import Path
 
 
 class HeldError(ValueError):
-    """The folder is another run's at this moment; the message names it."""
+    """The folder is another run's at this moment, or cannot be one; the message names it."""
 
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Hold a folder, made where it is not there. Raises HeldError where another run has it.
+    """Hold a folder, made where it is not there. Raises HeldError where another run, or a file, has it.
 
     The lock lies on the folder itself and leaves no file. The system releases it with the process, however
     that ended. Where the system or its file system has no such locks nothing is held, and that is said.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise HeldError(f"--out {folder}: there is a file in the way; name another folder") from None
     with ExitStack() as closing:
         try:
             import fcntl

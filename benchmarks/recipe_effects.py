@@ -116,13 +116,15 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
     from .presets import find_preset
     from .wardrobe import embedded_motions, open_wardrobe
 
-    preset = replace(find_preset("quick"), garment_vertices=options.vertices)
+    quick = find_preset("quick")
+    name = "quick" if options.vertices == quick.garment_vertices else f"quick, {options.vertices} vertices"
+    preset = replace(quick, name=name, garment_vertices=options.vertices)
     folder, facts, commit = RunFolder(options.out), provenance.hardware("cpu"), provenance.commit()
     folder.write_config({
         "command": "python -m benchmarks.recipe_effects", "seconds": options.seconds,
         "recipes": options.recipes, "vertices": options.vertices,
         "seeds": sorted({seed for _, seed in asked}), "workers": options.workers,
-        "preset": "quick", "commit": commit, "hardware": facts, "versions": provenance.versions(),
+        "preset": preset.name, "commit": commit, "hardware": facts, "versions": provenance.versions(),
         "motions": {"train": learned(TRAIN), "held_out": list(HELD_OUT)},
     })  # fmt: skip
     records, hardware = Records(folder, commit=commit), provenance.hardware_line(facts)
@@ -140,7 +142,7 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
         for found in (records.find(work) for work in works):
             if found.state == "finished" and found.result:
                 own = [cells_to_row(cells) for cells in found.result["rows"]]
-                rows += with_provenance(own, preset="quick", commit=found.commit, hardware=hardware)
+                rows += with_provenance(own, preset=name, commit=found.commit, hardware=hardware)
         folder.write_rows(rows)
     failures = [result for result in ended if isinstance(result, workers.Failure)]
     for failure in failures:

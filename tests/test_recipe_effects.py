@@ -111,6 +111,14 @@ def test_a_training_that_fails_is_a_row_and_one_that_is_killed_a_line(small, mon
     ]
 
 
+def test_a_file_in_place_of_the_folder_is_one_line(tmp_path, capsys):
+    (tmp_path / "mine").write_text("precious")
+    for out in (tmp_path / "mine", tmp_path / "mine" / "deeper"):
+        assert main(["--recipes", "paper", "-o", str(out)]) == 2
+        assert "there is a file in the way; name another folder" in capsys.readouterr().err
+    assert (tmp_path / "mine").read_text() == "precious"
+
+
 def test_a_wrong_word_is_one_line_and_the_list_needs_no_torch(capsys):
     assert main(["--recipes", "nothing like it"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
