@@ -15,15 +15,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 from snug.recipe import DEFAULT, PAPER, Recipe
 
 from . import provenance, workers
 from .fingerprint import code_of
+from .judged import kept_rows
 from .lock import held
 from .recipe_trials import HELD_OUT, learned, tried
 from .records import Records, Work
-from .results import Row, RunFolder, cells_to_row, with_provenance
+from .results import Row, RunFolder, with_provenance
 
 EXAMPLES = """examples:
   python -m benchmarks.recipe_effects                                    each for a minute
@@ -116,19 +118,21 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
     from .presets import find_preset
     from .wardrobe import embedded_motions, open_wardrobe
 
-    quick = find_preset("quick")
-    name = "quick" if options.vertices == quick.garment_vertices else f"quick, {options.vertices} vertices"
-    preset = replace(quick, name=name, garment_vertices=options.vertices)
+    preset = find_preset("quick")
+    if options.vertices != preset.garment_vertices:
+        name = f"quick, {options.vertices} vertices"
+        preset = replace(preset, name=name, garment_vertices=options.vertices)
     folder, facts, commit = RunFolder(options.out), provenance.hardware("cpu"), provenance.commit()
+    versions, hardware = provenance.versions(), provenance.hardware_line(facts)
     folder.write_config({
         "command": "python -m benchmarks.recipe_effects", "seconds": options.seconds,
         "recipes": options.recipes, "vertices": options.vertices,
         "seeds": sorted({seed for _, seed in asked}), "workers": options.workers,
-        "preset": preset.name, "commit": commit, "hardware": facts, "versions": provenance.versions(),
+        "preset": preset.name, "commit": commit, "hardware": facts, "versions": versions,
         "motions": {"train": learned(TRAIN), "held_out": list(HELD_OUT)},
     })  # fmt: skip
-    records, hardware = Records(folder, commit=commit), provenance.hardware_line(facts)
-    works = [_work(recipe, seed, options) for recipe, seed in asked]
+    records, machine = Records(folder, commit=commit), {"versions": versions, "hardware": hardware}
+    works = [_work(recipe, seed, options, machine) for recipe, seed in asked]
     jobs = [
         workers.Job(work.name, tried, (preset, recipe, seed, options.seconds), 1, work, records)
         for work, (recipe, seed) in zip(works, asked)
@@ -140,9 +144,8 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
         ended = workers.run_jobs(jobs, wardrobe, title="recipes", unit="training", workers=options.workers)
     finally:  # an interrupt leaves the rows of all that had ended
         for found in (records.find(work) for work in works):
-            if found.state == "finished" and found.result:
-                own = [cells_to_row(cells) for cells in found.result["rows"]]
-                rows += with_provenance(own, preset=name, commit=found.commit, hardware=hardware)
+            if found.state == "finished":
+                rows += with_provenance(kept_rows(found), preset=preset.name, hardware=hardware)
         folder.write_rows(rows)
     failures = [result for result in ended if isinstance(result, workers.Failure)]
     for failure in failures:
@@ -153,11 +156,10 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
     return int(bool(failures) or any(not row.passed for row in rows))
 
 
-def _work(recipe: Recipe, seed: int, options: argparse.Namespace) -> Work:
+def _work(recipe: Recipe, seed: int, options: argparse.Namespace, machine: dict[str, Any]) -> Work:
     """A training and its judgement. Those beside it share the memory, so how many there are counts."""
     inputs = {name: getattr(options, name) for name in ("seconds", "vertices", "workers")}
-    inputs |= {"recipe": dataclasses.asdict(recipe), "seed": seed, "versions": provenance.versions()}
-    inputs["hardware"] = provenance.hardware_line(provenance.hardware("cpu"))
+    inputs |= {"recipe": dataclasses.asdict(recipe), "seed": seed, **machine}
     code = code_of("benchmarks.recipe_trials", "benchmarks.scenes.dressed_body")  # the scene by its name
     return Work("recipe", f"{recipe.name}, seed {seed}", inputs, code)
 
