@@ -54,6 +54,7 @@ DEVIATIONS = (
     Deviation("velocity in root axes", ("velocity_frame",)),
     Deviation("smoothed weights", ("smoothing",)),
     Deviation("higher rate, by a cosine", ("learning_rate", "schedule")),
+    Deviation("weight decay", ("weight_decay",)),
     Deviation("remembered states, less noise", ("remembered", "h0_sigma")),
     Deviation("overlapping windows", ("window_stride",)),
     Deviation("even epochs", ("even",)),

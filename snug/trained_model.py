@@ -22,7 +22,7 @@ from snug.swing import SwingTeacher
 from snug.swinging_regressor import SwingingRegressor
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 
-FORMAT = "snug-model-4"
+FORMAT = "snug-model-5"
 KEPT = ("seed", "steps", "seconds", "setup_seconds", "history", "summary")  # in the file as in the model
 
 

@@ -78,7 +78,9 @@ class Trainer:
         self.network = network.to(device)
         if isinstance(network, Regressor):
             network.closed_form = self.kernels
-        self.optimiser = torch.optim.Adam(self.network.parameters(), lr=recipe.learning_rate, fused=True)
+        self.optimiser = torch.optim.AdamW(
+            self.network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay, fused=True
+        )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
         self.shaped = bool(recipe.shape_range) and how.features == "motion" and how.physics

@@ -17,7 +17,7 @@ from snug.trained_model import TrainedModel
 from snug.trainer import Trainer, part_of
 from snug.validation import Validation, Validator
 
-FORMAT = "snug-checkpoint-4"
+FORMAT = "snug-checkpoint-5"
 Log = Callable[[dict[str, float]], None]
 
 

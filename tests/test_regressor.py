@@ -155,6 +155,7 @@ def test_recipes_survive_a_file(recipe):
         ({"window": 2}, "window"),
         ({"learning_rate": 0.0}, "learning_rate"),
         ({"even": 0}, "even"),
+        ({"weight_decay": -0.1}, "weight_decay"),
         ({"mixed_lift": 1.5}, "mixed_lift"),
         ({"mixed_lift": -0.1}, "mixed_lift"),
     ],

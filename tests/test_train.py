@@ -55,6 +55,21 @@ def test_rate_follows_its_schedule(schedule, wanted):
         assert rate == pytest.approx(share * PLAIN.learning_rate, rel=1e-9)
 
 
+@pytest.mark.parametrize("decay", [0.0, 0.5])
+def test_weight_decay_takes_its_share_off_weights_that_nothing_else_moves(decay):
+    recipe = replace(PLAIN, weight_decay=decay, schedule="constant")
+    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=8, seed=0, recipe=recipe)
+    unread = np.isinf(trainer.data.input_statistics()[1])
+    weights = next(p for p in trainer.network.parameters() if p.shape[-1] == len(unread))
+    before = weights.detach().clone()
+    for number in range(8):
+        trainer.step(number)
+    left = (1 - recipe.learning_rate * decay) ** 8
+    assert unread.any() and not unread.all()
+    assert torch.allclose(weights[:, unread], left * before[:, unread], rtol=1e-5)
+    assert not torch.allclose(weights[:, ~unread], left * before[:, ~unread], rtol=1e-5)
+
+
 def test_trained_beats_skinning_in_a_roll_out(trained):
     from reference_sim.energies import Gravity, StretchStVK
 
