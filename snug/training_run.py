@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
@@ -17,7 +18,7 @@ from snug.trained_model import TrainedModel
 from snug.trainer import Trainer, part_of
 from snug.validation import Validation, Validator
 
-FORMAT = "snug-checkpoint-5"
+FORMAT = "snug-checkpoint-6"
 Log = Callable[[dict[str, float]], None]
 
 
@@ -179,6 +180,9 @@ class TrainingRun:
             "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},
             "seed": trainer.seed,
             "steps": trainer.steps,
+            # Both change the order of sums, and so the last bits.
+            "threads": torch.get_num_threads(),
+            "processes": trainer.group.size,
             "vertices": trainer.dressed.vertices,
             "data": digest.hexdigest(),
             "material": asdict(trainer.dressed.cloth.material),
@@ -232,4 +236,4 @@ class TrainingRun:
         )
 
 
-SHORT = ("kind", "seed", "steps", "vertices", "every")  # worth naming in one line
+SHORT = ("kind", "seed", "steps", "threads", "processes", "vertices", "every")  # worth naming in one line

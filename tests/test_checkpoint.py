@@ -164,6 +164,13 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path):
         short(saving=again, recipe=replace(PLAIN, h0_sigma=0.1))
     with pytest.raises(TensorFileError, match="another data"):
         short(saving=again, clips=[swaying(31)])
+    threads = torch.get_num_threads()
+    torch.set_num_threads(threads + 1)
+    try:
+        with pytest.raises(TensorFileError, match=f"threads {threads} there, {threads + 1} here"):
+            short(saving=again)
+    finally:
+        torch.set_num_threads(threads)
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(TensorFileError, match=r"run\.safetensors"):
         short(saving=again)
