@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 from snug.recipe import DEFAULT, TRAININGS
 
 from . import provenance
 from .clips import SUFFIX
-from .fingerprint import ROOT, code_of, digest, digest_of_file, preset_values
+from .fingerprint import code_of, data_files, digest, preset_values
 from .methods import find_method
 from .plan import Cell, Network, Plan, network_of, runs
 from .records import Records, Work
@@ -23,7 +23,6 @@ from .scene import Scene
 from .scenes import dressed_scene
 
 REFERENCE = "simulation"
-DATA_FILES = "snug/data/*.npz"  # what the modules of snug read
 
 
 class Agenda:
@@ -127,7 +126,7 @@ class Agenda:
         """What code depends on besides itself: sizes that it reads, machine, packages, files it may read."""
         inputs: dict[str, Any] = {"preset": preset_values(self.plan.preset, code), "machine": self.machine}
         if any(path.startswith("snug/") for path in code):
-            inputs["files"] = _data_files()
+            inputs["files"] = data_files()
             if self.plan.body:
                 inputs["body"] = self.plan.body.digest
         return inputs
@@ -153,9 +152,3 @@ def declared(entry: Any) -> dict[str, Any]:
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     fields.pop("description")
     return {name: dict(value) if isinstance(value, Mapping) else value for name, value in fields.items()}
-
-
-@lru_cache(maxsize=1)
-def _data_files() -> dict[str, str]:
-    found = sorted(ROOT.glob(DATA_FILES))
-    return {path.relative_to(ROOT).as_posix(): digest_of_file(path) for path in found}

@@ -146,6 +146,8 @@ def run_cell(cell: Cell, entry: MethodEntry, scene: BuiltScene, run: RunFolder) 
         if hasattr(method, "ready_batch"):
             _BATCHES[cell.label] = method.ready_batch
     except Exception as error:
+        for left in (path, run.held_path(cell.scene.name, cell.method, cell.seed)):
+            left.unlink(missing_ok=True)  # nobody is to look at the frames of a cell that failed
         return failed(cell, error)
     frames = frames_computed(trajectory)
     return Outcome(

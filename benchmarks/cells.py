@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -154,9 +155,10 @@ class Cells:
         folder.trajectory_path(*place).unlink(missing_ok=True)
         folder.held_path(*place).unlink(missing_ok=True)
         for number in range(1, self.plan.preset.repeats):
-            self.records.forget("repeat", f"{name_of(cell)}-{number}")
+            self.records.forget("repeat", f"{escape(name_of(cell))}-{number}")
         compared = cell.method.startswith(REFERENCE)
-        self.records.forget("metrics", f"{flat(cell.scene.name)}/**/*" if compared else name_of(cell))
+        names = f"{escape(flat(cell.scene.name))}/**/*" if compared else escape(name_of(cell))
+        self.records.forget("metrics", names)
 
     def _keep(self, work: Work, outcome: Outcome) -> None:
         folder, cell = self.records.folder, outcome.cell

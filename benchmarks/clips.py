@@ -9,13 +9,13 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+from .results import CLIP as SUFFIX
+
 if TYPE_CHECKING:
     import numpy as np
 
     from snug.body import Body
     from snug.motion import Motion
-
-SUFFIX = "@clip"
 
 
 def clip(body: Body, motion: Motion, frames: int) -> Motion:

@@ -21,6 +21,7 @@ COLUMNS = (
     ("cost/train", "train s"),
 )
 DASH = "-"
+FEWER = "*"
 
 
 def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
@@ -56,34 +57,48 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
 
 
 def _groups(suite: str, rows: list[Row]) -> list[tuple[str, list[Row]]]:
-    """All scenes of garments together; of speed each by itself, as errors of different scenes do not add."""
-    if not rows:
-        return []
-    scenes = list(dict.fromkeys(row.scene for row in rows))
-    if suite == "garments":
-        return [(f"garments, mean of {len(scenes)} scene{'s' * (len(scenes) > 1)}", rows)]
-    return [(f"speed, {scene}", [row for row in rows if row.scene == scene]) for scene in scenes]
+    """Scenes of one garment together; of speed each by itself, as errors of different scenes do not add."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        part = row.scene.partition("/")[0] if suite == "garments" else row.scene
+        groups.setdefault(part, []).append(row)
+    if suite != "garments":
+        return [(f"speed, {scene}", own) for scene, own in groups.items()]
+    titled = []
+    for garment, own in groups.items():
+        count = len({row.scene for row in own})
+        of = f", {garment}" if len(groups) > 1 else ""
+        titled.append((f"garments{of}, mean of {count} scene{'s' * (count > 1)}", own))
+    return titled
 
 
 def _table(title: str, rows: list[Row]) -> str:
     methods = list(dict.fromkeys(row.method for row in rows))
     values: dict[tuple[str, str], list[float]] = {}
+    scenes: dict[str, set[str]] = {}
     for row in rows:
         if row.value is not None and row.status in ("ok", "stalled"):
             values.setdefault((row.method, row.metric), []).append(row.value)
+            scenes.setdefault(row.metric, set()).add(row.scene)
+    seeds = {method: len({row.seed for row in rows if row.method == method}) for method in methods}
+
+    def shown(method: str, metric: str) -> str:
+        own = values.get((method, metric))
+        if not own:
+            return DASH
+        return f"{sum(own) / len(own):.4g}" + FEWER * (len(own) < seeds[method] * len(scenes[metric]))
+
     columns = [(metric, head) for metric, head in COLUMNS if any((m, metric) in values for m in methods)]
     lines = [[title, *(head for _, head in columns), "status"]]
     for method in methods:
-        numbers = [_number(values.get((method, metric))) for metric, _ in columns]
+        numbers = [shown(method, metric) for metric, _ in columns]
         statuses = dict.fromkeys(row.status for row in rows if row.method == method)
         lines.append([method, *numbers, ", ".join(statuses)])
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
-    return "\n".join(
+    text = "\n".join(
         "  ".join(cell.ljust(w) if k in (0, len(widths) - 1) else cell.rjust(w)
                   for k, (cell, w) in enumerate(zip(line, widths))).rstrip()
         for line in lines
     )  # fmt: skip
-
-
-def _number(values: list[float] | None) -> str:
-    return f"{sum(values) / len(values):.4g}" if values else DASH
+    partly = any(cell.endswith(FEWER) for line in lines for cell in line)
+    return text + f"\n{FEWER} over fewer scenes or seeds than its neighbours" * partly

@@ -21,6 +21,7 @@ from .presets import Preset
 
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS = ("reference_sim", "snug", "benchmarks")
+DATA_FILES = "snug/data/*.npz"  # what the modules of snug read
 # Lists of names and sizes, what they name is an input by itself; and the words of result files.
 LISTS = (
     "benchmarks/__init__.py", "benchmarks/methods/__init__.py", "benchmarks/methods/solvers.py",
@@ -61,6 +62,13 @@ def code_of(*modules: str) -> dict[str, str]:
         path = _file_of(module) or _elsewhere(module)
         found |= _closure(path)
     return {path: _source(path)[0] for path in sorted(found)}
+
+
+@cache
+def data_files() -> dict[str, str]:
+    """File -> digest, of what comes with the package and code may read."""
+    found = sorted(ROOT.glob(DATA_FILES))
+    return {path.relative_to(ROOT).as_posix(): digest_of_file(path) for path in found}
 
 
 def preset_values(preset: Preset, code: Iterable[str]) -> dict[str, Any]:

@@ -15,18 +15,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from snug.recipe import DEFAULT, PAPER, Recipe
 
 from . import provenance, workers
-from .fingerprint import code_of
+from .fingerprint import code_of, data_files, preset_values
 from .judged import kept_rows
 from .lock import held
 from .recipe_trials import HELD_OUT, learned, tried
 from .records import Records, Work
-from .results import Row, RunFolder, with_provenance
+from .results import ResultsError, Row, RunFolder, with_provenance
 
+if TYPE_CHECKING:
+    from .presets import Preset
+
+COMMAND = "python -m benchmarks.recipe_effects"
 EXAMPLES = """examples:
   python -m benchmarks.recipe_effects                                    each for a minute
   python -m benchmarks.recipe_effects --seeds 0,1 --seconds 120
@@ -101,11 +105,12 @@ def main(words: Sequence[str] | None = None) -> int:
         return 0
     try:
         seeds = [int(word) for word in options.seeds.split(",")]
-        if not chosen or options.seconds <= 0 or min(seeds) < 0 or (options.workers or 1) < 1:
+        if options.workers is None:
+            options.workers = workers.worker_count()
+        if not chosen or options.seconds <= 0 or min(seeds) < 0 or options.workers < 1:
             raise ValueError(
                 "--recipes names none, --seconds or --workers is not above 0, or a seed is below 0"
             )
-        options.workers = options.workers or workers.worker_count()
         with held(Path(options.out)):
             return _run(options, [(recipe, seed) for recipe in chosen for seed in seeds])
     except (ValueError, OSError) as error:
@@ -123,17 +128,17 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
     if options.vertices != preset.garment_vertices:
         name = f"quick, {options.vertices} vertices"
         preset = replace(preset, name=name, garment_vertices=options.vertices)
-    folder, facts, commit = RunFolder(options.out), provenance.hardware("cpu"), provenance.commit()
+    folder, facts, commit = _folder(options.out), provenance.hardware("cpu"), provenance.commit()
     versions, hardware = provenance.versions(), provenance.hardware_line(facts)
     folder.write_config({
-        "command": "python -m benchmarks.recipe_effects", "seconds": options.seconds,
+        "command": COMMAND, "seconds": options.seconds,
         "recipes": options.recipes, "vertices": options.vertices,
         "seeds": sorted({seed for _, seed in asked}), "workers": options.workers,
         "preset": preset.name, "commit": commit, "hardware": facts, "versions": versions,
         "motions": {"train": learned(TRAIN), "held_out": list(HELD_OUT)},
     })  # fmt: skip
     records, machine = Records(folder, commit=commit), {"versions": versions, "hardware": hardware}
-    works = [_work(recipe, seed, options, machine) for recipe, seed in asked]
+    works = [_work(recipe, seed, options, preset, machine) for recipe, seed in asked]
     jobs = [
         workers.Job(work.name, tried, (preset, recipe, seed, options.seconds), 1, work, records)
         for work, (recipe, seed) in zip(works, asked)
@@ -157,18 +162,33 @@ def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> in
     return int(bool(failures) or any(not row.passed for row in rows))
 
 
-def _work(recipe: Recipe, seed: int, options: argparse.Namespace, machine: dict[str, Any]) -> Work:
+def _folder(out: str) -> RunFolder:
+    """Raises ValueError for a folder with the results of something else."""
+    folder = RunFolder(out)
+    try:
+        other = folder.config_path.is_file() and folder.read_config().get("command") != COMMAND
+    except ResultsError as error:
+        raise ValueError(f"--out {error}; name another folder, or put that file right") from None
+    if other:
+        raise ValueError(f"--out {out}: holds the results of another command; name another folder")
+    return folder
+
+
+def _work(
+    recipe: Recipe, seed: int, options: argparse.Namespace, preset: Preset, machine: dict[str, Any]
+) -> Work:
     """A training and its judgement. Those beside it share the memory, so how many there are counts."""
     inputs = {name: getattr(options, name) for name in ("seconds", "vertices", "workers")}
     inputs |= {"recipe": dataclasses.asdict(recipe), "seed": seed, **machine}
     code = code_of("benchmarks.recipe_trials", "benchmarks.scenes.dressed_body")  # the scene by its name
+    inputs |= {"preset": preset_values(preset, code), "files": data_files()}
     return Work("recipe", f"{recipe.name}, seed {seed}", inputs, code)
 
 
 def _said(name: str, seed: int, rows: Sequence[Row]) -> str:
     """One line of the summary: means over the held-out motions."""
-    if any(row.value is None for row in rows):
-        return f"{name:<40} seed {seed}  {rows[-1].status}: {rows[-1].reason}"
+    if bad := next((row for row in rows if row.value is None), None):
+        return f"{name:<40} seed {seed}  {bad.status}: {bad.reason}"
     numbers: dict[str, list[float]] = {}
     for row in rows:
         numbers.setdefault(row.metric, []).append(row.value or 0.0)

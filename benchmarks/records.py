@@ -104,8 +104,10 @@ class Records:
         return digest_of_file(self.folder.path / name) if name.startswith(MODELS) else ""
 
     def forget_all(self) -> None:
-        """Everything is missing from now on."""
+        """Everything is missing from now on, and no training goes on from where an earlier one stopped."""
         shutil.rmtree(self.folder.records, ignore_errors=True)
+        for path in self.folder.models.rglob(".*.checkpoint.safetensors"):
+            path.unlink()
 
     def forget(self, kind: str, names: str) -> None:
         """Remove the records of that kind whose names fit a pattern of pathlib's."""

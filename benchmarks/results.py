@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+CLIP = "@clip"  # how the name of a scene ends that is part of a motion
 NOT_FALLING = "the error does not fall here"  # how the reason of such a row begins, see benchmarks.curves
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
 

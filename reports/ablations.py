@@ -111,6 +111,18 @@ def judged_ablations(rows: Sequence[Row]) -> dict[str, dict[str, tuple[dict[str,
     }
 
 
+def compared_in(rows: Sequence[Row]) -> dict[str, list[str]]:
+    """garment -> the measures that the full recipe and some ablation have in one scene at least."""
+    return {
+        garment: [
+            words
+            for metric, words in JUDGED.items()
+            if any(None not in source[metric][0].pair(FULL, m, metric, source[metric][1]) for m in ran)
+        ]
+        for garment, ran, source in _garments(rows)
+    }
+
+
 def _judged(method: str, source: Source) -> tuple[dict[str, str], dict[str, str]]:
     worse: dict[str, str] = {}
     better: dict[str, str] = {}

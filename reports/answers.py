@@ -121,8 +121,11 @@ def overtaken(point: Point, others: Sequence[Point]) -> bool:
 
 
 def _scatter(one: Point, other: Point) -> float:
-    """Two standard deviations of the difference of their run times: networks of one size take one time."""
-    return 2.0 * math.hypot(one.time_spread, other.time_spread)
+    """How far apart the run times of two equals may be measured: networks of one size take one time.
+
+    The range of three repeats is 1.7 standard deviations on average, so this is near two of the difference.
+    """
+    return math.hypot(one.time_spread, other.time_spread)
 
 
 def cut_solvers(points: Sequence[Point]) -> list[Point]:

@@ -35,12 +35,14 @@ class Cost:
 
 
 def cost_of(measured: Measurements, method: str, scenes: Sequence[str]) -> Cost | None:
-    """The cost of a method on the scenes given, or None where it was not timed there."""
+    """The cost of a method on the scenes given, or None where it was not timed there, or not in full."""
     frame = measured.value(method, TIME, scenes)
     if frame is None:
         return None
-    before = [measured.value(method, f"cost/{what}", scenes) or 0.0 for what in ("data", "setup", "train")]
-    return Cost(method, sum(before), frame / 1e3)
+    costs = {what: measured.value(method, f"cost/{what}", scenes) for what in ("data", "setup", "train")}
+    if costs["train"] is not None and costs["data"] is None:
+        return None  # what its simulations took is not known any more
+    return Cost(method, sum(cost or 0.0 for cost in costs.values()), frame / 1e3)
 
 
 def crossing(dear: Cost, cheap: Cost) -> float | None:
@@ -149,15 +151,17 @@ def break_even(folder: Path, rows: Sequence[Row]) -> list[Picture]:
 
 def _mark_crossings(axes, trained: Sequence[Cost], against: Sequence[Cost]) -> str:
     """A dot at each crossing, and the sentence that names them."""
-    parts = []
+    parts, crossed = [], False
     for network in trained:
         for rival in against:
             frames = crossing(network, rival)
             if frames is not None and 1.0 <= frames <= MOST_FRAMES:
-                total = network.total(frames)
+                total, crossed = network.total(frames), True
                 axes.plot(frames, total, "o", color=palette.style(network.method).colour, markersize=4.5)
                 if len(trained) > FEW and network.method != "snug":
                     continue
                 names = f"{palette.label(network.method)} overtakes {palette.label(rival.method)}"
                 parts.append(f"{names} at {frames_text(frames)} frames ({duration(total)})")
-    return "; ".join(parts) + "." if parts else "No training pays within ten million frames."
+    if parts:
+        return "; ".join(parts) + "."
+    return "SNUG's training does not pay." if crossed else "No training pays within ten million frames."

@@ -37,6 +37,8 @@ def build_report(run_dir: str | Path, *, opengl: bool = True) -> tuple[Path, lis
     from reports.tables import make_tables
 
     tables = make_tables(rows)
+    for old in run.tables.glob("*.csv"):  # of other suites, asked for in this folder before
+        old.unlink()
     for table in tables.values():
         table.write_csv(run.tables)
     problems: list[str] = []
@@ -86,13 +88,23 @@ def draw_axes(run: RunFolder, x: str, y: str, scenes: str | None) -> Path:
             raise ResultsError(f"{run.rows_path}: no row has the {what} '{name}'")
     from reports.work_precision import metric_against_metric
 
-    having = [{r.scene for r in rows if r.metric == metric and r.value is not None} for metric in (x, y)]
-    asked = scenes.split(",") if scenes else sorted(set.intersection(*having))
+    asked = scenes.split(",") if scenes else most_shared(rows, x, y)
     picture = metric_against_metric(run.figures, rows, x, y, asked)
     if picture is None:
         where = ", ".join(asked) or "every scene"
         raise ResultsError(f"{run.rows_path}: fewer than two methods have both {x} and {y} on {where}")
     return picture.path
+
+
+def most_shared(rows: Sequence[Row], x: str, y: str) -> list[str]:
+    """The scenes in which most methods have both metrics, the same methods in each."""
+    having: dict[str, dict[str, set[str]]] = {x: {}, y: {}}
+    for row in rows:
+        if row.metric in having and row.value is not None:
+            having[row.metric].setdefault(row.scene, set()).add(row.method)
+    both = {scene: methods & having[y].get(scene, set()) for scene, methods in having[x].items()}
+    most = max(both.values(), key=len, default=set())
+    return sorted(scene for scene, methods in both.items() if methods and methods == most)
 
 
 def dressed_trajectories(run: RunFolder, rows: Sequence[Row], problems: list[str]) -> list[Dressed]:
@@ -154,7 +166,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="draw only metric Y against metric X (names as in results.csv, say cost/frame gap/relative), "
         "means over --scenes, into figures/",
     )
-    parser.add_argument("--scenes", metavar="NAME,...", help="scenes of --axes (default: all that have both)")
+    parser.add_argument(
+        "--scenes",
+        metavar="NAME,...",
+        help="of --axes, of suites garments and speed (default: those in which most methods have both)",
+    )
     options = parser.parse_args(arguments)
     try:
         if options.axes:

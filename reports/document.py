@@ -139,8 +139,17 @@ def document(
         "lead": figure_block(lead) if lead else None,
         "sections": [section for section in sections if section["blocks"]],
         "definitions": _definitions(rows),
+        "workers": _side_by_side(config),
         "configuration": configuration(config, rows),
     }
+
+
+def _side_by_side(config: dict[str, Any]) -> str:
+    count = config.get("workers")
+    if not count:
+        return "one thread each."
+    together = "one after another" if count == 1 else f"up to {count} side by side"
+    return f"{together}, one thread each."
 
 
 def _subtitle(config: dict[str, Any]) -> str:

@@ -13,7 +13,11 @@ TIME = "cost/frame"
 
 @dataclass(frozen=True)
 class Point:
-    """A method's run time [ms per frame] and error, each with its standard deviation (0 where unknown)."""
+    """A method's run time [ms per frame] and error.
+
+    time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
+    standard deviations over seeds. error_spread: one standard deviation over seeds. Both 0 where unknown.
+    """
 
     method: str
     time: float
@@ -23,17 +27,14 @@ class Point:
 
 
 def points_of(measured: Measurements, scenes: Sequence[str], metric: str, x: str = TIME) -> list[Point]:
-    """Every method that has both numbers in all the scenes, as means over them.
-
-    The spread of a run time is that between repeats where they were measured, else that over seeds.
-    """
+    """Every method that has both numbers in all the scenes, as means over them."""
     found = []
     for method in measured.methods:
         time, error = measured.mean(method, x, scenes), measured.mean(method, metric, scenes)
         if time is None or error is None or min(time.scenes, error.scenes) < len(scenes):
             continue
         repeats = measured.value(method, "cost/spread", scenes) if x == TIME else None
-        spread = time.value * repeats / 100.0 if repeats is not None else time.spread or 0.0
+        spread = time.value * repeats / 100.0 if repeats is not None else 2.0 * (time.spread or 0.0)
         found.append(Point(method, time.value, error.value, spread, error.spread or 0.0))
     return found
 

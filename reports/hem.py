@@ -32,7 +32,9 @@ def hem_curves(
     Where the body stops, that is marked, and what follows is drawn again, larger. None for a scene without
     these curves, or whose hem hardly turns.
     """
-    methods = shown(m for m in series if all(name in series[m].fields for name in (YAW, FROM_END)))
+    having = {m for m, mesh in series.items() if all(name in mesh.fields for name in (YAW, FROM_END))}
+    frames = max((series[m].frames for m in having), default=0)  # what ended early has no end to swing about
+    methods = shown(m for m in having if series[m].frames == frames)
     if not methods or max(float(np.nanmax(np.abs(series[m].fields[YAW]))) for m in methods) < LEAST:
         return None
     stop = None if body is None else stop_frame(body)

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -151,10 +151,16 @@ def side_by_side(folder: Path, dressed: Sequence[Dressed], *, opengl: bool = Tru
     """One picture per scene: a view per method, all at the same frame from the same place."""
     if not dressed:
         return []
+    frames = [max(mesh.frames for mesh in scene.series.values()) for scene in dressed]
+    ended = [[m for m, mesh in s.series.items() if mesh.frames < count] for s, count in zip(dressed, frames)]
+    dressed = [
+        replace(scene, series={m: mesh for m, mesh in scene.series.items() if m not in early})
+        for scene, early in zip(dressed, ended)
+    ]
     with tempfile.TemporaryDirectory() as scratch:
         planned = [_views_of(scene, Path(scratch) / str(place)) for place, scene in enumerate(dressed)]
         renderer = render_views([view for views in planned for view in views], opengl=opengl)
-        return [_compose(folder, scene, views, renderer) for scene, views in zip(dressed, planned)]
+        return [_compose(folder, *its, renderer) for its in zip(dressed, planned, ended)]
 
 
 def _views_of(dressed: Dressed, scratch: Path) -> list[View]:
@@ -170,7 +176,9 @@ def _views_of(dressed: Dressed, scratch: Path) -> list[View]:
     ]
 
 
-def _compose(folder: Path, dressed: Dressed, views: Sequence[View], renderer: str) -> Picture:
+def _compose(
+    folder: Path, dressed: Dressed, views: Sequence[View], ended: Sequence[str], renderer: str
+) -> Picture:
     """The views of one scene in rows, each under its method's name in its method's colour."""
     from matplotlib.image import imread
 
@@ -192,6 +200,9 @@ def _compose(folder: Path, dressed: Dressed, views: Sequence[View], renderer: st
     caption = f"{dressed.scene}: frame {frame} (t = {number(time)} s), "
     by_inertia = _by_inertia(dressed.series)
     caption += "where the simulation's inertia term is largest." if by_inertia else "the middle."
+    if ended:
+        names = ", ".join(palette.label(method) for method in palette.ordered(ended))
+        caption += f" Not shown, for they ended before their last frame: {names}."
     if renderer == "painter":
         caption += " Drawn without OpenGL, which did not start here."
     name = f"frames_{file_name(dressed.scene)}"

@@ -60,7 +60,7 @@ def read_history(path: Path) -> History | None:
 def training_curves(folder: Path, models: Path, problems: list[str]) -> list[Picture]:
     """Loss against training time: energies in one panel, distances of vertices in others."""
     histories = []
-    for path in sorted(models.glob("*.safetensors")):
+    for path in sorted(models.glob("[!.]*.safetensors")):  # no checkpoint of a training that was stopped
         try:
             history = read_history(path)
         except ModelHeaderError as error:

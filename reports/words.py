@@ -8,11 +8,12 @@ from collections.abc import Iterable, Sequence
 from benchmarks.results import NOT_FALLING, Row
 from reports import findings as paper_findings
 from reports import palette
-from reports.ablations import JUDGED, judged_ablations
+from reports.ablations import compared_in, judged_ablations
 from reports.answers import answers
 from reports.numbers import number, with_spread
 from reports.palette import NETWORKS, REFERENCE
 from reports.scatter import TIE, difference
+from reports.study_tables import law_measurements
 from reports.summary import TERMS, Measurements, dressed_scenes, only, suite_rows
 
 PAPER_TERMS = ("strain", "bending", "gravity", "inertia")
@@ -55,7 +56,7 @@ def name(method: str) -> str:
 
 
 def lowest_network(measured: Measurements) -> str:
-    """Which trained network ends lowest in total energy, beside simulation, skinning and no training."""
+    """The main networks by total energy, the lowest first, beside simulation, skinning and no training."""
     scenes = _shared(measured, NETWORKS, "energy/total")
     totals = {m: t for m in NETWORKS if (t := measured.mean(m, "energy/total", scenes)) is not None}
     if not totals:
@@ -63,10 +64,9 @@ def lowest_network(measured: Measurements) -> str:
     order = sorted(totals, key=lambda method: totals[method].value)
     best = totals[order[0]]
     rest = [f"{name(method)} {number(totals[method].value)} J" for method in order[1:]]
-    text = f"Of the trained networks, {name(order[0])} has" if rest else f"{name(order[0])} has"
-    text += f" {'the lowest' if rest else 'a'} mean total on unseen motions{_only(scenes, measured)}: "
+    text = f"On unseen motions{_only(scenes, measured)} {name(order[0])} has a mean total of "
     text += f"{with_spread(best.value, best.spread)} J per frame"
-    text += f" ({', '.join(rest)})." if rest else "."
+    text += f", less than {_listed(rest)}." if rest else "."
     others = [
         f"{name(method)} {number(total)} J"
         for method in (REFERENCE, "skinning", "untrained")
@@ -128,7 +128,7 @@ def change(value: float, other: float) -> str:
 
 def curvature(measured: Measurements) -> str:
     """Who is closest to the simulation's wrinkles, and how wrinkled each is by itself."""
-    others = [method for method in palette.leading(measured.methods) if palette.is_contestant(method)]
+    others = [method for method in measured.methods if palette.is_contestant(method)]
     scenes = _shared(measured, others, "curvature/error")
     errors = {m: e for m in others if (e := measured.value(m, "curvature/error", scenes)) is not None}
     if not errors:
@@ -136,7 +136,7 @@ def curvature(measured: Measurements) -> str:
     order = sorted(errors, key=lambda method: errors[method])
     text = f"Smallest mean-curvature error{_only(scenes, measured)}: "
     text += f"{name(order[0])}, {number(errors[order[0]])} 1/m"
-    rest = [f"{name(method)} {number(errors[method])}" for method in order[1:]]
+    rest = [f"{name(m)} {number(errors[m])}" for m in order[1:] if m in palette.leading(errors)]
     text += f" ({', '.join(rest)})." if rest else "."
     own, snug = measured.pair(REFERENCE, "snug", "curvature/mean")
     if own is None or snug is None:
@@ -149,10 +149,10 @@ def left_out(rows: Sequence[Row]) -> str:
     """How many ablations are worse than the full recipe in each measure, and which in none, by garment."""
     several = len({row.seed for row in rows}) > 1
     beyond = "beyond the scatter of seeds" if several else f"by more than {100.0 * TIE:g} %"
-    sentences = []
+    sentences, measures = [], compared_in(rows)
     for garment, own in judged_ablations(rows).items():
         worse = {method: ways[0] for method, ways in own.items()}
-        counts = [f"{sum(what in found for found in worse.values())} in {what}" for what in JUDGED.values()]
+        counts = [f"{sum(what in found for found in worse.values())} in {what}" for what in measures[garment]]
         text = f"{garment}, of {len(worse)} ablations, worse than full SNUG {beyond}: "
         none = [palette.label(method) for method, found in worse.items() if not found]
         sentences.append(f"{text}{_listed(counts)}{f'; in nothing: {_listed(none)}' if none else ''}.")
@@ -189,15 +189,17 @@ def checks(rows: Sequence[Row]) -> str:
 
 def laws(rows: Sequence[Row]) -> str:
     """How far each method's roll-outs are from the laws of a time step, the simulation's first."""
-    measured = Measurements([row for row in suite_rows(rows, "validation") if row.metric.startswith("law/")])
-    missing = {m: v for m in measured.methods if (v := measured.value(m, "law/momentum")) is not None}
+    measured, scenes = law_measurements(rows)
+    asked = [m for m in measured.methods if measured.value(m, "law/momentum", scenes) is not None]
+    scenes = measured.shared(asked, "law/momentum", scenes)
+    missing = {m: v for m in asked if (v := measured.value(m, "law/momentum", scenes)) is not None}
     if REFERENCE not in missing or len(missing) == 1:
         return ""
     own = number(missing.pop(REFERENCE))
     text = f"Of the balance of momentum {name(REFERENCE)} misses {own} % of the weight in a mean frame"
     order = sorted(missing, key=lambda method: missing[method])
     text += f", {_listed(f'{name(m)} {number(missing[m])} %' for m in order)}."
-    above = {m: v for m in order if (v := measured.value(m, "law/descent_frames"))}
+    above = {m: v for m in order if (v := measured.value(m, "law/descent_frames", scenes))}
     words = [f"{name(m)} in {number(v, 2)} %" for m, v in above.items()]
     return text + (f" Frames that end above a guess that costs nothing: {_listed(words)}." if words else "")
 

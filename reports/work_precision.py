@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.results import Row
+from benchmarks.results import ResultsError, Row
 from reports import palette
 from reports.ablations import set_apart
 from reports.canvas import PAGE_WIDTH, Picture, file_name, grid, legend_above, log_axis, new_figure, save
@@ -59,19 +59,29 @@ def error_against_time(folder: Path, rows: Sequence[Row]) -> list[Picture]:
 def metric_against_metric(
     folder: Path, rows: Sequence[Row], x: str, y: str, scenes: Sequence[str]
 ) -> Picture | None:
-    """One figure of metric y against metric x, means over the scenes; None where fewer than two have both."""
+    """One figure of metric y against metric x, means over the scenes; None where fewer than two have both.
+
+    Both axes are logarithmic. Raises ResultsError for an x that is not positive, or a negative y.
+    """
     measured = speed_measurements(rows)
     points = points_of(measured, scenes, y, x)
     if len(points) < 2:
         return None
+    for point in points:
+        if point.time <= 0.0 or point.error < 0.0:
+            metric, value = (x, point.time) if point.time <= 0.0 else (y, point.error)
+            raise ResultsError(
+                f"{metric} of {point.method} is {value:.4g}: it has no place on a logarithmic axis; "
+                "name another metric"
+            )
     figure = new_figure(PAGE_WIDTH * 0.75, 3.6)
     axes = figure.subplots()
-    _draw_points(axes, points, None, 0.0)
+    below = _draw_points(axes, points, None, 0.0)
     units = {m: f"{m} [{measured.units[m]}]" for m in (x, y)}
     axes.set(xlabel=units[x], ylabel=units[y])
     grid(axes)
     _legend(figure, points, None)
-    caption = f"{y} against {x}, means over {', '.join(scenes)}."
+    caption = f"{y} against {x}, means over {', '.join(scenes)}.{_hollow(below)}"
     name = file_name(f"{y}_against_{x}")
     return save(figure, folder, name, caption=caption, section="speed", kind="axes")
 
@@ -114,14 +124,18 @@ def _draw_errors(
     if reference:
         caption += f" Dotted line: the converged simulation, {number(reference)} ms."
     if any(p.time_spread or p.error_spread for p in shown):
-        caption += " Bars: standard deviation over repeats and seeds."
+        caption += " Bars: run time, as wide as repeats lie apart (without repeats, two standard deviations "
+        caption += "over seeds); error, a standard deviation over seeds up and down."
     if floor:
         caption += f" Grey: under {number(floor)} mm, as far as two simulations that start 1 nm apart drift."
-    if below:
-        names = ", ".join(palette.label(m) for m in palette.ordered(below))
-        caption += f" Hollow, on the lower edge: zero or below the panel ({names})."
+    caption += _hollow(below)
     name = f"error_against_time_{file_name(scene)}"
     return save(figure, folder, name, caption=caption, section=section, kind="speed")
+
+
+def _hollow(below: set[str]) -> str:
+    names = ", ".join(palette.label(m) for m in palette.ordered(below))
+    return f" Hollow, on the lower edge: zero or below the panel ({names})." if below else ""
 
 
 def _floor(measured: Measurements, scene: str) -> float:
@@ -152,7 +166,7 @@ def _draw_points(axes: Axes, points: Sequence[Point], reference: float | None, f
         axes.errorbar(
             point.time,
             edge if hollow else point.error,
-            xerr=[[min(point.time_spread, 0.9 * point.time)], [point.time_spread]],
+            xerr=[[min(point.time_spread / 2, 0.9 * point.time)], [point.time_spread / 2]],
             yerr=[[min(point.error_spread, 0.9 * abs(point.error))], [point.error_spread]],
             color=colour, marker=look.marker, markersize=5.5, linestyle="none", elinewidth=0.8, zorder=3,
             markerfacecolor="white" if hollow else colour,

@@ -62,22 +62,23 @@ class Guard:
             if self._count_bad(number, joules, name):
                 return "leave out"
         else:
-            self._bad_in_a_row = 0
             self._usual = mean if self._usual is None else MEMORY * self._usual + (1 - MEMORY) * mean
-            if number - self._good_step >= SNAPSHOT_EVERY or not self._good:
-                self._good, self._good_step = self._copied(), number
         if peaks.any():
             self._remark(number, peaks, joules, name, "gradient clipped")
         return "distrust" if runaway else "clip" if peaks.any() else "update"
 
     def accepts(
-        self, number: int, gradient_norm: float, joules: np.ndarray, name: Callable[[int], str]
+        self, number: int, verdict: str, gradient_norm: float, joules: np.ndarray, name: Callable[[int], str]
     ) -> bool:
-        """Whether the gradient of a judged batch may be followed. One that is not finite would ruin the
+        """Whether the gradient of a batch judged so may be followed. One that is not finite would ruin the
         weights, whatever the energies; the highest window is named. Raises TrainingError as `judge` does.
         """
         if np.isfinite(gradient_norm):
             self._skipped_in_a_row = 0
+            if verdict != "distrust":
+                self._bad_in_a_row = 0
+                if number - self._good_step >= SNAPSHOT_EVERY or not self._good:
+                    self._good, self._good_step = self._copied(), number
             return True
         first = np.arange(len(joules)) == np.argmax(joules)
         self._leave_out(number, first, joules, name, "gradient not finite, update left out")

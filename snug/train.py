@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import time
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snug.recipe import DEFAULT, TRAININGS, Recipe, find_recipe
-from snug.train_options import parse
+from snug.train_options import check, parse
 
 if TYPE_CHECKING:
     from snug.dresser import DressedBody
@@ -118,10 +119,9 @@ def _run(options: argparse.Namespace) -> int:
     from snug.parallel import join_group, leave_group
     from snug.training_run import Interrupted
 
-    if options.threads < 1:
-        raise ValueError(f"--threads {options.threads}: at least 1")
-    Path(options.out).parent.mkdir(parents=True, exist_ok=True)  # refused now rather than after the training
+    check(options)
     patterns = [find_pattern(name) for name in dict.fromkeys(options.garment or ["tshirt"])]
+    outs = _outs(Path(options.out), patterns)
     device = find_device(options.device)
     torch.set_num_threads(options.threads)
     motions, held_out = _motions(options)
@@ -129,10 +129,7 @@ def _run(options: argparse.Namespace) -> int:
     group, device = join_group(device)
     try:
         body = Body.from_file(options.body) if options.body else Body.load()
-        for pattern in patterns:
-            out = Path(options.out)
-            if len(patterns) > 1:
-                out = out.with_name(f"{out.stem}-{pattern.name}{out.suffix}")
+        for pattern, out in zip(patterns, outs):
             garment = (body, pattern)
             _train_one(options, garment, motions, held_out, out, str(device), group, stop)
     except Interrupted as interrupted:
@@ -142,6 +139,20 @@ def _run(options: argparse.Namespace) -> int:
     finally:
         leave_group()
     return 0
+
+
+def _outs(out: Path, patterns: Sequence[Any]) -> list[Path]:
+    """The file of each garment. What cannot be written is refused now rather than after the training."""
+    outs = [out]
+    if len(patterns) > 1:
+        outs = [out.with_name(f"{out.stem}-{pattern.name}{out.suffix}") for pattern in patterns]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    for path in outs:
+        if path.is_dir():
+            raise ValueError(f"--out {path}: is a folder; name a file")
+        if not os.access(path.parent, os.W_OK | os.X_OK):
+            raise ValueError(f"--out {path}: {path.parent} cannot be written to; name another folder")
+    return outs
 
 
 def _motions(options: argparse.Namespace) -> tuple[list[Any], list[Any]]:
@@ -197,13 +208,16 @@ def _train_one(
         minutes=options.checkpoint_minutes, resume=options.resume,
     )  # fmt: skip
     say = print if group.writes else lambda *_: None
-    if options.resume and out.is_file() and not saving.path.is_file():
-        say(f"{out}: is there, and no checkpoint beside it; nothing to resume")
-        return
     if saving.path.is_file() and not options.resume:
         say(f"note: {saving.path} of a stopped run will be replaced; --resume would go on with it")
     body, pattern = garment
     dressed = DressedBody(body, pattern.tailor(body, vertices=options.vertices))
+    if options.resume and out.is_file() and not saving.path.is_file():
+        _check_ended(out, options, dressed.vertices)
+        say(f"{out}: is there, and no checkpoint beside it; nothing to resume")
+        return
+    if out.is_file():
+        say(f"note: {out} will be replaced when this training has ended")
     frames = sum(motion.frames for motion in motions)
     say(f"{pattern.description}: {dressed.vertices} vertices, {len(motions)} motions, {frames} frames, "
         f"recipe {options.recipe}")  # fmt: skip
@@ -226,6 +240,22 @@ def _train_one(
         _tell(model)
         print(model.save(out))
         saving.done()
+
+
+def _check_ended(out: Path, options: argparse.Namespace, vertices: int) -> None:
+    """Raises ValueError where the model there is not what this command trains."""
+    from snug.trained_model import TrainedModel
+
+    there, asked = TrainedModel.load(out), find_recipe(options.recipe)
+    pairs = {
+        "model": (there.kind, options.model),
+        "recipe": (there.recipe, asked),
+        "seed": (there.seed, options.seed),
+        "vertices": (there.vertices, vertices),
+        "number of steps": (there.steps, there.steps if options.patience else options.steps),
+    }
+    if other := [name for name, (found, mine) in pairs.items() if found != mine]:
+        raise ValueError(f"{out}: of another {other[0]}; name another --out, or leave out --resume")
 
 
 def _tell(model: TrainedModel) -> None:

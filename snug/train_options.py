@@ -38,8 +38,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
     add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
     add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
-    add("-o", "--out", default="snug.safetensors",
-        help="file to write; of several garments each adds its name (default: %(default)s)")  # fmt: skip
+    add("-o", "--out", metavar="FILE",
+        help="file to write; of several garments each adds its name (default: by --model)")  # fmt: skip
     add = parser.add_argument_group("early stop").add_argument
     add("--validation", metavar="NAME", action="append", default=[],
         help="hold a motion out of training and roll it out now and then; may be repeated. The weights that "
@@ -56,4 +56,25 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--checkpoint-steps", metavar="N", type=int, default=0, help="a checkpoint every N steps as well")
     add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
     add("--tensorboard", metavar="DIR", help="write curves for TensorBoard (extra: tensorboard)")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    options.out = options.out or f"{options.model}.safetensors"
+    return options
+
+
+LEAST = {
+    "seed": 0,
+    "threads": 1,
+    "validate_every": 1,
+    "patience": 0,
+    "checkpoint_minutes": 0,
+    "checkpoint_steps": 0,
+}
+
+
+def check(options: argparse.Namespace) -> None:
+    """Raises ValueError for a word that is out of range, or means nothing without another."""
+    for name, least in LEAST.items():
+        if getattr(options, name) < least:
+            raise ValueError(f"--{name.replace('_', '-')} {getattr(options, name)}: at least {least}")
+    if options.patience and not options.validation:
+        raise ValueError(f"--patience {options.patience}: add --validation NAME, a motion to stop by")

@@ -16,7 +16,7 @@ from snug.baselines.pbns import PoseSpaceDeformation
 from snug.baselines.santesteban2019 import FitAndWrinkles
 from snug.baselines.supervised import VertexTargets
 from snug.baselines.tailornet import BandTargets, FrequencyMixture
-from snug.recipe import Recipe, RecipeError
+from snug.recipe import Recipe
 from snug.regressor import Regressor, parameter_megabytes
 from snug.swing import SwingTeacher
 from snug.swinging_regressor import SwingingRegressor
@@ -124,7 +124,9 @@ class TrainedModel:
             )
             network.load_state_dict(tensors)
             rest = {name: data[name] for name in KEPT}
-        except (KeyError, RecipeError, RuntimeError) as error:
+        except ModelFileError:
+            raise
+        except (KeyError, ValueError, RuntimeError) as error:
             raise ModelFileError(f"{path}: broken model file ({error})") from error
         return cls(data["kind"], network.eval(), recipe, **rest)
 

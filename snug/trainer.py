@@ -278,7 +278,7 @@ class Trainer:
         with self.clock.part("optimiser"):
             parameters = [p for p in self.network.parameters() if p.grad is not None]
             norm = nn.utils.get_total_norm([p.grad for p in parameters])
-            if not self.guard.accepts(number, float(norm), joules, name):
+            if not self.guard.accepts(number, verdict, float(norm), joules, name):
                 return means, False
             if verdict != "update":
                 nn.utils.clip_grads_with_norm_(parameters, self.recipe.gradient_limit, norm)

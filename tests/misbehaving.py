@@ -22,6 +22,8 @@ class Misbehaving:
 
     def __init__(self, how: str) -> None:
         self.how = how
+        if how == "unheld":
+            self.held = self._no_room
 
     def prepare(self, scene) -> None:
         self.scene = scene
@@ -56,6 +58,9 @@ class Misbehaving:
             return still
 
         return compute
+
+    def _no_room(self) -> Trajectory:
+        raise OSError("no room left for the held poses")
 
     def _hang(self, _) -> None:
         subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])

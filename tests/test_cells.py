@@ -91,6 +91,7 @@ def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_pat
         ("killed", "out-of-memory", "SIGKILL"),
         ("hungry", "out-of-memory", "no room"),
         ("early", "failed", "its time cannot be believed"),
+        ("unheld", "failed", "OSError: no room left"),
     ],
 )
 def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path, misbehaving):

@@ -108,7 +108,7 @@ def test_a_killed_run_resumes_bit_for_bit(tmp_path):
     """kill -9 while the child writes checkpoints as fast as it can; a run resumed from what lies there."""
     path = tmp_path / "run.safetensors"
     arguments = [sys.executable, "-c", CHILD, str(Path(__file__).parent), str(path)]
-    child = subprocess.Popen(arguments, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    child = subprocess.Popen(arguments, env={**os.environ, "OMP_NUM_THREADS": str(torch.get_num_threads())})
     deadline = time.monotonic() + 120
     while not path.is_file() and time.monotonic() < deadline:
         assert child.poll() is None
@@ -222,6 +222,19 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     assert "8 steps" in shown and "validation" in shown and "ms a step" in shown
     assert [path.name for path in tmp_path.iterdir()] == ["small.safetensors"]
     assert module.main(words) == 0 and "nothing to resume" in capsys.readouterr().out
+    before = out.read_bytes()
+    others = {"seed": "1", "recipe": "paper", "steps": "9", "vertices": "300", "model": "pbns"}
+    for name, value in others.items():
+        assert module.main([*words, f"--{name}", value]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1 and f"small.safetensors: of another {name}" in said.replace(
+            "number of ", ""
+        )
+    assert out.read_bytes() == before
+    monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
+    assert module.main([*words[:-1], "--seed", "1"]) == 130
+    assert "small.safetensors will be replaced when this training has ended" in capsys.readouterr().out
+    assert out.read_bytes() == before
 
 
 def test_garments_are_trained_one_after_another_and_those_that_ended_stay(tmp_path, monkeypatch, capsys):

@@ -90,6 +90,23 @@ def test_a_gradient_that_is_not_finite_is_not_followed():
     assert not torch.equal(weights_of(trainer), before) and torch.isfinite(weights_of(trainer)).all()
 
 
+def test_gradients_that_are_not_finite_in_a_row_bring_good_weights_back():
+    """Something in the weights is broken that no energy shows: waiting would not mend it."""
+    trainer = made()
+    for number in range(4):
+        trainer.step(number)
+    spoilt = trainer.network.offsets.weight.register_hook(lambda gradient: gradient * float("nan"))
+    good = {name: tensor.clone() for name, tensor in trainer.guard.state()[0].items()}
+    for number in range(4, 4 + PATIENCE):
+        assert trainer.guard.summary["restored"] == 0
+        assert np.isfinite(trainer.step(number)["loss"])
+    spoilt.remove()
+    assert trainer.guard.summary["restored"] == 1
+    assert torch.equal(trainer.network.offsets.weight, good["network.offsets.weight"])
+    trainer.step(4 + PATIENCE)
+    assert trainer.optimiser.param_groups[0]["lr"] == 0.5 * PLAIN.learning_rate
+
+
 def test_training_gives_up_over_gradients_too():
     trainer = made()
     trainer.network.offsets.weight.register_hook(lambda gradient: gradient * float("inf"))

@@ -133,16 +133,18 @@ def test_another_material_judges_the_same_roll_out(stage):
 def test_the_long_roll_out_is_the_short_one_carried_on(stage, walk, monkeypatch):
     monkeypatch.setattr(hard_motion_stage, "CHUNK", 37)
     (network,) = stage.networks
-    sampled, away, drift = stage.long_roll_out(network, 300, 7)
-    motion, _ = hard_motion_cases.looped(walk, 300)
+    sampled, away, drift = stage.long_roll_out(network, 390, 7)
+    motion, _ = hard_motion_cases.looped(walk, 390)
     trajectory = roll_out(TrainedModel.load(network.path), stage.dressed, motion)
     pelvis = stage.dressed.pelvis(motion)
     assert sampled == pytest.approx(trajectory.positions[::7] - pelvis[::7, None], abs=2e-5)
     bare = stage.skinned(motion, None)
     assert away == pytest.approx(np.linalg.norm(trajectory.positions - bare, axis=2)[::7], abs=2e-5)
-    assert 0.0 <= drift < 1e-3  # the state of an untrained network is soon forgotten
-    monkeypatch.setitem(hard_motions.LONG, "smoke", 300)
+    assert 0.0 < drift < 1e-3  # the state of an untrained network is soon forgotten
+    monkeypatch.setitem(hard_motions.LONG, "smoke", 390)
     rows = hard_motions.do_long(None, lambda _: None, SMOKE, stage.networks)
+    with pytest.raises(ValueError, match="a drift needs three loops, 390 frames, not 389"):
+        stage.long_roll_out(network, 389, 7)
     assert {row.metric for row in rows} >= {"motion/drift", "motion/strain_ratio"}
 
 

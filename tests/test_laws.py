@@ -146,8 +146,22 @@ def test_the_simulation_alone_is_judged_and_a_stall_is_told_from_a_lie(dropped):
     assert stall.status == "stalled" and "1 of 7" in stall.reason
 
 
+def test_a_motion_without_a_step_has_no_laws_and_stops_no_other(tmp_path):
+    folder = RunFolder(tmp_path)
+    path = folder.trajectory_path("dressed/blink", "simulation")
+    path.parent.mkdir(parents=True)
+    path.touch()  # not even opened
+    built = SimpleNamespace(cloth=SimpleNamespace(pins=[]), frames=2)
+    scene = SimpleNamespace(dressed=True, name="dressed/blink", build=lambda preset, wardrobe: built)
+    cell = SimpleNamespace(scene=scene, method="simulation", seed=0)
+    plan = SimpleNamespace(scenes=[scene], cells=[cell], preset=SMOKE)
+    (row,) = laws.rows(plan, folder, object())
+    assert row.status == "skipped"
+
+
 def test_without_roll_outs_there_is_one_skipped_row(tmp_path):
     (row,) = laws.rows(plan_of(tmp_path), RunFolder(tmp_path), None)
     assert row.status == "skipped" and "garments" in row.reason and row.suite == "validation"
+    assert "three frames or more" in row.reason
     assert laws.has_laws("simulation") and laws.has_laws("snug") and laws.has_laws("skinning")
     assert not laws.has_laws("untrained") and not laws.has_laws("newton-1")

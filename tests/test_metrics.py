@@ -240,6 +240,17 @@ def test_the_gap_is_taken_to_the_lowest_minimum_found():
     assert skinned == pytest.approx((here - low) / (potential.value(other[2]) - low), rel=1e-6)
 
 
+def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypatch):
+    """Its first guess has no energy; the minimum found from its frame has one."""
+    from benchmarks.metrics import optimality as module
+
+    scene = hanging_sheet.build("hanging_sheet", dataclasses.replace(find_preset("smoke"), sheet_cells=6))
+    still = np.repeat(scene.start[None], 3, axis=0)
+    monkeypatch.setattr(module, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
+    found = module.optimality(scene, still, samples=1)
+    assert np.isnan(found.to_gain) and found.missed >= 0.0 and sum(found.found_by.values()) == 1
+
+
 def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places():
     random = np.random.default_rng(5)
     h, area = random.uniform(1.0, 9.0, (2, 50)), random.uniform(0.5, 1.5, (2, 50))

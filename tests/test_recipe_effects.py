@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import pytest
 from dressing import swaying, tube_dress
 
-from benchmarks import recipe_trials, workers
+from benchmarks import presets, recipe_trials, workers
 from benchmarks.recipe_effects import DEVIATIONS, main, variants
 from benchmarks.recipe_trials import HELD_OUT, learned, steps_within
 from benchmarks.results import RunFolder
@@ -92,6 +92,19 @@ def test_what_has_ended_is_not_done_again(small, monkeypatch):
     after = RunFolder(small.out).read_rows()
     assert {row.seed for row in after} == {0, 1} and after[: len(before)] == before
     assert main([*words, "--seconds", "0.02"]) == 0 and len(small.done) == 4  # other work
+
+
+def test_what_a_changed_preset_or_another_command_left_is_not_taken_for_its_own(small, monkeypatch, capsys):
+    assert main(small.words) == 0 and len(small.done) == 1
+    quick = presets.find_preset("quick")
+    monkeypatch.setattr(presets, "find_preset", lambda name: replace(quick, frames=quick.frames + 1))
+    assert main(small.words) == 0 and len(small.done) == 2
+    folder = RunFolder(small.out)
+    folder.write_config(folder.read_config() | {"command": "python -m benchmarks.run"})
+    before = folder.rows_path.read_bytes()
+    assert main(small.words) == 2
+    assert "holds the results of another command" in capsys.readouterr().err
+    assert folder.rows_path.read_bytes() == before
 
 
 def test_a_training_that_fails_is_a_row_and_one_that_is_killed_a_line(small, monkeypatch, capsys):

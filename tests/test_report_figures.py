@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from report_folder import FRAMES, row, sheet, write_mesh
+from report_folder import FRAMES, row, sheet, write_mesh, write_model
 
 from reference_sim import Trajectory
-from reports import figures, hem, palette, vtkhdf, work_precision
+from reports import figures, hem, palette, render, training, vtkhdf, work_precision
 from reports.fronts import Point
 
 
@@ -92,7 +92,32 @@ def test_a_stop_is_where_the_body_no_longer_moves(tmp_path):
         path = tmp_path / f"{method}.vtkhdf"
         write_mesh(path, moving, faces, {"hem/yaw": yaw, "hem/from_end": np.abs(yaw - yaw[-1])})
         series[method] = vtkhdf.read_series(path)
+    torn = {"hem/yaw": curves["swings"][:8], "hem/from_end": np.abs(curves["swings"][:8])}
+    write_mesh(tmp_path / "torn.vtkhdf", moving[:8], faces, torn)  # it has no end to be measured from
+    series["torn"] = vtkhdf.read_series(tmp_path / "torn.vtkhdf")
     picture = hem.hem_curves(tmp_path, "tunic/stop", series, body)
+    assert picture is not None and "torn" not in picture.caption.lower()
     assert picture is not None and "the body has stopped, at 0.400 s" in picture.caption
     assert hem.overshoot(curves["swings"], 12) > np.radians(10.0)
     assert hem.overshoot(curves["creeps"], 12) == 0.0
+
+
+def test_what_ended_early_moves_nobody_elses_picture(tmp_path):
+    cloth, faces = sheet(0.1)
+    inertia = {"energy/inertia": np.array([0.0, 0.0, 1.0, 5.0, 2.0])}
+    series = {}
+    for method, frames in (("simulation", FRAMES), ("snug", FRAMES), ("lbfgs-5", 2)):
+        fields = {name: values[:frames] for name, values in inertia.items()}
+        write_mesh(tmp_path / f"{method}.vtkhdf", cloth[:frames], faces, fields)
+        series[method] = vtkhdf.read_series(tmp_path / f"{method}.vtkhdf")
+    (picture,) = render.side_by_side(tmp_path, [render.Dressed("dressed/a", series, None)], opengl=False)
+    assert "frame 3 " in picture.caption
+    assert "Not shown, for they ended before their last frame: L-BFGS, 5 iterations." in picture.caption
+
+
+def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
+    write_model(tmp_path / "snug-seed0.safetensors", "snug", strain=0.1)
+    write_model(tmp_path / ".pbns-seed0.0123.checkpoint.safetensors", "pbns", strain=0.1)
+    monkeypatch.setattr(training, "_draw", lambda folder, panels: panels)
+    ((_, histories),) = training.training_curves(tmp_path, tmp_path, [])[0]
+    assert [history.method for history in histories] == ["snug"]

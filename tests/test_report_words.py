@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 
@@ -10,7 +11,7 @@ import pytest
 from report_folder import SCENES, all_rows, row, skipped
 
 from benchmarks.results import NOT_FALLING
-from reports import numbers, tables, words
+from reports import numbers, study_tables, tables, words
 from reports.document import document, merged
 from reports.layout import table_block
 from reports.summary import Mean, Measurements
@@ -96,8 +97,8 @@ def test_the_answer_follows_the_numbers():
         rows = [row(method=m, metric=f"energy/{t}", value=v) for m, v in values for t in terms]
         return " ".join(text for _, text in words.findings(rows))
 
-    assert "SNUG has the lowest" in said(1.0, 2.5) and "inertia is reproduced." not in said(2.5, 1.0)
-    assert "PBNS has the lowest" in said(2.5, 1.0) and "2.5 times as much" in said(2.5, 1.0)
+    assert "per frame, less than PBNS" in said(1.0, 2.5) and "inertia is reproduced." not in said(2.5, 1.0)
+    assert "per frame, less than SNUG" in said(2.5, 1.0) and "2.5 times as much" in said(2.5, 1.0)
     assert "SNUG is lower in strain" in said(1.0, 2.5) and "SNUG is higher in strain" in said(2.5, 1.0)
     assert "gravity and inertia, is reproduced." in said(1.0, 1.2)
     assert "equal in strain" in said(1.0, 1.001) and "reproduced in 0 of 4" in said(1.0, 1.001)
@@ -115,10 +116,10 @@ def test_words_compare_means_over_the_scenes_that_both_have():
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
     measured = Measurements(rows)
     assert words.against(measured, "pbns").startswith("SNUG is lower in total (−50 %) (1 scene only).")
-    assert words.lowest_network(measured).startswith("Of the trained networks, SNUG has the lowest")
-    assert "unseen motions (1 scene only): 1.00 J" in words.lowest_network(measured)
+    assert words.lowest_network(measured).startswith("On unseen motions (1 scene only) SNUG has")
+    assert "a mean total of 1.00 J per frame, less than PBNS 2.00 J." in words.lowest_network(measured)
     alone = Measurements(rows[:2])
-    assert words.lowest_network(alone) == "SNUG has a mean total on unseen motions: 5.00 J per frame."
+    assert words.lowest_network(alone) == "On unseen motions SNUG has a mean total of 5.00 J per frame."
     rows = [row(s, m, "curvature/error", v) for s, m, v in zip((*SCENES, SCENES[0]), ("snug", "snug", "pbns"),
             (1.0, 9.0, 2.0))]  # fmt: skip
     # The reference's twin and the bound run no garment, however near they are.
@@ -126,6 +127,49 @@ def test_words_compare_means_over_the_scenes_that_both_have():
     assert words.curvature(Measurements(rows)) == (
         "Smallest mean-curvature error (1 scene only): SNUG, 1.00 1/m (PBNS 2.00)."
     )
+
+
+def test_the_smallest_curvature_error_is_the_smallest_of_all_that_ran():
+    """Also where there are more methods than a sentence names."""
+    others = {f"lbfgs-{n}": 9.0 - n / 10 for n in range(1, 9)}
+    errors = {"snug": 4.0, "pbns": 6.0, "tailornet": 3.6, "lbfgs-10": 3.4} | others
+    rows = [row(method=m, metric="curvature/error", value=v, unit="1/m") for m, v in errors.items()]
+    text = words.curvature(Measurements(rows))
+    assert text.startswith("Smallest mean-curvature error: L-BFGS, 10 iterations, 3.40 1/m (TailorNet 3.60,")
+    assert text.endswith("SNUG 4.00, PBNS 6.00).") and "8 iterations" not in text
+
+
+def test_ablations_are_counted_in_what_was_measured():
+    rows = [
+        row(method=method, metric="energy/total", value=value, seed=seed)
+        for method, value in (("snug", 1.0), ("snug-no-bending", 2.0))
+        for seed in (0, 1)
+    ]
+    assert words.left_out(rows) == (
+        "T-shirt, of 1 ablations, worse than full SNUG beyond the scatter of seeds: 1 in total energy."
+    )
+
+
+def test_laws_count_no_part_of_a_motion_twice():
+    more = {"suite": "validation", "metric": "law/momentum", "unit": "%"}
+    scenes = ("dressed/a", "dressed/a@clip", "dressed/b@clip")
+    rows = [row(scene, "simulation", value=0.0, **more) for scene in scenes]
+    rows += [row(scene, value=value, **more) for scene, value in zip(scenes, (10.0, 70.0, 20.0))]
+    rows.append(row("tunic/a", value=99.0, **more))
+    assert words.laws(rows).endswith("misses 0 % of the weight in a mean frame, SNUG 15.0 %.")
+    rows += [dataclasses.replace(r, metric="law/residual") for r in rows]
+    table = study_tables.laws(rows)
+    assert table is not None
+    assert {line[0]: line[1].value for line in table.rows} == {"simulation": 0.0, "snug": 15.0}
+
+
+@pytest.mark.parametrize(
+    ("workers", "said"),
+    [(None, ""), (1, "one after another, "), (4, "up to 4 side by side, ")],
+)
+def test_times_say_what_ran_beside(workers, said):
+    check = row("free_fall", "simulation", "check", 0.0, suite="validation", expected=0.0, tolerance=1.0)
+    assert document({"workers": workers}, [check], {}, [], [])["workers"] == f"{said}one thread each."
 
 
 def test_sections_exist_only_for_what_ran():

@@ -116,6 +116,21 @@ def test_the_closing_table_shows_a_dash_for_what_is_not_there():
     assert "validation: 1 ok" in text and "cells 3 s" in text
 
 
+def test_the_closing_table_keeps_garments_apart_and_marks_means_over_less():
+    rows = [
+        Row("garments", scene, method, 0, "energy/total", "J", value)
+        for scene, method, value in (
+            ("dressed/a", "snug", 1.0), ("dressed/b", "snug", 3.0), ("dressed/a", "pbns", 5.0),
+            ("tunic/a", "snug", 9.0),
+        )
+    ]  # fmt: skip
+    rows.append(Row("garments", "dressed/b", "pbns", 0, "cost/frame", "ms", None, "diverged", "why"))
+    lines = summary(rows, []).splitlines()
+    assert "garments, dressed, mean of 2 scenes" in lines[0] and lines[1].split() == ["snug", "2", "ok"]
+    assert lines[2].split() == ["pbns", "5*", "ok,", "diverged"] and lines[3].startswith("* over fewer")
+    assert "garments, tunic, mean of 1 scene " in lines[5] and lines[6].split() == ["snug", "9", "ok"]
+
+
 def test_a_check_that_is_off_or_raises_is_a_failed_row(monkeypatch):
     check = validation.CHECKS[0]
     off = validation.run_check(dataclasses.replace(check, expected=1.0))

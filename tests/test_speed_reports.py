@@ -44,6 +44,7 @@ def all_rows() -> list[Row]:
                 rows.append(row(scene, method, "curvature/error", curvature, "1/m"))
                 rows.append(row(scene, method, "distance/rms", 10.0 * curvature, "mm"))
         rows.append(row(scene, "snug", "cost/train", 200.0, "s"))
+        rows.append(row(scene, "snug", "cost/data", 0.0, "s"))
         rows.append(row(scene, "simulation", "distance/floor", 21.0, "mm"))
     for method in ("simulation", "newton-1", "newton-4"):
         time, gap, _ = DRESSED[method]
@@ -135,8 +136,31 @@ def test_the_answers_follow_the_numbers():
     assert "after 13,000 frames" in said["When training pays"]
 
 
+def test_a_run_time_spreads_as_its_repeats_do_else_as_its_seeds():
+    rows = [row(SCENES[0], "newton-1", m, v) for m, v in (("cost/frame", 10.0), ("gap/relative", 0.2))]
+    rows += [
+        dataclasses.replace(row(SCENES[0], "snug", metric, value), seed=seed)
+        for seed, time in ((0, 1.0), (1, 3.0))
+        for metric, value in (("cost/frame", time), ("gap/relative", 0.1))
+    ]
+    spreads = {
+        p.method: p.time_spread for p in points_of(speed_measurements(rows), SCENES[:1], "gap/relative")
+    }
+    assert spreads == {"newton-1": 0.0, "snug": pytest.approx(2.0 * 2.0**0.5)}  # twice the deviation
+    rows.append(row(SCENES[0], "newton-1", "cost/spread", 25.0, "%"))
+    (again,) = solvers(points_of(speed_measurements(rows), SCENES[:1], "gap/relative"))
+    assert again.time_spread == 2.5  # [ms] from the fastest repeat to the slowest
+
+
+def test_a_training_whose_data_nobody_can_price_has_no_break_even():
+    rows = [r for r in all_rows() if r.metric != "cost/data"]
+    measured = speed_measurements(rows)
+    assert cost_of(measured, "snug", SCENES) is None and cost_of(measured, "newton-1", SCENES) is not None
+    assert crossings(rows) is None
+
+
 def test_as_fast_is_within_the_scatter_of_run_times():
-    point, twin = Point("snug", 0.350, 4.2, 0.004), Point("supervised", 0.357, 3.7, 0.003)
+    point, twin = Point("snug", 0.350, 4.2, 0.008), Point("supervised", 0.357, 3.7, 0.006)
     assert overtaken(point, [twin]) and beaten_by([point, twin], point) is twin
     assert not overtaken(twin, [point])  # which is less accurate
     slower = dataclasses.replace(twin, time=0.361)
@@ -232,6 +256,20 @@ def test_any_metric_against_any_other(tmp_path, capsys):
     run.write_rows(all_rows())
     assert build.main([str(tmp_path), "--axes", "distance/rms", "gap/relative"]) == 0
     assert (tmp_path / "figures/gap-relative_against_distance-rms.svg").is_file()
+    capsys.readouterr()
+    # Curvature exists on the dressed scenes alone, where most methods have it; zero has no place there.
+    assert build.main([str(tmp_path), "--axes", "cost/frame", "curvature/error"]) == 0
+    assert (tmp_path / "figures/curvature-error_against_cost-frame.svg").is_file()
+    run.write_rows([*all_rows(), row("sheet", "newton-1", "curvature/error", 1.0)])
+    assert build.main([str(tmp_path), "--axes", "cost/frame", "curvature/error"]) == 0
+    run.write_rows([*all_rows(), row(SCENES[0], "newton-1", "lag", -1.0), row(SCENES[0], "snug", "lag", 1.0)])
+    capsys.readouterr()
+    for axes in (("lag", "gap/relative"), ("cost/frame", "lag")):
+        assert build.main([str(tmp_path), "--axes", *axes]) == 2
+        said = capsys.readouterr().err
+        assert (
+            said.count("\n") == 1 and "lag of newton-1 is -1: it has no place on a logarithmic axis" in said
+        )
     assert build.main([str(tmp_path), "--axes", "cost/frame", "gap/nothing"]) == 2
     assert "no row has the metric 'gap/nothing'" in capsys.readouterr().err
     assert build.main([str(tmp_path), "--axes", "cost/frame", "gap/relative", "--scenes", "moon"]) == 2

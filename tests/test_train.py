@@ -114,6 +114,11 @@ def test_broken_model_files_are_named(tmp_path, trained):
     save_file({"a": torch.zeros(2)}, foreign)
     with pytest.raises(ModelFileError, match="no model of this project"):
         TrainedModel.load(foreign)
+    later = replace(trained, kind="later-kind")  # of a version that knows more
+    with pytest.raises(
+        ModelFileError, match=r"later\.safetensors: broken model file \(unknown model 'later-kind'"
+    ):
+        TrainedModel.load(later.save(tmp_path / "later.safetensors"))
 
 
 def test_supervised_learns_what_it_is_shown():
@@ -301,6 +306,22 @@ def test_command_line_refuses_what_it_could_not_do_before_any_work(capsys, tmp_p
     assert main(["--threads", "0", "-o", str(tmp_path / "model.safetensors")]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 2 and "file" in error and "--threads 0: at least 1" in error
+    for words, said in (
+        (["-o", str(tmp_path)], "is a folder; name a file"),
+        (["--seed", "-1"], "--seed -1: at least 0"),
+        (["--checkpoint-minutes", "-1"], "--checkpoint-minutes -1.0: at least 0"),
+        (["--patience", "3"], "--patience 3: add --validation NAME"),
+    ):
+        assert main(["-o", str(tmp_path / "model.safetensors"), *words]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and said in error
+
+
+def test_each_model_has_a_file_of_its_own():
+    from snug.train_options import parse
+
+    assert parse([]).out == "snug.safetensors" and parse(["--model", "pbns"]).out == "pbns.safetensors"
+    assert parse(["--model", "pbns", "-o", "mine.safetensors"]).out == "mine.safetensors"
 
 
 def test_only_inputs_that_hold_a_shape_are_normalised_by_its_range():

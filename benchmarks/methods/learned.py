@@ -41,7 +41,7 @@ LEARNED = (
     *map(_cleaned, ("snug", "pbns", "supervised", "santesteban2019", "tailornet")),
     MethodEntry(
         name="free-bound",
-        description="no network: the vertices of a whole clip optimised directly, a lower bound",
+        description="no network: the vertices of a whole clip optimised directly, the least energy found",
         module="benchmarks.methods.free_bound",
         needs_body=True,
     ),

@@ -96,9 +96,11 @@ def optimality(
             "from_frame": both.minimise(x).energy,
             "frame": here,
         }
-        best = min(energies.values())
+        # A guess that has no energy, as of a garment that collapsed a frame ago, leads nowhere.
+        best = min(energy for energy in energies.values() if np.isfinite(energy))
         to_gain = potential.value(guess if skinned is None else skinned[frame]) - best
-        finder = next(name for name in FINDERS if energies[name] <= best + ALIKE * abs(to_gain))
+        alike = ALIKE * abs(to_gain) if np.isfinite(to_gain) else 0.0
+        finder = next(name for name in FINDERS if energies[name] <= best + alike)
         found.found_by[finder] += 1
         found.missed += here - best
         found.missed_locally += here - min(here, energies["from_frame"])

@@ -1,7 +1,8 @@
-"""python -m benchmarks.solver_speed: the simulator's own benchmark. Times are medians; compare ratios.
+"""python -m benchmarks.solver_speed: the simulator's own benchmark.
 
-Every part runs in a process of its own, one after another, so that its peak memory is its own and nothing
-runs beside it. No test asserts a time: it belongs to the machine that it was taken on.
+Times are medians, of part left_out minima; compare ratios. Every part runs in a process of its own, one after
+another, so that its peak memory is its own and nothing runs beside it. No test asserts a time: it belongs to
+the machine that it was taken on.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ class HardMotion:
 
     betas: the first shape coefficients, the others being zero. material: factors on the material of the
     judging energies, and of the simulator. glitch: whether frame GLITCH is wrong, hence the recovery to be
-    measured. simulate: whether the simulator does it too. smoke: whether the smallest preset does it.
+    measured. smoke: whether the smallest preset does it.
     """
 
     name: str

@@ -140,7 +140,7 @@ class HardStage:
 
         Returns every `every`-th frame as positions (S,V,3) [m] and their distance to skinning (S,V) [m], and
         the drift: root mean square over the last loop and all vertices of the offset less that of the second
-        loop at the same place in it [m].
+        loop at the same place in it [m]. Raises ValueError for fewer than three loops, which have none.
         """
         import torch
 
@@ -153,6 +153,8 @@ class HardStage:
         rest, weights = self.dressed.rest(), self.dressed.weights(model.recipe.smoothing)
         transforms = self.dressed.transforms(motion.poses)
         last = (frames // loop - 1) * loop
+        if last <= loop:
+            raise ValueError(f"a drift needs three loops, {3 * loop} frames, not {frames}")
         kept: dict[int, np.ndarray] = {}
         sampled, away, state = [], [], None
         with torch.inference_mode():

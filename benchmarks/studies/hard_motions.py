@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..wardrobe import Wardrobe
     from ..workers import Tell
 
-LONG = {"smoke": 300, "quick": 10_000, "paper": 10_000}  # frames of the long roll-out
+LONG = {"smoke": 390, "quick": 10_000, "paper": 10_000}  # frames of the long roll-out
 SAMPLED = 50  # of the long roll-out, one frame in so many is skinned and measured
 MM = 1e3
 LOST = 0.5  # [m] from the skinned shirt: a vertex so far off is on no body any more

@@ -1,8 +1,9 @@
 """Which physical laws each roll-out on an unseen motion keeps, frame by frame, read from its file.
 
-Rows "law/..." of each method and dressed scene are reported, but of scenes whose garment has pins: nobody
-knows the forces on those. Three checks judge the simulation alone, at its worst frame: it must keep what
-nobody asks of a network. A run that leaves nothing to read has one skipped row, which says so.
+Rows "law/..." of each method and dressed scene are reported, but of scenes whose garment has pins, for nobody
+knows the forces on those, and of motions too short to have a step. Three checks judge the simulation alone,
+at its worst frame: it must keep what nobody asks of a network. A run that leaves nothing to read has one
+skipped row, which says so.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ JUDGED = (
     ("simulation_energy", "rise", "J", 1e-9),
     ("simulation_residual", "residual", "vertex weights", 1e-6),
 )
-NOTHING = "this run has no roll-out on a body without pins: laws are read from the files of suite garments"
+NOTHING = (
+    "this run has no roll-out of three frames or more on a body without pins in the files of suite garments"
+)
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class Kept:
 
 def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     """Reported rows of every method and dressed scene without pins, then the simulation's judged rows."""
+    from ..metrics.energy import FIRST_FULL_FRAME
+
     found: list[Row] = []
     references: list[Kept] = []
     for scene in (scene for scene in plan.scenes if scene.dressed) if wardrobe is not None else ():
@@ -50,7 +55,7 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
         paths = [folder.trajectory_path(scene.name, cell.method, cell.seed) for cell in cells]
         if any(path.is_file() for path in paths):
             built = scene.build(plan.preset, wardrobe)
-            if not len(built.cloth.pins):
+            if not len(built.cloth.pins) and built.frames > FIRST_FULL_FRAME:
                 found += _of_scene(built, cells, folder, references)
     if references:
         found += [judged(*check, references) for check in JUDGED]
