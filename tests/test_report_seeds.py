@@ -143,7 +143,7 @@ def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
     full = made["ablations"].rows[0]
     assert full[-1] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, complete=True)
     said = dict(words.findings(rows))["Ablations"]
-    assert "of 2 ablations" in said and "1 in total energy, 0 in curvature error" in said
+    assert "of 2 ablations" in said and "1 in total energy and 0 in drift" in said
     assert said.endswith("in nothing: SNUG, windows of 6.")
     assert made["ablations_judged"].rows == (
         ("T-shirt", "snug-no-noise", "total energy", "drift of long roll-outs"),
