@@ -86,6 +86,7 @@ GROUPED = {
     "energies_by_scene": ("scene",),
     "speed": ("scene",),
     "answers": ("scene",),
+    "recipes": ("base",),
     **dict.fromkeys(BY_GARMENT, ("garment",)),
     **study_tables.GROUPED,
 }

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from benchmarks.results import Row
 from reports.ablations import ABLATIONS, LONG, ROLL_OUTS
+from reports.numbers import number
 from reports.scatter import apart, difference
 from reports.summary import Mean, Measurements, dressed_scenes, suite_rows
 from reports.table import Cell, Column, Table
@@ -28,6 +29,7 @@ CAPTIONS = {
     "more steps where windows overlap or motions are mixed.",
 }
 RECIPES = "recipes"  # suite of rows that have no scenes of their own
+MOST = 3  # deviations that a sentence names
 STEADY = 0.05  # share by which the energy may rise over a thousand frames
 REPRODUCED, NOT_REPRODUCED, SCATTERED = "reproduced", "not reproduced", "within the scatter of seeds"
 SNUG, QUIET, NOISY, SPRINGS = "snug", "snug-no-noise", "snug-noise-alone", "snug-springs"
@@ -148,17 +150,38 @@ def recipes(rows: Sequence[Row]) -> Table | None:
     terms = ("total", "strain", "bending", "gravity", "inertia", "collision")
     columns = [(f"energy/{term}", Column(term, term.capitalize(), "J")) for term in terms]
     columns += [
-        ("penetration/vertices", Column("below", "Below the skin", "%")),
+        ("penetration/vertices", Column("below", "In skin", "%")),
         ("train/steps", Column("steps", "Steps")),
         ("cost/train", Column("training", "Training", "s")),
-        ("cost/setup", Column("ready", "Making ready", "s")),
+        ("cost/setup", Column("ready", "Ready", "s")),
     ]
     columns = [(metric, column) for metric, column in columns if metric in measured.metrics]
     order = dict.fromkeys(row.method for row in measured.rows)  # default first, as it was run
     # A training is no scene: each mean is over the scenes that can have its metric.
     scenes = {m: [r.scene for r in measured.rows if r.metric == m] for m, _ in columns}
     scenes = {metric: list(dict.fromkeys(found)) for metric, found in scenes.items()}
-    lines = [(name, *(measured.mean(name, m, scenes[m]) for m, _ in columns)) for name in order]
+    lines = [(*_parted(name), *(measured.mean(name, m, scenes[m]) for m, _ in columns)) for name in order]
     if not lines:
         return None
-    return Table("recipes", (Column("recipe", "Recipe"), *(column for _, column in columns)), tuple(lines))
+    head = (Column("base", "Recipe"), Column("recipe", "Deviation"))
+    return Table("recipes", (*head, *(column for _, column in columns)), tuple(lines))
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """ "default without small output" as what it begins with and what is changed."""
+    base, _, change = name.partition(" ")
+    return base, change or "as it is"
+
+
+def recipe_effects(rows: Sequence[Row]) -> str:
+    """Which deviations from the paper's text matter most, by the total energy of roll-outs."""
+    measured = Measurements(row for row in suite_rows(rows, RECIPES) if row.metric == "energy/total")
+    totals = {m: v for m in measured.methods if (v := measured.value(m, "energy/total")) is not None}
+    sentences = []
+    for base, words, sign in (("default", "most is lost", -1.0), ("paper", "most is gained", 1.0)):
+        others = {m: v for m, v in totals.items() if m.startswith(f"{base} ")}
+        if base in totals and others:
+            order = sorted(others, key=lambda name: sign * others[name])[:MOST]
+            listed = ", ".join(f"{_parted(name)[1]} ({number(others[name])} J)" for name in order)
+            sentences.append(f"Recipe {base} has {number(totals[base])} J per frame; {words} {listed}.")
+    return " ".join(sentences)

@@ -16,8 +16,8 @@ LONG = 24  # rows from which a table may run over pages
 
 # Texts that need room get a share of the page's width; every other column is as wide as its content.
 WIDTHS = {
-    "reason": "2fr", "check": "1fr", "finding": "2fr", "case": "1fr", "scene": "1fr", "worse": "1fr",
-    "better": "1fr", "beaten": "1fr", "solver": "1.3fr", "hybrid": "1.3fr",
+    "reason": "2fr", "check": "1fr", "recipe": "1fr", "finding": "2fr", "case": "1fr", "scene": "1fr",
+    "worse": "1fr", "better": "1fr", "beaten": "1fr", "solver": "1.3fr", "hybrid": "1.3fr",
 }  # fmt: skip
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
 TEXTS = (

@@ -37,6 +37,7 @@ def findings(rows: Sequence[Row]) -> list[tuple[str, str]]:
         ("Wrinkles", curvature(dressed)),
         ("Ablations", left_out(rows)),
         ("The paper's findings", judged(rows)),
+        ("Held-out training motions", paper_findings.recipe_effects(rows)),
         *answers(rows),
         ("Where it rises", rising(rows)),
         ("Validation", checks(rows)),

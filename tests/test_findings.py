@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.results import Row
 from reports.document import document
-from reports.findings import CAPTIONS, claims, findings, recipes
+from reports.findings import CAPTIONS, claims, findings, recipe_effects, recipes
 from reports.tables import make_tables
 from snug.recipe import TRAININGS
 
@@ -72,15 +72,29 @@ def test_without_a_network_there_is_no_table():
 def test_recipes_keep_their_order_and_their_dashes():
     rows = [
         row(name, "energy/total", value, suite="recipes", scene="lunge", seed=seed)
-        for name, value in (("default", 1.0), ("paper", 9.0), ("default, no zero start", 2.0))
+        for name, value in (("default", 1.0), ("default without zero start", 2.0), ("paper", 9.0))
         for seed in (0, 1)
     ]
     rows.append(row("paper", "train/steps", 7.0, suite="recipes", scene="training", unit="1"))
     table = recipes(rows)
-    assert [line[0] for line in table.rows] == ["default", "paper", "default, no zero start"]
-    assert [column.name for column in table.columns] == ["recipe", "total", "steps"]  # what somebody has
-    assert table.rows[1][1].value == 9.0 and table.rows[1][1].seeds == 2 and table.rows[0][2] is None
-    assert table.rows[1][2].value == 7.0 and table.rows[1][1].complete
+    named = [("default", "as it is"), ("default", "without zero start"), ("paper", "as it is")]
+    assert [line[:2] for line in table.rows] == named
+    assert [column.name for column in table.columns] == ["base", "recipe", "total", "steps"]  # what there is
+    assert table.rows[2][2].value == 9.0 and table.rows[2][2].seeds == 2 and table.rows[0][3] is None
+    assert table.rows[2][3].value == 7.0 and table.rows[2][2].complete
+
+
+def test_what_matters_most_in_a_recipe_is_named_first():
+    values = {"default": 1.0, "default without a": 1.5, "default without b": 3.0, "default without c": 0.9}
+    values |= {"default without d": 2.0, "paper": 9.0, "paper with a": 12.0, "paper with b": 4.0}
+    rows = [
+        row(name, "energy/total", value, suite="recipes", scene="lunge") for name, value in values.items()
+    ]
+    assert recipe_effects(rows) == (
+        "Recipe default has 1.00 J per frame; most is lost without b (3.00 J), without d (2.00 J), without a "
+        "(1.50 J). Recipe paper has 9.00 J per frame; most is gained with b (4.00 J), with a (12.0 J)."
+    )
+    assert recipe_effects(rows[:1]) == recipe_effects([]) == ""
 
 
 def test_what_diverged_is_the_worse_one_and_not_a_dash():
