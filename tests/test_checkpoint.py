@@ -1,6 +1,5 @@
 """A run that was stopped, or killed at any moment, and resumed ends with the bits of an unbroken one."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -96,8 +95,10 @@ def test_validation_resumes_bit_for_bit(tmp_path):
 
 CHILD = """
 import sys
+import torch
+torch.set_num_threads(int(sys.argv[3]))
 sys.path.insert(0, sys.argv[1])
-from test_checkpoint import CLIPS, short
+from test_checkpoint import short
 from snug.training_run import Saving
 from pathlib import Path
 short(steps=4000, saving=Saving(path=Path(sys.argv[2]), steps=3, minutes=0))
@@ -107,8 +108,8 @@ short(steps=4000, saving=Saving(path=Path(sys.argv[2]), steps=3, minutes=0))
 def test_a_killed_run_resumes_bit_for_bit(tmp_path):
     """kill -9 while the child writes checkpoints as fast as it can; a run resumed from what lies there."""
     path = tmp_path / "run.safetensors"
-    arguments = [sys.executable, "-c", CHILD, str(Path(__file__).parent), str(path)]
-    child = subprocess.Popen(arguments, env={**os.environ, "OMP_NUM_THREADS": str(torch.get_num_threads())})
+    threads = str(torch.get_num_threads())  # whatever the tests before this one have left in the environment
+    child = subprocess.Popen([sys.executable, "-c", CHILD, str(Path(__file__).parent), str(path), threads])
     deadline = time.monotonic() + 120
     while not path.is_file() and time.monotonic() < deadline:
         assert child.poll() is None
