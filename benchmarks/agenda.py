@@ -14,11 +14,11 @@ from typing import Any
 from snug.recipe import DEFAULT, TRAININGS
 
 from . import provenance
-from .clips import SUFFIX
 from .fingerprint import code_of, data_files, digest, preset_values
 from .methods import find_method
 from .plan import Cell, Network, Plan, network_of, runs
 from .records import Records, Work
+from .results import CLIP
 from .scene import Scene
 from .scenes import dressed_scene
 
@@ -133,7 +133,7 @@ class Agenda:
 
     def motion(self, name: str) -> str:
         """Of a file its content; an embedded one, or part of one, is made by code, looked at by itself."""
-        whole = name.partition(SUFFIX)[0]
+        whole = name.partition(CLIP)[0]
         return f"{name} {digest(self.plan.files[whole])}" if whole in self.plan.files else name
 
 

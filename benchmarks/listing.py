@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from .clips import SUFFIX
 from .meetings import default_suites
 from .method import MethodEntry
 from .methods import METHODS
 from .presets import PRESETS, find_preset
+from .results import CLIP
 from .scenes import SMALL_SCENES, WORN
 from .studies import STUDIES
 from .suites import SUITES
@@ -28,7 +28,7 @@ def listing() -> str:
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),
         (
-            f"scenes; of a dressed body also its liveliest part, as {dressed[0][0]}{SUFFIX}",
+            f"scenes; of a dressed body also its liveliest part, as {dressed[0][0]}{CLIP}",
             [*((s.name, s.description) for s in SMALL_SCENES), *dressed],
         ),
         (

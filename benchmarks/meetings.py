@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
-from .clips import SUFFIX
 from .methods import METHODS, find_method
 from .presets import PRESETS, Preset
+from .results import CLIP
 from .scene import Scene
 from .scenes import TSHIRT
 
@@ -70,7 +70,7 @@ def _unlisted_scenes(declared: dict[str, Scene], motions: Motions, scenes: Seque
     own = motions.test, motions.swing_test
     listed = {name for suite in MEETINGS for name in _module(suite).scenes(*own, full=True, further=True)}
     return {
-        name: "garments" if scene.dressed and not name.endswith(SUFFIX) else "speed"
+        name: "garments" if scene.dressed and not name.endswith(CLIP) else "speed"
         for name, scene in declared.items()
         if name in scenes and name not in listed
     }

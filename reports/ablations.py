@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from benchmarks.results import Row
 from reports.scatter import difference
-from reports.summary import TSHIRT, Measurements, suite_rows, wardrobe
+from reports.summary import TSHIRT, Mean, Measurements, suite_rows, wardrobe
 from reports.table import Cell, Column, Table
 
 FULL = "snug"
@@ -113,22 +113,26 @@ def judged_ablations(rows: Sequence[Row]) -> dict[str, dict[str, tuple[dict[str,
 
 def compared_in(rows: Sequence[Row]) -> dict[str, list[str]]:
     """garment -> the measures that the full recipe and some ablation have in one scene at least."""
-    return {
-        garment: [
-            words
-            for metric, words in JUDGED.items()
-            if any(None not in source[metric][0].pair(FULL, m, metric, source[metric][1]) for m in ran)
-        ]
-        for garment, ran, source in _garments(rows)
-    }
+    found = {}
+    for garment, ran, source in _garments(rows):
+        had = {words for method in ran for words, _, _ in _compared(method, source)}
+        found[garment] = [words for words in JUDGED.values() if words in had]
+    return found
+
+
+def _compared(method: str, source: Source) -> Iterator[tuple[str, Mean, Mean]]:
+    """Each measure that the full recipe and the ablation have, with both means."""
+    for metric, words in JUDGED.items():
+        measured, scenes = source[metric]
+        full, own = measured.pair(FULL, method, metric, scenes)
+        if full is not None and own is not None:
+            yield words, full, own
 
 
 def _judged(method: str, source: Source) -> tuple[dict[str, str], dict[str, str]]:
     worse: dict[str, str] = {}
     better: dict[str, str] = {}
-    for metric, words in JUDGED.items():
-        measured, scenes = source[metric]
-        full, own = measured.pair(FULL, method, metric, scenes)
-        if full is not None and own is not None and (sign := difference(own, full)):
+    for words, full, own in _compared(method, source):
+        if sign := difference(own, full):
             (worse if sign > 0 else better)[words] = own.fewer
     return worse, better

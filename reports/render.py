@@ -151,16 +151,21 @@ def side_by_side(folder: Path, dressed: Sequence[Dressed], *, opengl: bool = Tru
     """One picture per scene: a view per method, all at the same frame from the same place."""
     if not dressed:
         return []
-    frames = [max(mesh.frames for mesh in scene.series.values()) for scene in dressed]
-    ended = [[m for m, mesh in s.series.items() if mesh.frames < count] for s, count in zip(dressed, frames)]
-    dressed = [
-        replace(scene, series={m: mesh for m, mesh in scene.series.items() if m not in early})
-        for scene, early in zip(dressed, ended)
-    ]
+    parted = [_whole(scene) for scene in dressed]
     with tempfile.TemporaryDirectory() as scratch:
-        planned = [_views_of(scene, Path(scratch) / str(place)) for place, scene in enumerate(dressed)]
+        planned = [_views_of(scene, Path(scratch) / str(place)) for place, (scene, _) in enumerate(parted)]
         renderer = render_views([view for views in planned for view in views], opengl=opengl)
-        return [_compose(folder, *its, renderer) for its in zip(dressed, planned, ended)]
+        return [
+            _compose(folder, scene, views, ended, renderer) for (scene, ended), views in zip(parted, planned)
+        ]
+
+
+def _whole(dressed: Dressed) -> tuple[Dressed, list[str]]:
+    """The scene without the methods that ended early, and those."""
+    last = max(mesh.frames for mesh in dressed.series.values())
+    ended = [method for method, mesh in dressed.series.items() if mesh.frames < last]
+    whole = {method: mesh for method, mesh in dressed.series.items() if method not in ended}
+    return replace(dressed, series=whole), ended
 
 
 def _views_of(dressed: Dressed, scratch: Path) -> list[View]:

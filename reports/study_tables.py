@@ -59,21 +59,21 @@ GROUPED = {"dependence": ("variant",), "hard_motions": ("case",), "hard_aftermat
 
 def laws(rows: Sequence[Row]) -> Table | None:
     """What each method leaves undone of the laws of a time step, mean over the dressed scenes."""
-    measured, scenes = law_measurements(rows)
+    measured = law_measurements(rows)
     lines: list[tuple[Cell, ...]] = [
-        (method, *(measured.mean(method, metric, scenes) for metric in LAWS))
+        (method, *(measured.mean(method, metric) for metric in LAWS))
         for method in measured.methods
-        if measured.mean(method, "law/residual", scenes) is not None
+        if measured.mean(method, "law/residual") is not None
     ]
     return _table("laws", (Column("method", "Method"), *LAWS.values()), lines)
 
 
-def law_measurements(rows: Sequence[Row]) -> tuple[Measurements, tuple[str, ...]]:
-    """The rows of the laws, and the scenes to take means over: no clip whose whole motion is among them."""
+def law_measurements(rows: Sequence[Row]) -> Measurements:
+    """The laws in the scenes to take means over: no clip whose whole motion is among them."""
     kept = [row for row in suite_rows(rows, "validation") if row.metric.startswith("law/")]
     measured = Measurements(kept)
     scenes = dressed_scenes(measured)
-    return measured, tuple(s for s in scenes if not (s.endswith(CLIP) and s.removesuffix(CLIP) in scenes))
+    return measured.only(s for s in scenes if not (s.endswith(CLIP) and s.removesuffix(CLIP) in scenes))
 
 
 def dependence(rows: Sequence[Row]) -> Table | None:

@@ -190,10 +190,9 @@ def checks(rows: Sequence[Row]) -> str:
 
 def laws(rows: Sequence[Row]) -> str:
     """How far each method's roll-outs are from the laws of a time step, the simulation's first."""
-    measured, scenes = law_measurements(rows)
-    asked = [m for m in measured.methods if measured.value(m, "law/momentum", scenes) is not None]
-    scenes = measured.shared(asked, "law/momentum", scenes)
-    missing = {m: v for m in asked if (v := measured.value(m, "law/momentum", scenes)) is not None}
+    measured = law_measurements(rows)
+    scenes = _shared(measured, measured.methods, "law/momentum")
+    missing = {m: v for m in measured.methods if (v := measured.value(m, "law/momentum", scenes)) is not None}
     if REFERENCE not in missing or len(missing) == 1:
         return ""
     own = number(missing.pop(REFERENCE))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..clips import SUFFIX
+from ..results import CLIP
 from ..scene import Scene
 
 SMALL_SCENES = (
@@ -66,7 +66,7 @@ def worn_in(scene: str) -> Wear:
 
 def motion_of(scene: str) -> str:
     """The motion, whole, of the dressed scene of that name."""
-    return scene.partition("/")[2].removesuffix(SUFFIX)
+    return scene.partition("/")[2].removesuffix(CLIP)
 
 
 def dressed_scene(motion: str, garment: str = TSHIRT) -> Scene:
@@ -91,6 +91,6 @@ def all_scenes(motions: Iterable[str], swings: Iterable[str]) -> dict[str, Scene
         dressed_scene(name, wear.garment)
         for wear in WORN
         for motion in chosen[wear.swings]
-        for name in (motion, motion + SUFFIX)
+        for name in (motion, motion + CLIP)
     ]
     return {scene.name: scene for scene in (*SMALL_SCENES, *dressed)}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..clips import SUFFIX
+from ..results import CLIP
 
 SMALL = ("hanging_sheet", "sheet_on_sphere", "flag", "twisted_strip")
 EXACT = ("free_fall",)  # every method has no error there but round-off: only for whoever names it
@@ -42,10 +42,10 @@ def scenes(
     """Small scenes and clips of dressed bodies; the quick subset is one of each."""
     lively = [name for name in test_motions if name in LIVELY] or list(test_motions[:2])
     if not full:
-        return [SMALL[0], *(f"dressed/{name}{SUFFIX}" for name in lively[:1])]
+        return [SMALL[0], *(f"dressed/{name}{CLIP}" for name in lively[:1])]
     swinging = [name for name in swing_motions if name in SWINGING]
-    shirts = [f"dressed/{name}{SUFFIX}" for name in (*lively, *swinging)]
-    return [*SMALL, *(EXACT if further else ()), *shirts, *(f"skirt/{name}{SUFFIX}" for name in swinging)]
+    shirts = [f"dressed/{name}{CLIP}" for name in (*lively, *swinging)]
+    return [*SMALL, *(EXACT if further else ()), *shirts, *(f"skirt/{name}{CLIP}" for name in swinging)]
 
 
 def methods(newton_cuts: Sequence[int]) -> list[str]:
