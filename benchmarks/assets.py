@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .scenes import TSHIRT
-
 if TYPE_CHECKING:
     import numpy as np
 
@@ -17,51 +15,51 @@ if TYPE_CHECKING:
     from snug.motion import Motion
 
     from .presets import Preset
+    from .scene import Scene
 
 
 @dataclass(frozen=True)
-class Wardrobe:
+class Assets:
     """A body, what it may wear and the motions, all by name; each motion at most `preset.frames` long.
 
-    bodies: motion -> posed body (T,B,3) [m], where it is ready made.
+    clips: motion -> its liveliest part. bodies: (motion, part) -> posed body (T,B,3) [m], where ready made.
     """
 
     body: Body
     garments: dict[str, Garment]
     motions: dict[str, Motion]
+    clips: dict[str, Motion]
     bodies: dict[str, np.ndarray] = field(default_factory=dict)
-
-    @property
-    def garment(self) -> Garment:
-        """The T-shirt, which every study wears."""
-        return self.garments[TSHIRT]
 
     def named(self, names: Iterable[str]) -> list[Motion]:
         """The motions of those names, in that order."""
         return [self.motions[name] for name in names]
 
-    def of_motion(self, name: str) -> Wardrobe:
-        """The same with this motion alone: little to hand to another process."""
-        return replace(self, motions={name: self.motions[name]}, bodies={})
+    def motion_of(self, scene: Scene) -> Motion:
+        """The motion of a dressed scene, or the part of it."""
+        return (self.clips if scene.part == "clip" else self.motions)[scene.motion]
 
-    def posed_body(self, name: str) -> np.ndarray:
-        """The body (T,B,3) [m] in the motion of that name."""
-        motion = self.motions[name]
-        ready = self.bodies.get(name)
+    def only(self, scene: Scene) -> Assets:
+        """The same for this scene alone: little to hand to another process."""
+        names = {scene.motion} & self.motions.keys()
+        own = {name: self.motions[name] for name in names}
+        return replace(self, motions=own, clips={name: self.clips[name] for name in names}, bodies={})
+
+    def posed_body(self, motion: Motion) -> np.ndarray:
+        """The body (T,B,3) [m] in that motion."""
+        ready = self.bodies.get(motion.name)
         return self.body.vertices(motion.poses, motion.translations) if ready is None else ready
 
 
-def open_wardrobe(
+def open_assets(
     preset: Preset,
     motions: Iterable[Motion],
-    garments: Iterable[str] = (TSHIRT,),
+    garments: Iterable[str],
     *,
     body: Path | None = None,
-) -> Wardrobe:
+) -> Assets:
     """Load the body, or that of a file, tailor these garments and no other; motions are cut to the preset's
     length.
-
-    The liveliest part of each is there too, under a name of its own: see clips.
     """
     from snug.body import Body
     from snug.garments import find_pattern
@@ -73,8 +71,8 @@ def open_wardrobe(
         name: find_pattern(name).tailor(wearer, vertices=preset.garment_vertices) for name in garments
     }
     whole = [motion.cut(0, preset.frames) for motion in motions]
-    clips = [clip(wearer, motion, preset.clip_frames) for motion in whole]
-    return Wardrobe(wearer, tailored, {motion.name: motion for motion in (*whole, *clips)})
+    clips = {motion.name: clip(wearer, motion, preset.clip_frames) for motion in whole}
+    return Assets(wearer, tailored, {motion.name: motion for motion in whole}, clips)
 
 
 def embedded_motions(names: Iterable[str]) -> list[Motion]:

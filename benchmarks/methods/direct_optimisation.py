@@ -1,4 +1,4 @@
-"""The free lower bound: no network, the vertices of a whole clip optimised directly under the training loss.
+"""A bound: no network, the vertices of a whole clip optimised directly under the training loss.
 
     min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t) + sum_{t >= 3} inertia(x_t)
     inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
@@ -13,7 +13,6 @@ with: its time a frame is that of the whole clip divided by its frames.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ from reference_sim import Cloth, Potential, Trajectory
 from reference_sim.energies import ContactPenalty, Gravity, Inertia
 from reference_sim.minimise import make_minimiser
 
+from ..method import Method
 from ..scene import BuiltScene
 from ..scenes.dressed_body import declared_energies
 
@@ -57,7 +57,7 @@ class ClipInertia(Inertia):
         return np.arange(len(self.masses)), diagonal[:, None, None]
 
 
-class FreeBound:
+class DirectOptimisation(Method):
     """One clip. `sums` holds the minimised sum [J] at the end of each round, with that round's planes."""
 
     def prepare(self, scene: BuiltScene) -> None:
@@ -86,7 +86,6 @@ class FreeBound:
         self.carried = float(gravity.weights.sum() * (heights - gravity.origin_height).sum())
 
     def run(self) -> Trajectory:
-        clock = time.perf_counter()
         x = self.start.reshape(-1, 3)
         potential = Potential(self.terms)
         descent = make_minimiser(
@@ -110,15 +109,15 @@ class FreeBound:
             status, reason = "diverged", f"round {len(self.sums) + 1}: {result.reason}"
         elif not settled:
             status, reason = "stalled", f"the sum was still falling after {ROUNDS} rounds"
-        frames, seconds = self.scene.frames, time.perf_counter() - clock
+        frames = self.scene.frames
         return Trajectory(
             positions=x.reshape(frames, -1, 3),
             faces=np.asarray(self.scene.cloth.faces),
             times=np.arange(frames) * self.scene.dt,
-            frame_seconds=np.full(frames, seconds / frames),
+            frame_seconds=np.full(frames, np.nan),
             status=status,
             reason=reason,
-            provenance={"method": "free-bound", "sums_J": [float(value) for value in self.sums]},
+            provenance={"method": "direct-optimisation", "sums_J": [float(value) for value in self.sums]},
             frame_fields={},
         )
 
@@ -152,6 +151,6 @@ def _by_kind(values: np.ndarray, kinds: list[int]) -> np.ndarray:
     )
 
 
-def make(*, models: Path, seed: int) -> FreeBound:
+def make(*, models: Path, seed: int) -> DirectOptimisation:
     """The bound; it has no seed and no model."""
-    return FreeBound()
+    return DirectOptimisation()

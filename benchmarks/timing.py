@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
@@ -25,7 +25,6 @@ AFTER = 0.05  # [s] for which the process is watched once the clock has stopped
 BUSY = 0.3  # share of that time which the processor may be at work
 CROWDED = 1.3  # processor seconds per second on the clock, beyond which more than one thread has worked
 GRAIN = 0.05  # [s] below which processor time is too coarse to be compared
-SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
 
 
 @dataclass(frozen=True)
@@ -72,18 +71,6 @@ def touch(positions: np.ndarray) -> float:
     import numpy as np
 
     return float(np.add.reduce(np.asarray(positions), axis=None))
-
-
-def spread(seconds: Sequence[float]) -> float:
-    """How far repeats lie apart: largest less smallest, as a share of their median [1]."""
-    ordered = sorted(seconds)
-    return (ordered[-1] - ordered[0]) / median(ordered)
-
-
-def median(seconds: Sequence[float]) -> float:
-    """The middle one, or the mean of the two in the middle."""
-    ordered, half = sorted(seconds), len(seconds) // 2
-    return ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2
 
 
 def _still_at_work(

@@ -10,6 +10,7 @@ import numpy as np
 
 from reference_sim.trajectory import Trajectory
 
+from ..method import Method
 from ..scene import BuiltScene
 
 
@@ -19,7 +20,7 @@ def model_path(models: Path, kind: str, seed: int) -> Path:
 
 
 @dataclass
-class Network:
+class Network(Method):
     """A model read from its file. Features are made and the network is warmed up before the clock runs."""
 
     path: Path
@@ -38,13 +39,13 @@ class Network:
     def run(self) -> Trajectory:
         return self.frames()
 
-    def ready_batch(self, copies: int) -> Callable[[], np.ndarray]:
+    def batch(self, copies: int) -> Callable[[], np.ndarray]:
         """What computes so many bodies in this motion at once when called: (T, copies, V, 3) [m]."""
         from snug.rollout import ready_for_many
 
         return ready_for_many(self.model, self.dressed, self.motion, copies=copies)
 
-    def held(self) -> Trajectory:
+    def quasi_static(self) -> Trajectory:
         """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""
         from snug.rollout import roll_out
 

@@ -2,8 +2,7 @@
 
 Membrane and hinges become newton's as solver_speed.newton_peer says: close to ours at small strain, not at
 large. Sub-steps are those of newton's examples, so a frame is not the minimum of one step of ours, and its
-energy gap says so. Copies into and out of newton are off a frame's own time, as a program would do without
-them; they are on the cell's clock.
+energy gap says so. Copies into and out of newton are on the clock.
 """
 
 from __future__ import annotations
@@ -16,11 +15,12 @@ import numpy as np
 
 from reference_sim import Trajectory
 
+from ..method import Method
 from ..scene import BuiltScene
 
 
 @dataclass
-class NewtonPeer:
+class NewtonSolver(Method):
     """One solver of newton on one scene without contact."""
 
     solver: str
@@ -39,7 +39,7 @@ class NewtonPeer:
         scene = self.scene
         x = scene.start
         v = np.zeros_like(x) if scene.start_velocity is None else scene.start_velocity
-        positions, seconds, status, reason = [x], [np.nan], "ok", ""
+        positions, status, reason = [x], "ok", ""
         for frame in range(1, scene.frames):
             if scene.pin_positions is not None:
                 x = x.copy()
@@ -50,12 +50,11 @@ class NewtonPeer:
                 break
             x, v = advance.x, advance.v
             positions.append(x)
-            seconds.append(advance.seconds)
         return Trajectory(
             positions=np.array(positions),
             faces=scene.cloth.faces,
             times=scene.dt * np.arange(len(positions)),
-            frame_seconds=np.array(seconds),
+            frame_seconds=np.full(len(positions), np.nan),
             status=status,
             reason=reason,
             provenance=self._provenance(),
@@ -72,6 +71,6 @@ class NewtonPeer:
         }
 
 
-def make(*, models: Path, seed: int, solver: str, iterations: int, substeps: int) -> NewtonPeer:
+def make(*, models: Path, seed: int, solver: str, iterations: int, substeps: int) -> NewtonSolver:
     """The solver "VBD" or "XPBD" of newton."""
-    return NewtonPeer(solver, iterations, substeps)
+    return NewtonSolver(solver, iterations, substeps)

@@ -1,7 +1,7 @@
 """The reference once more, its start moved by a billionth of a metre: how far apart two right answers are.
 
 Wrinkling cloth has several minima, and which one is reached hangs on the last digits. The distance between
-this run and the reference is the floor under every vertex distance of the scene.
+this run and the reference is the sensitivity: no vertex distance of the scene below it means anything.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .simulation import Simulation
 SHIFT = 1e-9  # [m]
 
 
-class Moved(Simulation):
+class PerturbedStart(Simulation):
     """A simulation from a start whose free vertices are each moved by SHIFT in a direction of their own."""
 
     def prepare(self, scene: BuiltScene) -> None:
@@ -28,6 +28,6 @@ class Moved(Simulation):
         super().prepare(dataclasses.replace(scene, settle=lambda: start))
 
 
-def make(*, models: Path, seed: int) -> Moved:
+def make(*, models: Path, seed: int) -> PerturbedStart:
     """The reference from a moved start."""
-    return Moved(options={})
+    return PerturbedStart(options={})

@@ -20,7 +20,7 @@ from typing import Any
 PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
 
 
-class Broken(RuntimeError):
+class WorkerDied(RuntimeError):
     """The work did not come back; the message says why.
 
     status: the word of a result row, "timeout", "out-of-memory" or "failed".
@@ -31,7 +31,7 @@ class Broken(RuntimeError):
         self.status = status
 
 
-class Guarded:
+class IsolatedProcess:
     """One worker process, started when first needed, and again after it had to be ended.
 
     begin(*arguments) is called first in each new process. Use it in a `with` block, or call `close`.
@@ -43,10 +43,15 @@ class Guarded:
         self._process: Any = None
         self._pipe: Any = None
 
+    @property
+    def alive(self) -> bool:
+        """Whether the process that was last asked is there still."""
+        return self._process is not None
+
     def call(self, function: Callable[..., Any], *arguments: Any, seconds: float | None) -> Any:
         """function(*arguments) in the worker; both sides must be picklable.
 
-        Raises what the function raises, and Broken after `seconds` (None: no deadline) or where the process
+        Raises what the function raises, and WorkerDied after `seconds` (None: no deadline) or where the process
         ended.
         """
         if self._process is None:
@@ -54,13 +59,13 @@ class Guarded:
         try:
             self._pipe.send((function, arguments))
             if not self._pipe.poll(seconds):
-                raise Broken(f"no answer within {seconds:g} s", "timeout")
+                raise WorkerDied(f"no answer within {seconds:g} s", "timeout")
             fine, answer = self._pipe.recv()
         except (EOFError, ConnectionError):
             self._process.join()
             code = self._process.exitcode
             self._kill()
-            raise Broken(*how_it_ended(code)) from None
+            raise WorkerDied(*how_it_ended(code)) from None
         except BaseException:
             self._kill()
             raise
@@ -95,7 +100,7 @@ class Guarded:
             self._pipe.close()
             self._process = None
 
-    def __enter__(self) -> Guarded:
+    def __enter__(self) -> IsolatedProcess:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from reference_sim.material import GRAVITY
 
+from ..metric import Metric
 from .energy import FIRST_FULL_FRAME
 from .optimality import first_guess
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from reference_sim import Potential
     from reference_sim.energies import Step
 
+    from ..metric import RollOut, SceneRollOuts
     from ..scene import BuiltScene
 
 Floats = NDArray[np.float64]
@@ -49,6 +51,65 @@ INTERNAL = (
     "area_barrier",
 )  # their forces on a cloth sum to nothing, and turn nothing
 RISE = 1e-9  # of the larger side: beyond it, a frame breaks an inequality
+
+
+
+
+def _law(name: str, unit: str, title: str, definition: str, tolerance: float | None = None) -> Metric:
+    table = "" if tolerance else "conservation"
+    return Metric(
+        name=f"conservation/{name}", unit=unit, title=title, definition=definition, table=table,
+        lower_is_better=True, reference_tolerance=tolerance,
+    )  # fmt: skip
+
+
+METRICS = (
+    _law("momentum", "% of weight", "Momentum", "what is missing from the balance of momentum, mean"),
+    _law("angular", "N m", "Angular", "the same of angular momentum about the pelvis"),
+    _law("energy_frames", "%", "Energy", "frames whose energy rises while contact planes stand still"),
+    _law("energy", "J", "Energy rise", "by how much it rises there, mean over all frames"),
+    _law("descent_frames", "%", "Descent", "frames that end above the step's first guess"),
+    _law("descent", "J", "Above guess", "by how much, mean over all frames"),
+    _law("residual", "vertex weights", "Residual", "largest component of the gradient left, mean"),
+    _law("residual_rms", "vertex weights", "Rms", "root mean square of the gradient left, mean"),
+    _law("momentum_worst", "weights", "Momentum, worst", "the worst frame that claims to have converged", 2e-6),
+    _law("energy_worst", "J", "Energy rise, worst", "the worst frame that claims to have converged", 1e-9),
+    _law("residual_worst", "vertex weights", "Residual, worst", "the worst frame that claims to have "
+         "converged", 1e-6),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Of the reference, skinning and what was trained: nobody asks a truncated solver for conservation."""
+    if roll_out not in _asked(roll_out.group):
+        return {}
+    laws = _laws_of(roll_out.group)[roll_out]
+    found = laws.metrics()
+    if roll_out is not roll_out.group.reference:
+        return found
+    fields, frames = roll_out.trajectory.frame_fields, roll_out.trajectory.frames
+    claims = fields.get("converged", np.ones(frames))[FIRST_FULL_FRAME:] > 0.5
+    worst = {"momentum": laws.force / laws.weight, "energy": laws.rise, "residual": laws.residual}
+    if claims.any():
+        found |= {f"conservation/{name}_worst": max(0.0, float(v[claims].max())) for name, v in worst.items()}
+    return found
+
+
+def _asked(group: SceneRollOuts) -> list[RollOut]:
+    scene = group.scene
+    if scene.dressed is None or len(scene.cloth.pins) or scene.frames <= FIRST_FULL_FRAME:
+        return []
+    return [r for r in group.roll_outs if r.entry.conserving and len(r.positions) == scene.frames]
+
+
+def _laws_of(group: SceneRollOuts) -> dict[RollOut, LawSeries]:
+    """Of all that are asked at once: they share the search trees."""
+    kept: dict[RollOut, LawSeries] | None = group.memo.get("conservation")
+    if kept is None:
+        asked = _asked(group)
+        kept = dict(zip(asked, law_series(group.scene, [roll_out.positions for roll_out in asked])))
+        group.memo["conservation"] = kept
+    return kept
 
 
 @dataclass(frozen=True)
@@ -74,27 +135,15 @@ class LawSeries:
         broken = self.rise > RISE * self.size
         climbed = self.climb > RISE * self.size
         return {
-            "law/momentum": 100.0 * float(self.force.mean()) / self.weight,
-            "law/angular": float(self.torque.mean()),
-            "law/energy": float(np.where(broken, self.rise, 0.0).mean()),
-            "law/energy_frames": 100.0 * float(broken.mean()),
-            "law/descent": float(np.where(climbed, self.climb, 0.0).mean()),
-            "law/descent_frames": 100.0 * float(climbed.mean()),
-            "law/residual": float(self.residual.mean()),
-            "law/residual_rms": float(self.residual_rms.mean()),
+            "conservation/momentum": 100.0 * float(self.force.mean()) / self.weight,
+            "conservation/angular": float(self.torque.mean()),
+            "conservation/energy": float(np.where(broken, self.rise, 0.0).mean()),
+            "conservation/energy_frames": 100.0 * float(broken.mean()),
+            "conservation/descent": float(np.where(climbed, self.climb, 0.0).mean()),
+            "conservation/descent_frames": 100.0 * float(climbed.mean()),
+            "conservation/residual": float(self.residual.mean()),
+            "conservation/residual_rms": float(self.residual_rms.mean()),
         }
-
-
-UNITS = {
-    "law/momentum": "% of weight",
-    "law/angular": "N m",
-    "law/energy": "J",
-    "law/energy_frames": "%",
-    "law/descent": "J",
-    "law/descent_frames": "%",
-    "law/residual": "vertex weights",
-    "law/residual_rms": "vertex weights",
-}
 
 
 def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSeries]:

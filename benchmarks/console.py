@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from .clock import SPREAD
-from .results import NOT_FALLING, Row
+from .results import Row
+from .rows import NOT_FALLING, SPREAD
 
 COLUMNS = (
     ("energy/total", "total J"),
@@ -41,11 +41,11 @@ def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
 
 
 def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> list[str]:
-    """What whoever reads the times should know, in a line each. outdated: cell -> what has changed since."""
+    """What whoever reads the times should know, in a line each. outdated: task -> what has changed since."""
     rows, lines = list(rows), []
     if reused:
         lines.append(f"{reused} results taken from earlier runs in this folder")
-    lines += [f"{label}: kept though {why} changed" for label, why in outdated.items()]
+    lines += [f"{label}: {remark}" for label, remark in outdated.items()]
     spreads = {f"{row.scene} x {row.method}": row.value or 0.0 for row in rows if row.metric == "cost/spread"}
     wide = [f"{cell} ({percent:.0f} %)" for cell, percent in spreads.items() if percent > 100.0 * SPREAD]
     if wide:
@@ -60,8 +60,7 @@ def _groups(suite: str, rows: list[Row]) -> list[tuple[str, list[Row]]]:
     """Scenes of one garment together; of speed each by itself, as errors of different scenes do not add."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
-        part = row.scene.partition("/")[0] if suite == "garments" else row.scene
-        groups.setdefault(part, []).append(row)
+        groups.setdefault(row.garment if suite == "garments" else row.scene, []).append(row)
     if suite != "garments":
         return [(f"speed, {scene}", own) for scene, own in groups.items()]
     titled = []

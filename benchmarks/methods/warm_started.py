@@ -1,6 +1,6 @@
 """A network's frame, or skinning's, as the first guess of a step, and a few iterations of a solver from it.
 
-The state is carried: x_hat comes from the hybrid's own two previous frames, so that inertia acts, while the
+The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while the
 network sees what it always sees. The potential of the step is frozen as for every solver (contact planes at
 the guess that the body carries), and only the starting point differs. The time of the network or of skinning
 is on the clock; features and joint transforms are ready before, as they are for the network alone.
@@ -18,8 +18,9 @@ import numpy as np
 from reference_sim import Potential, Trajectory
 from reference_sim.minimise import Minimiser, Result, make_minimiser
 
+from ..method import Method
 from ..scene import BuiltScene
-from .networks import model_path
+from .network import model_path
 from .simulation import Simulation
 
 SKINNING = "skinning"
@@ -39,7 +40,7 @@ class FromElsewhere:
 
 
 @dataclass
-class Hybrid:
+class WarmStarted(Method):
     """A simulation whose steps start at frames from elsewhere and are cut short."""
 
     guess: str
@@ -80,9 +81,9 @@ class Hybrid:
         return lambda: predictions(model, dressed, motion)
 
 
-def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> Hybrid:
+def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:
     """`iterations` of "newton" or "lbfgs" from the network of kind `guess`, or from "skinning"."""
     options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
     if solver == "lbfgs":
         options["finish"] = False
-    return Hybrid(guess, model_path(models, guess, seed), options)
+    return WarmStarted(guess, model_path(models, guess, seed), options)
