@@ -26,7 +26,7 @@ DATA_FILES = "snug/data/*.npz"  # what the modules of snug read
 LISTS = (
     "benchmarks/__init__.py", "benchmarks/methods/__init__.py", "benchmarks/methods/solvers.py",
     "benchmarks/methods/learned.py", "benchmarks/scenes/__init__.py",
-    "benchmarks/suites/__init__.py", "benchmarks/suites/extreme_cases.py", "benchmarks/presets.py",
+    "benchmarks/suites/__init__.py", "benchmarks/presets.py",
     "benchmarks/plan.py", "benchmarks/results.py", "snug/recipe.py",
 )  # fmt: skip
 

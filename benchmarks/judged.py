@@ -10,32 +10,25 @@ from typing import Any
 from snug.recipe import DEFAULT
 
 from .agenda import Agenda, declared
-from .check import Check
 from .fingerprint import code_of
 from .plan import Network, runs
 from .records import Found, Records, Work
 from .results import Row, cells_to_row, row_to_cells
 from .study import METHOD, Study
-from .suites.extremes import Case
+from .validation.case import Case
 from .wardrobe import Wardrobe
 
 # What studies reach by name, through lists that are no code: the dressed body's scene and skinning.
 BY_NAME = ("benchmarks.scenes.dressed_body", "benchmarks.methods.skinning")
 
 
-def work_of(item: Check | Case, agenda: Agenda) -> Work:
-    """What the row of a check or a case depends on."""
-    if isinstance(item, Check):
-        kind, code = "check", code_of(f"benchmarks.checks.{item.module}", "benchmarks.check")
-    else:
-        module = item.function.partition(":")[0]
-        kind, code = "case", code_of(f"benchmarks.checks.{module}", "benchmarks.suites.extremes")
+def work_of(item: Case, agenda: Agenda) -> Work:
+    """What the row of a case depends on."""
+    kind, code = "case", code_of(item.module, "benchmarks.validation.case")
     return Work(kind, item.name, agenda.inputs(code) | {"declared": declared(item)}, code)
 
 
-def rows_of(
-    items: Iterable[Check | Case], run: Callable[[Any], Row], agenda: Agenda, records: Records
-) -> list[Row]:
+def rows_of(items: Iterable[Case], run: Callable[[Any], Row], agenda: Agenda, records: Records) -> list[Row]:
     """The row of each item. One that is left out by --only has none."""
     rows = []
     for item in items:

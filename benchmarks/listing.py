@@ -12,8 +12,8 @@ from .results import CLIP
 from .scenes import SMALL_SCENES, WORN
 from .studies import STUDIES
 from .suites import SUITES
-from .suites.extremes import MAPS, REFUSALS, STEPS
-from .suites.validation import CHECKS
+from .validation.registry import KNOWN_ANSWERS
+from .validation.stress_tests import MAPS, STEPS
 
 
 def listing() -> str:
@@ -38,8 +38,8 @@ def listing() -> str:
         ("training motions", ((name, "") for name in TRAIN)),
         ("training motions of garments that swing", ((name, "") for name in SWING_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
-        ("validation checks", ((c.name, c.description) for c in CHECKS)),
-        ("extreme cases", [*((c.name, c.description) for c in (*STEPS, *REFUSALS)), *map(_map, MAPS)]),
+        ("validation checks", ((c.name, c.description) for c in KNOWN_ANSWERS)),
+        ("extreme cases", [*((c.name, c.description) for c in STEPS), *map(_map, MAPS)]),
         ("studies", ((s.name, f"{s.suite}: {s.description}") for s in STUDIES)),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)

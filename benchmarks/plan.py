@@ -19,10 +19,10 @@ from .scenes import SMALL_SCENES, TSHIRT, WORN, all_scenes, motion_of
 from .studies import METHOD as STUDIES_METHOD
 from .studies import STUDIES, Study
 from .suites import SUITE_NAMES
-from .suites.extremes import CASES, Case
-from .suites.extremes import METHOD as EXTREMES_METHOD
-from .suites.validation import CHECKS, Check
-from .suites.validation import METHOD as VALIDATION_METHOD
+from .validation.case import METHOD as VALIDATION_METHOD
+from .validation.case import Case
+from .validation.registry import KNOWN_ANSWERS as CHECKS
+from .validation.registry import STRESS_TESTS as CASES
 
 if TYPE_CHECKING:
     from snug.motion import Motion
@@ -79,7 +79,7 @@ class Plan:
     preset: Preset
     suites: tuple[str, ...]
     cells: tuple[Cell, ...]
-    checks: tuple[Check, ...]
+    checks: tuple[Case, ...]
     cases: tuple[Case, ...]
     studies: tuple[Study, ...] = ()
     train: tuple[str, ...]
@@ -219,7 +219,7 @@ def choose_cells(
     scenes: Sequence[str],
     methods: Sequence[str],
     seeds: Sequence[int],
-) -> tuple[tuple[Cell, ...], tuple[Check, ...], tuple[Case, ...]]:
+) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Case, ...]]:
     """Cells, checks and cases that the request names. Raises PlanError for a word that names nothing.
 
     scenes and methods: see benchmarks.meetings.
@@ -240,7 +240,7 @@ def choose_cells(
     known = [check for check in CHECKS if check.smoke or scenes or preset.name != "smoke"]
     checks = _matching(known, scenes, "validation" in suites and named(VALIDATION_METHOD, methods))
     hard = [case for case in CASES if case.smoke or scenes or preset.name != "smoke"]
-    cases = _matching(hard, scenes, "extremes" in suites and named(EXTREMES_METHOD, methods))
+    cases = _matching(hard, scenes, "extremes" in suites and named(VALIDATION_METHOD, methods))
     if not (found or checks or cases or choose_studies(suites, scenes, methods)):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
     # The reference first: an error against it can be said as soon as another cell is done.

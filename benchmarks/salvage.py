@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 
 from .agenda import Agenda
 from .cells import outcome_of_record, with_repeat
-from .check import Check
 from .curves import remarked
 from .judged import kept_row, kept_rows, work_of, work_of_study
 from .measuring import costs_of
@@ -14,7 +13,7 @@ from .plan import runs
 from .records import Records
 from .results import Row
 from .rows import clock_costs, rows_of
-from .suites.extremes import Case
+from .validation.case import Case
 
 ENDED = ("finished", "failed")
 
@@ -42,7 +41,7 @@ def finished_rows(agenda: Agenda, records: Records) -> Iterator[Row]:
                     outcome = with_repeat(outcome, outcome_of_record(cell, once_more), number)
             cells += rows_of(outcome, metrics.result | clock_costs(outcome) | costs_of(cell, agenda, records))
     yield from remarked(cells)
-    items: tuple[Check | Case, ...] = (*plan.checks, *plan.cases)
+    items: tuple[Case, ...] = (*plan.checks, *plan.cases)
     for item in items:
         found = records.find(work_of(item, agenda))
         if found.state in ENDED and found.result is not None:

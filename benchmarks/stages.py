@@ -98,16 +98,16 @@ class Stages:
             self.record.note("cells", {"run": sum(map(runs, plan.cells)), "failed": failed})
         if plan.checks:
             with self.record.stage("validation"):
-                from .suites.validation import run_check
+                from .validation.case import Case
 
                 checks = _bar(plan.checks, "validation", "check")
-                self.record.rows += judged.rows_of(checks, run_check, self.agenda, self.records)
+                self.record.rows += judged.rows_of(checks, Case.run, self.agenda, self.records)
         if plan.cases:
             with self.record.stage("extremes"):
-                from .suites.extremes import run_case
+                from .validation.isolated import run_isolated
 
                 cases = _bar(plan.cases, "extremes", "case")
-                self.record.rows += judged.rows_of(cases, run_case, self.agenda, self.records)
+                self.record.rows += judged.rows_of(cases, run_isolated, self.agenda, self.records)
         for study in plan.studies:
             with self.record.stage(f"{study.suite}: {study.name}"):
                 self.record.rows += judged.rows_of_study(study, self.agenda, self.records, self.wardrobe)
