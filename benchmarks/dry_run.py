@@ -19,7 +19,7 @@ def describe(plan: Plan) -> str:
         if task.stage != stage:
             stage = task.stage
             lines.append(stage)
-        lines.append(f"  {task.kind} {task.label}: {_verdict(found, skip)}")
+        lines.append(f"  {task.title}: {_verdict(found, skip)}")
         if not skip and found.wanted:
             wanted.append(found)
         cached += not skip and not found.wanted and found.outcome is not None

@@ -104,14 +104,14 @@ class _Worker:
         # A queue for each process: one that is killed while it reports leaves a lock that nobody opens.
         self.progress = multiprocessing.get_context("spawn").SimpleQueue()
         self.process = IsolatedProcess(_begin, self.context, self.progress)
-        self.warm: set[str] = set()
+        self.warm: set[tuple[str, str]] = set()
 
     def do(self, batch: Sequence[Task], needed: Needed) -> list[Outcome]:
-        kind = type(batch[0])
+        first = batch[0]
         try:
-            if kind.kind not in self.warm:
-                self.process.call(_warm_up, kind, seconds=COMPILING)
-                self.warm.add(kind.kind)
+            if (first.kind, first.modules[0]) not in self.warm:
+                self.process.call(first.warm_up, seconds=COMPILING)
+                self.warm.add((first.kind, first.modules[0]))
             self.process.call(_forget, seconds=None)
         except Exception as error:
             self._renew()
@@ -158,10 +158,6 @@ def _begin(context: Context, progress: Any = None) -> None:
     global _context
     tell: Callable[[int], None] = tell_nobody if progress is None else progress.put
     _context = dataclasses.replace(context, tell=tell, memo={})
-
-
-def _warm_up(kind: type[Task]) -> None:
-    kind.warm_up(_context)
 
 
 def _forget() -> None:

@@ -36,7 +36,10 @@ def listing() -> str:
         ("training motions of garments with dynamics", ((name, "") for name in SWING_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
         *(
-            (f"cases of suite {suite.name}", [(c.name, c.description) for c in CASES if c.suite == suite.name])
+            (
+                f"cases of suite {suite.name}",
+                [(c.name, c.description) for c in CASES if c.suite == suite.name],
+            )
             for suite in SUITES
             if any(case.suite == suite.name for case in CASES)
         ),

@@ -54,7 +54,8 @@ class MethodEntry:
     needs_no_obstacle: whether it knows no contact. package: what it needs installed besides this project.
     truncated: whether it stops before the minimum on purpose, so that running out of iterations is its end.
     batched: whether it computes many bodies at once. gives_first_frame: whether it computes frame 0 too; a
-    simulator is given it. conserving: whether conservation laws are asked of it. role, family, level, base, pairing_group: see benchmarks.results.Row.
+    simulator is given it. conserving: whether conservation laws are asked of it. role, family, level, base,
+    pairing_group: see benchmarks.results.Row.
     """
 
     name: str

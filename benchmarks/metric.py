@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from reference_sim import Trajectory
 
+    from .method import MethodEntry
     from .metrics.curvature import CurvatureSeries
     from .metrics.geometry import Penetration
-    from .method import MethodEntry
     from .scene import BuiltScene, Scene
 
 WHOLE = ("ok", "stalled")  # statuses of cells that came to their last frame

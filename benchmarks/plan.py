@@ -70,8 +70,8 @@ class Motions:
 class Plan:
     """Everything to be done.
 
-    body: an own one; None: the package's. only: states of what the folder holds in which a task is done again;
-    fresh: all that it holds is forgotten first. workers: processes side by side where nothing is timed.
+    body: an own one; None: the package's. only: states of what the folder holds in which a task is done
+    again; fresh: all that it holds is forgotten first. workers: processes side by side where nothing is timed.
     """
 
     preset: Preset

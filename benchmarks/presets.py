@@ -37,7 +37,7 @@ class Preset:
     further: bool = False
 
     def steps_of(self, training: str, kind: str) -> int:
-        """Optimiser steps of that training of snug.recipe, of a network of that kind; 0 for an untrained one."""
+        """Optimiser steps of that training of snug.recipe, by its kind; 0 for an untrained network."""
         return self.steps.get(training, self.steps.get(kind, 0))
 
 
@@ -51,7 +51,14 @@ PRESETS = (
         frames=20,
         clip_frames=10,
         settle_frames=12,
-        steps={"snug": 60, "dynamic": 60, "supervised": 60, "pbns": 60, "santesteban2019": 10, "tailornet": 60},
+        steps={
+            "snug": 60,
+            "dynamic": 60,
+            "supervised": 60,
+            "pbns": 60,
+            "santesteban2019": 10,
+            "tailornet": 60,
+        },
         sheet_cells=6,
         sheet_frames=10,
         iteration_budgets=(1, 4),
@@ -69,7 +76,14 @@ PRESETS = (
         frames=150,
         clip_frames=36,
         settle_frames=30,
-        steps={"snug": 5300, "dynamic": 5300, "supervised": 4000, "pbns": 6000, "santesteban2019": 1000, "tailornet": 4000},
+        steps={
+            "snug": 5300,
+            "dynamic": 5300,
+            "supervised": 4000,
+            "pbns": 6000,
+            "santesteban2019": 1000,
+            "tailornet": 4000,
+        },
         sheet_cells=14,
         sheet_frames=45,
         iteration_budgets=(1, 2, 4, 8),
@@ -87,7 +101,9 @@ PRESETS = (
         frames=100_000,
         clip_frames=100_000,
         settle_frames=60,
-        steps=dict.fromkeys(("snug", "dynamic", "supervised", "pbns", "santesteban2019", "tailornet"), 60_000),
+        steps=dict.fromkeys(
+            ("snug", "dynamic", "supervised", "pbns", "santesteban2019", "tailornet"), 60_000
+        ),
         further=True,
         sheet_cells=30,
         sheet_frames=90,

@@ -51,8 +51,8 @@ class IsolatedProcess:
     def call(self, function: Callable[..., Any], *arguments: Any, seconds: float | None) -> Any:
         """function(*arguments) in the worker; both sides must be picklable.
 
-        Raises what the function raises, and WorkerDied after `seconds` (None: no deadline) or where the process
-        ended.
+        Raises what the function raises, and WorkerDied after `seconds` (None: no deadline) or where the
+        process ended.
         """
         if self._process is None:
             self._start()

@@ -11,8 +11,8 @@ from typing import Any
 
 # For a reader; what a task depends on is found from the source: see benchmarks.source.
 PACKAGES = (
-    "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis", "ipctk", "pyvista",
-    "pyacvd",
+    "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis", "ipctk",
+    "pyvista", "pyacvd",
 )  # fmt: skip
 
 

@@ -11,12 +11,13 @@ from typing import Any
 from snug.recipe import learns_from_simulation
 
 from .metrics import find_metric
-from .plan import Plan, network_of, runs
+from .plan import Plan, network_of
 from .results import Row
 from .schedule import Schedule
 from .tasks.case import RunCase
 from .tasks.cell import UNBELIEVABLE, Cell
 from .tasks.task import Outcome, Task, TaskId
+from .validation.case import timed_out
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
@@ -138,10 +139,8 @@ def _rows_of_case(task: RunCase, outcomes: Outcomes) -> Iterator[Row]:
     outcome = outcomes.get(task.id)
     if outcome is None or outcome.status == "skipped":
         return
-    if outcome.result:
-        row = Row(**outcome.result)
-    else:
-        row = task.case.died(outcome.status, outcome.reason)
+    died = not outcome.result
+    row = timed_out(task.case, outcome.reason, outcome.status) if died else Row(**outcome.result)
     reason = "; ".join(filter(None, (row.reason, outcome.remark)))
     yield dataclasses.replace(row, commit=outcome.commit, reason=reason)
 
@@ -226,5 +225,3 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
 def _fields(entry: Any, *without: str) -> dict[str, Any]:
     names = [field.name for field in dataclasses.fields(entry) if field.name not in without]
     return {name: getattr(entry, name) for name in names}
-
-

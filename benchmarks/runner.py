@@ -28,12 +28,12 @@ class Log(Protocol):
 class Runner:
     """Runs or reuses tasks, in their order: those that others need come first.
 
-    outcomes: of every task so far. reused: labels of those that an earlier run had finished.
+    outcomes: of every task so far. reused: titles of those that an earlier run had finished.
     """
 
     def __init__(self, tasks: Sequence[Task], cache: Cache) -> None:
         self.tasks, self.cache = tuple(tasks), cache
-        self.labels = {task.id: task.label for task in self.tasks}
+        self.titles = {task.id: task.title for task in self.tasks}
         self.found: dict[TaskId, Found] = {}
         self.outcomes: dict[TaskId, Outcome] = {}
         self.reused: list[str] = []
@@ -111,18 +111,18 @@ class Runner:
             self.outcomes[task.id] = Outcome("skipped", LEFT_OUT)
         else:
             self.found[task.id], self.outcomes[task.id] = found, found.outcome
-            self.reused.append(task.label)
+            self.reused.append(task.title)
         return False
 
     def _blocked(self, lacking: TaskId) -> Outcome:
         """Of a task that cannot be run. It is done as soon as nothing blocks it, whatever --only says."""
-        label, other = self.labels.get(lacking, " ".join(lacking)), self.outcomes.get(lacking, Outcome())
+        title, other = self.titles.get(lacking, " ".join(lacking)), self.outcomes.get(lacking, Outcome())
         if other.remark:
-            return Outcome("skipped", f"not built upon {label}, {other.remark}")
+            return Outcome("skipped", f"not built upon {title}, {other.remark}")
         if other.status == "skipped":
-            return Outcome("skipped", f"{label}: {other.reason}")
-        reason = f"cannot be run: {label}: {other.status}: {other.reason}"
-        return Outcome("failed", reason, failed=True, result={BLOCKED: label})
+            return Outcome("skipped", f"{title}: {other.reason}")
+        reason = f"cannot be run: {title}: {other.status}: {other.reason}"
+        return Outcome("failed", reason, failed=True, result={BLOCKED: title})
 
     def _needed(self, *tasks: Task) -> dict[TaskId, Outcome]:
         """What the tasks may build upon: it is there, and up to date."""
@@ -156,14 +156,16 @@ class Runner:
         return self.outcomes
 
     def outdated(self) -> dict[str, str]:
-        """Label -> what has changed, of tasks whose outcome is kept though it is out of date."""
-        kept = ((task.label, self.outcomes[task.id].remark) for task in self.tasks if task.id in self.outcomes)
+        """Title -> what has changed, of tasks whose outcome is kept though it is out of date."""
+        kept = (
+            (task.label, self.outcomes[task.id].remark) for task in self.tasks if task.id in self.outcomes
+        )
         return {label: remark for label, remark in kept if remark}
 
     def broken(self) -> Mapping[str, str]:
-        """Label -> how it failed, of tasks of which no row speaks."""
+        """Title -> how it failed, of tasks of which no row speaks."""
         return {
-            task.label: f"{outcome.status}: {outcome.reason}"
+            task.title: f"{outcome.status}: {outcome.reason}"
             for task in self.tasks
             if (outcome := self.outcomes.get(task.id)) and outcome.failed and task.silent
         }

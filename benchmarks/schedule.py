@@ -59,14 +59,14 @@ class Schedule:
 
     def start(self, scene: Scene) -> SettleStart:
         return SettleStart(
-            name=flat(scene.name), label=f"settle {scene.name}", scene=scene, units=self.preset.settle_frames,
+            name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.settle_frames,
             **self._of_scene(scene, f"{TASKS}.ground_truth"),
         )  # fmt: skip
 
     def data(self, motion: str, garment: str) -> SimulateMotion:
         scene = of_garment(garment).scene(motion).at(self.preset)
         return SimulateMotion(
-            name=flat(scene.name), label=f"simulate {scene.name}", scene=scene,
+            name=flat(scene.name), label=scene.name, scene=scene,
             units=self.preset.settle_frames + self.preset.frames,
             **self._of_scene(scene, f"{TASKS}.ground_truth"),
         )  # fmt: skip
@@ -88,7 +88,7 @@ class Schedule:
         if training and training.simulated:
             simulated = {motion: self.data(motion, network.garment).id for motion in motions}
         return TrainNetwork(
-            name=f"{network.garment}/{network.name}-seed{network.seed}", label=f"train {network.label}",
+            name=f"{network.garment}/{network.name}-seed{network.seed}", label=network.label,
             inputs=inputs, modules=modules, reads=tuple(simulated.values()), units=max(steps, 1),
             training=network.name, seed=network.seed, garment=network.garment, steps=steps, motions=motions,
             simulated=simulated, device=self.plan.device, key=digest([inputs, code_of(*modules)]),
@@ -141,7 +141,7 @@ class Schedule:
 
     def quasi_static(self, scene: Scene) -> SimulateQuasiStatic:
         return SimulateQuasiStatic(
-            name=flat(scene.name), label=f"quasi-static {scene.name}", scene=scene, units=self.preset.frames,
+            name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.frames,
             needs=(self.start(scene).id,), **self._of_scene(scene, f"{TASKS}.ground_truth"),
         )  # fmt: skip
 
@@ -174,7 +174,7 @@ class Schedule:
         if scene.dressed:
             inputs["recipe"] = dataclasses.asdict(DEFAULT)  # of the skinning that gaps are a share of
         return MeasureCell(
-            name=cell.name, label=f"metrics of {cell.label}", cell=cell, place=plan.cells.index(cell),
+            name=cell.name, label=cell.label, cell=cell, place=plan.cells.index(cell),
             compared=compared, gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
             counterpart=counterpart, needs=(("cell", cell.name),), reads=reads, batch=scene.name,
             **of_scene | {"inputs": of_scene["inputs"] | inputs},

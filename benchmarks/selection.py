@@ -15,6 +15,7 @@ from .scene import Scene
 from .scenes import GARMENT_SCENES, all_scenes
 from .suites import SUITE_NAMES, SUITES, Extent, Suite
 from .tasks.cell import Cell
+from .validation.case import METHOD
 from .validation.registry import CASES
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
     from .validation.case import Case
 
-CASE_METHOD = "simulation"  # naming methods without it leaves cases out
 FIRST_GARMENT = GARMENT_SCENES[0].garment
 
 
@@ -72,8 +72,8 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
 def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, str, str]]:
     """(suite, scene, method), suite by suite.
 
-    A scene that no suite lists is met where its whole name is given: a body in a whole motion in garments, all
-    else in speed. A method that no suite lists takes part in each suite where its whole name is given.
+    A scene that no suite lists is met where its whole name is given: a body in a whole motion in garments,
+    all else in speed. A method that no suite lists takes part in each suite where its whole name is given.
     """
     extent = request.extent
     unlisted = _unlisted_scenes(request, declared)
@@ -95,8 +95,11 @@ def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, 
 
 
 def _cases(request: Request) -> Iterator[Case]:
-    """Those of the suites; the smallest preset runs those marked, unless they are named."""
-    if named(CASE_METHOD, request.methods):
+    """Those of the suites; the smallest preset runs those marked, unless they are named.
+
+    Naming methods without the simulation leaves them out.
+    """
+    if named(METHOD, request.methods):
         for case in CASES:
             small = case.smoke or request.scenes or request.preset.name != "smoke"
             if small and case.suite in request.suites and named(case.name, request.scenes):

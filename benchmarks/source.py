@@ -178,7 +178,9 @@ def _files_behind(base: str, name: str) -> Iterator[str]:
     """
     path, inner = _file_of(base), _file_of(f"{base}.{name}") if name else None
     if path is None or not path.endswith("/__init__.py") or not name:
-        yield from (found for found in (inner, path) if found is not None and (found == inner or inner is None))
+        yield from (
+            found for found in (inner, path) if found is not None and (found == inner or inner is None)
+        )
         return
     if name in _bound(path):
         yield path
@@ -202,7 +204,9 @@ def _bound(path: str) -> frozenset[str]:
             names.add(node.name)
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            names |= {part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)}
+            names |= {
+                part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)
+            }
     return frozenset(names)
 
 

@@ -41,7 +41,7 @@ class Suite:
 
 
 def _whole_motions(extent: Extent) -> list[str]:
-    """A T-shirt in each test motion; what has dynamics of its own where scenes are named, or at preset paper."""
+    """A T-shirt in each test motion; other garments where scenes are named, or at preset paper."""
     shirt, *others = GARMENT_SCENES
     names = [shirt.scene(name).name for name in extent.motions.test]
     if extent.further:

@@ -13,25 +13,23 @@ from .solvers import warm_started
 
 def network(name: str, label: str, description: str, **changes: Any) -> MethodEntry:
     """The entry of a network that snug.recipe.TRAININGS knows under the same name."""
-    return MethodEntry(
-        **{
-            "name": name,
-            "label": label,
-            "description": description,
-            "module": "benchmarks.methods.network",
-            "options": {"kind": name},
-            "needs_body": True,
-            "dtype": "float32",
-            "trained": name,
-            "seeded": True,
-            "batched": True,
-            "gives_first_frame": True,
-            "conserving": True,
-            "role": "network",
-            "pairing_group": name,
-        }
-        | changes
-    )
+    fields: dict[str, Any] = {
+        "name": name,
+        "label": label,
+        "description": description,
+        "module": "benchmarks.methods.network",
+        "options": {"kind": name},
+        "needs_body": True,
+        "dtype": "float32",
+        "trained": name,
+        "seeded": True,
+        "batched": True,
+        "gives_first_frame": True,
+        "conserving": True,
+        "role": "network",
+        "pairing_group": name,
+    } | changes
+    return MethodEntry(**fields)
 
 
 def _cleaned(kind: str, label: str) -> MethodEntry:

@@ -36,7 +36,7 @@ def declared() -> dict[str, Metric]:
 
 
 def find_metric(name: str) -> Metric:
-    """The declaration of a metric, also of one that a pattern such as "energy/*" declares. Raises KeyError."""
+    """The declaration of a metric, also by a pattern such as "energy/*". Raises KeyError."""
     metrics = declared()
     if name in metrics:
         return metrics[name]

@@ -50,9 +50,8 @@ INTERNAL = (
     "spring",
     "area_barrier",
 )  # their forces on a cloth sum to nothing, and turn nothing
+CLAIMED = "the worst frame that claims to have converged"
 RISE = 1e-9  # of the larger side: beyond it, a frame breaks an inequality
-
-
 
 
 def _law(name: str, unit: str, title: str, definition: str, tolerance: float | None = None) -> Metric:
@@ -72,10 +71,9 @@ METRICS = (
     _law("descent", "J", "Above guess", "by how much, mean over all frames"),
     _law("residual", "vertex weights", "Residual", "largest component of the gradient left, mean"),
     _law("residual_rms", "vertex weights", "Rms", "root mean square of the gradient left, mean"),
-    _law("momentum_worst", "weights", "Momentum, worst", "the worst frame that claims to have converged", 2e-6),
-    _law("energy_worst", "J", "Energy rise, worst", "the worst frame that claims to have converged", 1e-9),
-    _law("residual_worst", "vertex weights", "Residual, worst", "the worst frame that claims to have "
-         "converged", 1e-6),
+    _law("momentum_worst", "weights", "Momentum, worst", CLAIMED, 2e-6),
+    _law("energy_worst", "J", "Energy rise, worst", CLAIMED, 1e-9),
+    _law("residual_worst", "vertex weights", "Residual, worst", CLAIMED, 1e-6),
 )  # fmt: skip
 
 

@@ -20,8 +20,8 @@ METRICS = (
     _cost("data", "s", "Data generation", "simulation of the training motions, settling included"),
     _cost("setup", "s", "Making ready", "what a training does before its first step"),
     _cost("train", "s", "Training", "wall time of the steps of the training"),
-    _cost("frame", "ms", "Frame", "time of the whole run over the frames computed, one frame at a time on one "
-          "thread; the median of repeated runs"),
+    _cost("frame", "ms", "Frame", "time of the whole run over the frames computed, one frame at a time on "
+          "one thread; the median of repeated runs"),
     _cost("batch", "ms", "In batch", "time per frame and body of 16 bodies at once"),
     _cost("spread", "%", "Spread", "largest less smallest repeat, as a share of their median", ""),
     _cost("memory", "MB", "Memory", "size of the network"),

@@ -38,10 +38,10 @@ METRICS = (
     _energy("strain", "membrane energy of the declared material, mean over the frames with two before them"),
     _energy("bending", "energy of the hinges, mean over frames"),
     _energy("gravity", "weight times height above the pelvis's own height at rest, mean over frames"),
-    _energy("inertia", "sum of m / (2 dt^2) |x - 2 x' + x''|^2 over vertices, x' and x'' the method's own last "
-            "two frames; mean over frames"),
-    _energy("collision", "cubic penalty of vertices, edge midpoints and centroids nearer to the body than the "
-            "margin, contact planes searched at the method's own positions; mean over frames"),
+    _energy("inertia", "sum of m / (2 dt^2) |x - 2 x' + x''|^2 over vertices, x' and x'' the method's "
+            "own last two frames; mean over frames"),
+    _energy("collision", "cubic penalty of vertices, edge midpoints and centroids nearer to the body than "
+            "the margin, contact planes searched at the method's own positions; mean over frames"),
     _energy("total", "sum of all terms that the scene declares, and inertia"),
     _energy("*", "energy of that term, mean over frames", "{}"),
 )  # fmt: skip

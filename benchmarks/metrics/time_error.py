@@ -56,7 +56,9 @@ def time_errors(ladder: list[dict[str, float]]) -> dict[str, float]:
     errors = {}
     for metric in whole:
         limit = 2.0 * eighth[metric] - quarter[metric]
-        errors[f"time_error/{_QUANTITIES.get(metric, metric.removeprefix('energy/'))}"] = whole[metric] - limit
+        errors[f"time_error/{_QUANTITIES.get(metric, metric.removeprefix('energy/'))}"] = (
+            whole[metric] - limit
+        )
     coarse = abs(half["energy/total"] - quarter["energy/total"])
     fine = abs(quarter["energy/total"] - eighth["energy/total"])
     if coarse > 0.0 and fine > 0.0:

@@ -22,6 +22,9 @@ class RunCase(Task):
     unit = "case"
     case: Case
 
+    def warm_up(self) -> None:
+        self.case.warm_up()
+
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         row = self.case.run()
         context.tell(self.units)

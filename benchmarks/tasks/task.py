@@ -81,6 +81,10 @@ class Task:
     def id(self) -> TaskId:
         return self.kind, self.name
 
+    @property
+    def title(self) -> str:
+        return f"{self.kind} {self.label}"
+
     def skip(self, needed: Mapping[TaskId, Outcome]) -> str:
         """Why there is nothing to do, or empty. Such a task leaves no trace."""
         return ""
@@ -96,9 +100,8 @@ class Task:
         """Do it. needed: the outcomes of `needs` and `reads` that are there. What is raised is a failure."""
         raise NotImplementedError
 
-    @classmethod
-    def warm_up(cls, context: Context) -> None:
-        """What a process does before its first task of this kind, without a deadline."""
+    def warm_up(self) -> None:
+        """What a process does before its first task of this kind and module, without the deadline."""
 
     @classmethod
     def run_together(

@@ -43,7 +43,9 @@ class TrainNetwork(Task):
         """Its model, and checkpoints of trainings that nobody asks for any more."""
         path = self.path(folder)
         path.unlink(missing_ok=True)
-        for other in set(path.parent.glob(f".{path.stem}.*.checkpoint.safetensors")) - {self._checkpoint(path)}:
+        for other in set(path.parent.glob(f".{path.stem}.*.checkpoint.safetensors")) - {
+            self._checkpoint(path)
+        }:
             other.unlink()
 
     def _checkpoint(self, path: Path) -> Path:

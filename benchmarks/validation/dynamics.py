@@ -9,7 +9,7 @@ import numpy as np
 from reference_sim import Cloth, Material, Potential, Trajectory, minimise, simulate
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 
-from ..presets import find_preset
+from ..scene import Scene
 from ..scenes import free_fall as fall
 from ..scenes import hanging_sheet
 from .converged import converged
@@ -18,10 +18,15 @@ from .meshes import in_space, jittered_patch, right_grid
 DT = 1.0 / 30.0
 SPACING = 0.015  # [m] of the sheet that takes one step
 
+FALL = Scene(name="free_fall", description="a thrown sheet", module="benchmarks.scenes.free_fall")
+HANGING = Scene(
+    name="hanging_sheet", description="held at two corners", module="benchmarks.scenes.hanging_sheet"
+)
+
 
 def free_fall() -> float:
     """Largest distance [m] to x_0 + n dt v_0 + g dt^2 n (n+1)/2."""
-    scene = fall.build("free_fall", find_preset("quick"))
+    scene = fall.build(FALL, sheet_cells=14, sheet_frames=45)
     trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, velocity=scene.start_velocity
     )
@@ -31,7 +36,7 @@ def free_fall() -> float:
 
 def free_fall_in_substeps() -> float:
     """The same for four steps a frame: backward Euler with a quarter of the time step."""
-    scene, steps = fall.build("free_fall", find_preset("smoke")), 4
+    scene, steps = fall.build(FALL, sheet_cells=6, sheet_frames=10), 4
     trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.start, substeps=steps
     )
@@ -152,7 +157,7 @@ def energy_inequality() -> float:
     Both sides are the step's objective, at its end and at the previous positions: a step that ends above the
     place it came from is wrong. Measured on the hanging sheet.
     """
-    scene = hanging_sheet.build("hanging_sheet", find_preset("smoke"))
+    scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10)
     trajectory = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=20, start=scene.start)
     converged(trajectory, "the simulation")
     return _largest_rise(trajectory, scene.cloth, scene.energies, scene.dt)
