@@ -71,7 +71,7 @@ class Plan:
     """Everything to be done.
 
     body: an own one; None: the package's. only: states of what the folder holds in which a task is done
-    again; fresh: all that it holds is forgotten first. workers: processes side by side where nothing is timed.
+    again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
     """
 
     preset: Preset
@@ -96,7 +96,7 @@ class Plan:
     @property
     def networks(self) -> tuple[Network, ...]:
         """Every network that some cell needs."""
-        return tuple(dict.fromkeys(filter(None, (network_of(cell) for cell in self.cells if runs(cell)))))
+        return tuple(dict.fromkeys(filter(None, map(network_of, self.cells))))
 
     @property
     def garments(self) -> tuple[str, ...]:
@@ -126,5 +126,6 @@ def runs(cell: Cell) -> bool:
 
 
 def network_of(cell: Cell) -> Network | None:
-    """The network that a cell needs."""
-    return Network(cell.entry.trained, cell.seed, cell.scene.garment) if cell.entry.trained else None
+    """The network that a cell needs, where it is computed at all."""
+    trained = cell.entry.trained
+    return Network(trained, cell.seed, cell.scene.garment) if trained and runs(cell) else None
