@@ -158,7 +158,7 @@ class Runner:
     def outdated(self) -> dict[str, str]:
         """Title -> what has changed, of tasks whose outcome is kept though it is out of date."""
         kept = (
-            (task.label, self.outcomes[task.id].remark) for task in self.tasks if task.id in self.outcomes
+            (task.title, self.outcomes[task.id].remark) for task in self.tasks if task.id in self.outcomes
         )
         return {label: remark for label, remark in kept if remark}
 

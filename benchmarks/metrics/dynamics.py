@@ -36,6 +36,8 @@ METRICS = (
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     own, x = roll_out.quasi_static, roll_out.positions
+    if roll_out is roll_out.group.reference:
+        own = roll_out.group.simulated_quasi_static
     found = {}
     if own is not None:
         found["dynamics/quasi_static_difference"] = rms(x, own[: len(x)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -70,20 +71,19 @@ def _roll_out(
 ) -> RollOut:
     from reference_sim import Trajectory
 
-    folder = context.folder
-    quasi_static, counterpart = cell.quasi_static(folder), None
+    folder, counterpart = context.folder, None
     if task is not None and task.counterpart is not None:
         path = task.counterpart.trajectory(folder)
         counterpart = _positions(path) if path.is_file() else None
     return RollOut(
         group=group, entry=cell.entry, seed=cell.seed, status=outcome.status, suites=cell.suites,
         trajectory=Trajectory.load(cell.trajectory(folder)),
-        quasi_static=_positions(quasi_static) if task and len(outcome.files) > 1 else None,
+        quasi_static=_positions(cell.quasi_static(folder)) if len(outcome.files) > 1 else None,
         counterpart=counterpart,
     )  # fmt: skip
 
 
-def _positions(path) -> np.ndarray:
+def _positions(path: Path) -> np.ndarray:
     from reference_sim import Trajectory
 
     return Trajectory.load(path).positions
