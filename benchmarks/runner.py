@@ -50,7 +50,13 @@ class Runner:
         for stage, group in groupby(self.tasks, key=lambda task: task.stage):
             tasks = list(group)
             with log.stage(stage):
-                self._alone(tasks, executor) if tasks[0].process else self._together(tasks, executor)
+                if tasks[0].process:
+                    self._alone(tasks, executor)
+                while tasks and not tasks[0].process:  # those that need one another, one after another
+                    left = {task.id for task in tasks}
+                    later = [task for task in tasks if left & {*task.needs, *task.reads}]
+                    self._together([task for task in tasks if task not in later], executor)
+                    tasks = later
 
     def _together(self, tasks: Sequence[Task], executor: Executor) -> None:
         wanted = [task for task in tasks if self.decide(task)]
