@@ -107,7 +107,9 @@ def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
     plan = plan_of(tmp_path, "newton-1", scene=scene)
     loaded = outcome_of(plan).result["modules"]
     known = dependencies(next(task for task in tasks_of(plan) if task.kind == "cell"))
-    files = {name: name.replace(".", "/") for name in loaded if name.split(".")[0] in ("reference_sim", "snug")}
+    files = {
+        name: name.replace(".", "/") for name in loaded if name.split(".")[0] in ("reference_sim", "snug")
+    }
     files.pop("snug.recipe", None)  # names of trainings, which the list of methods holds
     missing = [n for n, stem in files.items() if f"{stem}.py" not in known and not (ROOT / stem).is_dir()]
     assert missing == [] and len(files) > 10
@@ -251,7 +253,9 @@ def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path):
 
     def measured() -> list[str]:
         """Methods whose metrics are there."""
-        return [c.method for k, c in enumerate(plan.cells) if found_of(plan, "metrics", k).state == "finished"]
+        return [
+            c.method for k, c in enumerate(plan.cells) if found_of(plan, "metrics", k).state == "finished"
+        ]
 
     def after(number: int) -> list[str]:
         finish(plan, "cells", "metrics")

@@ -1,4 +1,4 @@
-"""Workers: results in order, a failure as a value, records of what has ended."""
+"""Processes of this machine: outcomes of all tasks, a failure as a value, progress whatever dies."""
 
 from __future__ import annotations
 
@@ -6,71 +6,91 @@ import dataclasses
 import os
 import signal
 
-from benchmarks import workers
-from benchmarks.records import Records, Work
+from benchmarks import executor
+from benchmarks.executor import LocalExecutor
 from benchmarks.results import RunFolder
-from benchmarks.workers import Failure, Job, run_jobs
+from benchmarks.tasks.task import Outcome, Task
 
 
-def add(wardrobe, tell, a, b):
-    tell(1)
-    return wardrobe, a + b
+class Bar:
+    total, n = 100, 0
+
+    def update(self, units=1):
+        self.n += units
 
 
-def test_workers_give_results_in_order_and_a_failure_as_a_value():
-    jobs = [Job("one", add, (1, 2), 1), Job("two", add, (1, "x"), 1), Job("three", add, (3, 4), 1)]
-    first, second, third = run_jobs(jobs, "held", title="adding", unit="sum")
-    assert first == ("held", 3) and third == ("held", 7)
-    assert isinstance(second, Failure) and second.label == "two" and "TypeError" in second.reason
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Add(Task):
+    kind = "sum"
+    stage = "adding"
+    terms: tuple = (1, 2)
+    how: str = ""
+
+    def warm_up(self) -> None:
+        if self.how == "cold":
+            raise MemoryError("no room to compile")
+
+    def run(self, context, needed):
+        if self.how == "die telling":
+            executor._context.tell.__self__._wlock.acquire()  # as in the midst of a report
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.how == "hang":
+            signal.pause()
+        context.tell(1)
+        context.memo.setdefault("done", []).append(self.name)
+        first, second = self.terms
+        return Outcome(result={"sum": first + second, "memo": list(context.memo["done"])})
 
 
-def die_telling(wardrobe, tell):
-    workers._progress._wlock.acquire()  # as in the midst of a report
-    os.kill(os.getpid(), signal.SIGKILL)
+def add(name: str, **fields) -> Add:
+    return Add(name=name, label=name, inputs={}, modules=("benchmarks.results",), **fields)
 
 
-def test_a_worker_that_was_killed_while_it_reported_keeps_no_other_waiting():
-    jobs = [Job("dies", die_telling, (), 1), Job("tells", add, (3, 4), 1)]
-    died, told = run_jobs(jobs, "held", title="adding", unit="sum", workers=1)
-    assert isinstance(died, Failure) and "SIGKILL" in died.reason and told == ("held", 7)
+def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Bar]:
+    bar = Bar()
+    done = LocalExecutor(RunFolder(folder), None, workers).together([(batch, {}) for batch in batches], bar)
+    return {task.name: outcome for task, outcome in done}, bar
 
 
-@dataclasses.dataclass
-class Written:
-    value: int
-    files: tuple[str, ...]
+def test_a_failure_is_a_value_and_the_others_go_on(tmp_path):
+    found, _ = together(tmp_path, [add("one")], [add("two", terms=(1, "x"))], [add("three", terms=(3, 4))])
+    assert found["one"].result["sum"] == 3 and found["three"].result["sum"] == 7
+    assert found["two"].failed and found["two"].reason.startswith("TypeError")
+    assert all(outcome.seconds > 0.0 for outcome in found.values())
 
 
-def write(wardrobe, tell, folder, value):
-    (folder / f"{value}.txt").write_text("x")
-    return Written(value, (f"{value}.txt",))
+def test_a_process_that_was_killed_while_it_reported_keeps_no_other_waiting(tmp_path):
+    found, _ = together(tmp_path, [add("dies", how="die telling")], [add("tells", terms=(3, 4))])
+    assert found["dies"].status == "out-of-memory" and "SIGKILL" in found["dies"].reason
+    assert found["tells"].result["sum"] == 7
 
 
-def test_a_worker_records_what_it_has_done_and_where_it_lies(tmp_path):
-    records = Records(RunFolder(tmp_path))
-    works = [Work("data", f"w{value}", {"value": value}, {}) for value in range(2)]
-    jobs = [Job(w.name, write, (tmp_path, k), 1, work=w, records=records) for k, w in enumerate(works)]
-    run_jobs(jobs, None, title="writing", unit="file", workers=1)
-    assert [records.find(work).result["value"] for work in works] == [0, 1]
-    assert records.find(works[0]).state == "finished"
-    assert records.find(Work("data", "w0", {"value": 5}, {})).why == "value"
-    (tmp_path / "0.txt").unlink()
-    gone = records.find(works[0])
-    assert (gone.state, gone.why) == ("missing", "0.txt is gone")
-    records.path(works[1]).write_text("{")
-    assert records.find(works[1]).state == "missing"
+def test_a_task_that_hangs_is_ended_at_its_deadline(tmp_path):
+    found, _ = together(tmp_path, [add("hangs", how="hang", deadline=0.5)], [add("after")])
+    assert found["hangs"].status == "timeout" and "0.5 s" in found["hangs"].reason
+    assert found["after"].result["sum"] == 3
 
 
-def test_a_network_that_was_put_in_place_of_the_trained_one_is_stale(tmp_path):
-    records = Records(RunFolder(tmp_path))
-    model = tmp_path / "models" / "snug.safetensors"
-    model.parent.mkdir()
-    model.write_bytes(b"trained")
-    work = Work("network", "snug", {}, {})
-    records.keep(work, {}, seconds=1.0, files=[model])
-    assert records.find(work).state == "finished"
-    model.write_bytes(b"another")
-    assert (
-        records.find(work).state == "stale"
-        and records.find(work).remark == "kept though models/snug.safetensors changed"
-    )
+def test_what_cannot_be_made_ready_is_a_failure(tmp_path):
+    found, _ = together(tmp_path, [add("cold", how="cold")], [add("after")])
+    assert found["cold"].status == "out-of-memory" and "no room to compile" in found["cold"].reason
+    assert found["after"].result["sum"] == 3
+
+
+def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
+    batch = [add("one"), add("two"), add("bad", terms=(1, "x")), add("lost")]
+    found, _ = together(tmp_path, batch, [add("three")])
+    assert found["two"].result["memo"] == ["one", "two"] and found["three"].result["memo"] == ["three"]
+    assert found["bad"].failed and found["lost"].failed  # what raises takes the rest of its batch along
+
+
+def test_a_named_process_is_kept_until_it_is_released(tmp_path):
+    alone = LocalExecutor(RunFolder(tmp_path), None, 1)
+    try:
+        first, second = (add(name, process="own") for name in ("first", "second"))
+        assert alone.alone(first, {}).result["memo"] == ["first"]
+        assert alone.alone(second, {}).result["memo"] == ["first", "second"]
+        alone.release("own")
+        assert alone.alone(second, {}).result["memo"] == ["second"]
+    finally:
+        alone.close()
