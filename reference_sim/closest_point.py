@@ -18,9 +18,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from .group_search import search
+from .kernel_cache import njit
 
 LEAF = 4  # faces in a leaf, at most
 HALVINGS = 6  # of the longest side, for samples that nothing is remembered of

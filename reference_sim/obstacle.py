@@ -11,11 +11,11 @@ from functools import cached_property
 
 import igl
 import numpy as np
-from numba import njit
 
 from .closed_mesh import check_closed
 from .closest_point import Closest, FaceTree
 from .cloth import MeshError
+from .kernel_cache import njit
 from .resume import fingerprint
 
 DEFAULT_REGION = 0.20  # [m]
