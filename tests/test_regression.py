@@ -12,7 +12,7 @@ from reference_sim import Material
 from reference_sim.energies import HOME
 
 # Round-off of 1e-13 m at the start moves no term by more than 1e-11, another linear solver by 1e-14; the
-# solver's own tolerance of 1e-10 vertex weights is below that. 1e-9 leaves room for other processors.
+# solver's own tolerance of 1e-10 is below that. 1e-9 leaves room for other processors.
 TOLERANCE = 1e-9
 
 
