@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from reference_sim import Trajectory
+from reference_sim import Trajectory, energies
+from reference_sim.energies import MODULE_OF
 
 ROOT = Path(__file__).resolve().parent.parent
 UNNEEDED = (
@@ -81,6 +82,22 @@ def imported(path: Path, module: str, modules: set[str]) -> Iterator[str]:
                 yield from {name if name in modules else base} & modules - {module}
         elif isinstance(node, ast.Import):
             yield from {alias.name for alias in node.names} & modules - {module}
+
+
+def test_every_lazy_name_is_defined_by_one_module_of_its_package():
+    package = ROOT / "reference_sim/energies"
+    defined: dict[str, list[str]] = {}
+    for path in package.glob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                defined.setdefault(node.name, []).append(path.stem)
+    assert {name: defined[name] for name in MODULE_OF} == {name: [file] for name, file in MODULE_OF.items()}
+    nodes = ast.walk(ast.parse((package / "__init__.py").read_text(encoding="utf-8")))
+    named = [alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names]
+    assert sorted(named) == sorted([*MODULE_OF, "TYPE_CHECKING", "import_module"])
+    assert sorted(energies.__all__) == sorted(MODULE_OF)
+    for name in MODULE_OF:
+        assert getattr(energies, name).__name__ == name
 
 
 def test_no_module_imports_itself_by_a_circle():
