@@ -142,7 +142,7 @@ class Runner:
 
     # --- without running -----------------------------------------------------------------------------------
 
-    def foresee(self) -> Iterator[tuple[Task, Found, str]]:
+    def preview(self) -> Iterator[tuple[Task, Found, str]]:
         """Of each task what the folder holds of it, and why it would be skipped, or empty. Writes nothing."""
         for task in self.tasks:
             found = self.found[task.id] = self.cache.find(task, self.found)

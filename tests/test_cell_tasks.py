@@ -72,7 +72,7 @@ def outcome_of(plan: Plan, number: int = 0) -> Outcome:
 def found_of(plan: Plan, kind: str = "cell", number: int = 0):
     """What the folder says of a cell, or of its metrics."""
     runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=plan.only))
-    return {task.id: found for task, found, _ in runner.foresee()}[kind, plan.cells[number].name]
+    return {task.id: found for task, found, _ in runner.preview()}[kind, plan.cells[number].name]
 
 
 def rows_of_cell(runner: Runner, plan: Plan) -> list[Row]:
