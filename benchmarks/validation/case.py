@@ -42,7 +42,7 @@ class Case:
     description: str
     module: str
     function: str
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict, hash=False)
     scene: str = ""
     metric: str = "check"
     unit: str = "1"

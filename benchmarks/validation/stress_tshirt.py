@@ -14,9 +14,8 @@ from reference_sim.material import GRAVITY
 
 from .case import Measurement
 from .convergence_check import CheckedResult, StressStep, lbfgs_then_newton, solve_and_check
-from .stress_steps import DT, prepared, warm_up
-
-__all__ = ["shirt", "shirt_iterations", "solve_shirt", "warm_up"]
+from .stress_steps import DT, prepared
+from .stress_steps import warm_up as warm_up  # that of its cases too
 
 if TYPE_CHECKING:
     from snug.body import Body
