@@ -67,7 +67,7 @@ class Collisions:
         """Begin a step in which an obstacle (faces (Fb, 3)) moves from before to after (B, 3) [m].
 
         It is put at the end. Nothing is kept from the step before, so that sums have one order, whatever
-        was asked earlier, and a run taken up again gives the same bits.
+        was asked earlier, and a resumed run gives the same bits.
         """
         self._obstacle_faces, self._before, self._after = faces, before, after
         self._near: NearMesh | None = None
@@ -168,7 +168,7 @@ class Collisions:
         candidates.build(near.mesh, start, end, 0.0)
         return candidates.compute_collision_free_stepsize(near.mesh, start, end, 0.0, self._ccd)
 
-    def crossing(self, x: np.ndarray) -> str:
+    def first_intersection(self, x: np.ndarray) -> str:
         """An edge and a face that cut each other at x (V, 3), in words; "" if there are none."""
         near = self.mesh_around(x)
         positions = near.stack(x, self.obstacle_at(self.progress))

@@ -42,7 +42,7 @@ class PartialRun:
     before: np.ndarray | None
     ended: bool
 
-    def over(self, frames: int) -> bool:
+    def complete(self, frames: int) -> bool:
         """Whether nothing is left to do for a run of `frames` frames."""
         return self.ended and (self.trajectory.frames == frames or self.trajectory.status == "diverged")
 

@@ -87,9 +87,9 @@ def simulate(
     loop = Stepper(cloth, energies, dt, substeps, obstacle, guess, quasi_static, options)
     provenance = loop.provenance() | {"start": fingerprint(x, v)}
     earlier = recover(path, provenance, frames=frames) if resume and path else None
-    if earlier and earlier.over(frames):
+    if earlier and earlier.complete(frames):
         return earlier.trajectory
-    state = State(x, v) if earlier is None else loop.taken_up(earlier, v, pin_positions)
+    state = State(x, v) if earlier is None else loop.resumed(earlier, v, pin_positions)
     with Recorder(cloth, provenance, path) as record:
         if earlier is None:
             record.start(x, loop.first_fields(x))

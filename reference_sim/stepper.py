@@ -103,7 +103,7 @@ class Stepper:
         self.potential.prepare(Step(x, v, first, self.dt, self.obstacle, step))
         return first
 
-    def taken_up(
+    def resumed(
         self, earlier: PartialRun, v0: np.ndarray, pin_positions: Callable[[int], np.ndarray] | None
     ) -> State:
         """The state at the last frame of an earlier run that began with velocity v0 (V, 3)."""

@@ -140,7 +140,7 @@ class ContactBarrier(Energy):
 
     def infeasibility(self, x: np.ndarray) -> str:
         """An edge that cuts a face, as far as the obstacle has come; "" if there is none."""
-        return self.collisions.crossing(x) if np.isfinite(x).all() else ""
+        return self.collisions.first_intersection(x) if np.isfinite(x).all() else ""
 
 
 def _check_heights(cloth: Cloth, distance: float) -> None:

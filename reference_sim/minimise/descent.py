@@ -85,7 +85,8 @@ class Descent:
             value, gradient = self.evaluate(trial)
             if np.isfinite(value) and np.isfinite(gradient).all():
                 gain, end = alpha * slope, alpha * dot(gradient, p)
-                if fallen(self.value, value, gain) or level(self.value, value, gain, end):
+                enough = sufficient_decrease(self.value, value, gain)
+                if enough or approximate_wolfe(self.value, value, gain, end):
                     self.x, self.value, self.g = trial, value, gradient
                     return alpha
             alpha *= 0.5
@@ -130,12 +131,12 @@ def mean_weight(potential: Potential) -> float:
     return float(potential.cloth.masses.mean() * GRAVITY)
 
 
-def fallen(before: float, after: float, slope: float) -> bool:
+def sufficient_decrease(before: float, after: float, slope: float) -> bool:
     """Whether the energy fell enough on a step whose linear prediction is `slope` (Armijo)."""
     return after <= before + SUFFICIENT_DECREASE * slope
 
 
-def level(before: float, after: float, slope: float, end_slope: float) -> bool:
+def approximate_wolfe(before: float, after: float, slope: float, end_slope: float) -> bool:
     """Whether, within round-off of the energy, the slopes at both ends say that it fell.
 
     Hager and Zhang 2005, approximate Wolfe conditions.

@@ -25,7 +25,7 @@ import numpy as np
 
 from ..potential import Potential
 from .convergence_check import convergence_check
-from .descent import Descent, Observer, fallen, level
+from .descent import Descent, Observer, approximate_wolfe, sufficient_decrease
 from .factorised import FactorisedDescent, FactorisedHessian
 from .lbfgs_history import LBFGSHistory, dot
 from .result import Result
@@ -179,8 +179,8 @@ class Run(FactorisedDescent):
             self.value, self.g = self.evaluate(self.x)
             if not self.finite:
                 break
-            flat = k == 0 and level(value, self.value, slope, dot(self.g, p))
-            if flat or fallen(value, self.value, slope):
+            flat = k == 0 and approximate_wolfe(value, self.value, slope, dot(self.g, p))
+            if flat or sufficient_decrease(value, self.value, slope):
                 self.predicting = watchdog and (k > 0 or self.value - value > PREDICTED * 0.5 * slope)
                 if not self.predicting:
                     self.potential.forget()
