@@ -90,7 +90,7 @@ def skinned_frames(scene: BuiltScene) -> np.ndarray | None:
     """What the energy gap is a share of: the skinned garment (T,V,3) [m]; None where there is no body."""
     if scene.dressed is None:
         return None
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.recipe import DEFAULT
 
     dressed = DressedBody(scene.dressed.body, scene.dressed.garment)

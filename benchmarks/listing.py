@@ -18,12 +18,12 @@ from .suites.validation import CHECKS
 
 def listing() -> str:
     """Suites, scenes, methods, motions and presets, one line each."""
-    from snug.motion import SWING_TEST, SWING_TRAIN, TEST, TRAIN
+    from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, TEST, TRAIN
 
     dressed = [
         (wear.prefix + name, f"a body in {wear.words}; unseen in training")
         for wear in WORN
-        for name in (SWING_TEST if wear.swings else (*TEST, *SWING_TEST))
+        for name in (DYNAMIC_TEST if wear.swings else (*TEST, *DYNAMIC_TEST))
     ]
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),
@@ -36,7 +36,7 @@ def listing() -> str:
             ((m.name, f"{m.description} {_where(m)}") for m in METHODS),
         ),
         ("training motions", ((name, "") for name in TRAIN)),
-        ("training motions of garments that swing", ((name, "") for name in SWING_TRAIN)),
+        ("training motions of garments that swing", ((name, "") for name in DYNAMIC_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
         ("validation checks", ((c.name, c.description) for c in CHECKS)),
         ("extreme cases", [*((c.name, c.description) for c in (*STEPS, *REFUSALS)), *map(_map, MAPS)]),

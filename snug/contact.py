@@ -1,12 +1,12 @@
-"""Contact planes for training: where each point of a garment may touch the body, remembered and renewed.
+"""Contact planes for training: where each point of a garment may touch the body, cached and queried anew.
 
 The loss needs, for each contact sample x of each frame, a plane (closest body point c, outward normal n), so
 that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So an
-anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the
-frame carry it to a plane in no time. Near the skin it slides to where its sample is now, whenever the energy
-is taken (snug.sliding), and a few frames of each batch search anew from the current prediction, with the
+anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the frame
+carry it to a plane in no time. Near the skin it walks to where its sample is now, whenever the energy is
+taken (snug.surface_walk), and a few frames of each batch search anew from the current prediction, with the
 simulator's own search and its rule of regions. All positions are float32, relative to the pelvis.
-With thousands of frames remembered, an anchor has four bytes, two of them for its face: barycentric
+With thousands of frames cached, an anchor has four bytes, two of them for its face: barycentric
 coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 from reference_sim.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
 from reference_sim.obstacle import DEFAULT_REGION, vertex_normals
-from snug.sliding import SLACK, beyond_sides, slid
+from snug.surface_walk import SLACK, triangle_adjacency, walk_to_foot
 
 PARTS = 255.0  # of a barycentric coordinate
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
@@ -32,8 +32,8 @@ class Patch:
     """The part of a body that one garment may touch.
 
     body_vertices (P,) into the whole body; faces (Q, 3) into the patch; rest (P, 3) and centroids (Q, 3) [m]
-    in the T-pose; sample_rest (S, 3) [m] of the garment; beyond (Q, 3), see sliding.beyond_sides; a tree to
-    search the faces with.
+    in the T-pose; sample_rest (S, 3) [m] of the garment; adjacency (Q, 3), see
+    surface_walk.triangle_adjacency; a tree to search the faces with.
     """
 
     body_vertices: np.ndarray
@@ -42,7 +42,7 @@ class Patch:
     centroids: np.ndarray
     sample_rest: np.ndarray
     region: float
-    beyond: np.ndarray
+    adjacency: np.ndarray
     tree: FaceTree
 
     @classmethod
@@ -74,7 +74,7 @@ class Patch:
             centroids=centroids,
             sample_rest=samples.astype(np.float32),
             region=region,
-            beyond=beyond_sides(faces),
+            adjacency=triangle_adjacency(faces),
             tree=FaceTree(faces, centroids),
         )
 
@@ -102,13 +102,13 @@ class Patch:
         """Area-weighted vertex normals: positions (N, P, 3) float32 -> (N, P, 3) int8, 127 times unit length.
 
         A byte is enough (0.3 degrees): planes interpolate them and make the result unit length again. With
-        thousands of frames remembered, memory counts.
+        thousands of frames cached, memory counts.
         """
         return _byte_normals(positions, self.faces)
 
 
-def kept(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Anchors on a body of so many faces as they are remembered: faces (S,) in as few bytes as hold them,
+def quantised(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Anchors on a body of so many faces as they are cached: faces (S,) in as few bytes as hold them,
     barycentric (S, 2) as uint8 in 1 / PARTS, the two together never more than one.
     """
     parts = np.rint(PARTS * barycentric)
@@ -116,11 +116,13 @@ def kept(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[n
     return faces.astype(np.int16 if body_faces < 2**15 else np.int32), parts.astype(np.uint8)
 
 
-class Anchors:
-    """One anchor per frame and sample, and when each frame's were last searched, or lent."""
+class ContactCache:
+    """One anchor per frame and sample, and the steps since each frame's were last searched or propagated."""
 
     def __init__(self, patch: Patch, frames: int) -> None:
-        faces, barycentric = kept(*patch.search(patch.sample_rest, patch.rest, exact=True), len(patch.faces))
+        faces, barycentric = quantised(
+            *patch.search(patch.sample_rest, patch.rest, exact=True), len(patch.faces)
+        )
         self.patch = patch
         self.faces = np.repeat(faces[None], frames, axis=0)
         self.barycentric = np.repeat(barycentric[None], frames, axis=0)
@@ -157,11 +159,11 @@ class Anchors:
         positions: np.ndarray,
         normals: np.ndarray,
         *,
-        slide: bool = False,
+        walk: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Contact energy of garments x (N, V, 3) float32 [m] in frames (N,), with the planes of `planes`.
 
-        -> values (N,) [J], gradients (N, V, 3) [N], float32. slide: anchors near the skin first slide to
+        -> values (N,) [J], gradients (N, V, 3) [N], float32. walk: anchors near the skin first walk to
         where their samples are, and are remembered there. A sample that is out of reach costs no more than
         the look at its anchor, and no plane is stored.
         """
@@ -175,12 +177,12 @@ class Anchors:
             positions,
             normals,
             self.patch.faces.view(np.uint32),
-            self.patch.beyond,
+            self.patch.adjacency,
             self.patch.centroids,
             self.patch.sample_rest,
             np.float32(self.patch.region**2),
             np.float32(SLACK),
-            slide,
+            walk,
             self.faces,
             self.barycentric,
             values,
@@ -188,13 +190,13 @@ class Anchors:
         )
         return values, gradients
 
-    def renew(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:
+    def requery(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame.
 
         exact: no old anchor stands for being roughly right.
         """
         found = self.patch.search(points, positions, self.faces[frame], exact=exact)
-        self.faces[frame], self.barycentric[frame] = kept(*found, len(self.patch.faces))
+        self.faces[frame], self.barycentric[frame] = quantised(*found, len(self.patch.faces))
         self.age[frame] = 0
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
@@ -219,7 +221,7 @@ def _byte_normals(positions, faces):
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def _carried(faces, face, parts, vectors, c):
+def _interpolated(faces, face, parts, vectors, c):
     """Component c of what vectors (P, 3) of the body's vertices are at an anchor."""
     v, w = np.float32(parts[0]) / np.float32(PARTS), np.float32(parts[1]) / np.float32(PARTS)
     u = np.float32(1.0) - v - w
@@ -234,8 +236,8 @@ def _planes(frames, rows, positions, normals, faces, anchor_faces, barycentric, 
         for s in range(anchors.shape[0]):
             length = np.float32(0.0)
             for c in range(3):
-                out_points[n, s, c] = _carried(faces, anchors[s], parts[s], x, c)
-                direction = _carried(faces, anchors[s], parts[s], m, c)
+                out_points[n, s, c] = _interpolated(faces, anchors[s], parts[s], x, c)
+                direction = _interpolated(faces, anchors[s], parts[s], m, c)
                 out_normals[n, s, c] = direction
                 length += direction * direction
             length = np.sqrt(length) + np.float32(1e-30)
@@ -262,15 +264,15 @@ def _above(x0, x1, x2, skin, m, faces, face, parts):
 # No assumption on NaN or infinity: the guard of training must see them.
 @numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
 def _energy(
-    x, stencils, weights, stiffness, margin, power, frames, rows, positions, normals, faces, beyond,
-    centroids, homes, region, slack, slide, anchor_faces, barycentric, values, gradients,
+    x, stencils, weights, stiffness, margin, power, frames, rows, positions, normals, faces, adjacency,
+    centroids, homes, region, slack, walk, anchor_faces, barycentric, values, gradients,
 ):  # fmt: skip
     """k max(margin - d, 0)^power of each sample, summed: values (N,), and added up: gradients (N, V, 3).
 
     stencils, faces: uint32, for a signed index is first asked whether it counts from the end.
     """
     # Normals have 127 times unit length, within 0.9 by rounding.
-    reach = np.float32(128.0) * (margin + slack if slide else margin)
+    reach = np.float32(128.0) * (margin + slack if walk else margin)
     zero, corners = np.float32(0.0), np.empty((1, 3, 3), np.float32)
     for n in range(len(x)):
         garment, gradient, skin, m = x[n], gradients[n], positions[rows[n]], normals[rows[n]]
@@ -286,8 +288,10 @@ def _energy(
             along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, face, parts[s])
             if along >= reach:
                 continue
-            if slide and along < reach:  # not a sample that is no number
-                face, v, w = slid(x0, x1, x2, face, skin, faces, beyond, centroids, homes[s], region, corners)
+            if walk and along < reach:  # not a sample that is no number
+                face, v, w = walk_to_foot(
+                    x0, x1, x2, face, skin, faces, adjacency, centroids, homes[s], region, corners
+                )
                 anchors[s] = face
                 parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))
                 third = np.rint(np.float32(PARTS) * w)

@@ -9,9 +9,9 @@ three holds three static terms and one inertia. Its gradient reaches all three f
 `detached`, the last alone.
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
-kernels (snug.lanes, or those beside the definition) give the same values and gradients in a small part of
-the time, so autograd is told to use those. On a GPU the definitions run as they are.
-The contact planes are the one difference: training keeps an anchor for each sample, which slides along, and
+kernels (snug.batched_kernels, or those beside the definition) give the same values and gradients in a small
+part of the time, so autograd uses those. On a GPU the definitions run as they are.
+The contact planes are the one difference: training keeps an anchor for each sample, which walks along, and
 takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the
 closest point.
 """
@@ -37,8 +37,8 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from snug.baselines.springs import SquaredContact, spring_terms
+from snug.batched_kernels import batched_kernel
 from snug.device import CPU
-from snug.lanes import lane_kernel
 from snug.recipe import Recipe
 
 STATIC = ("strain", "bending", "gravity")
@@ -80,7 +80,7 @@ class ClosedForm(torch.autograd.Function):
         flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
         together = energy if callable(energy) else None
         if together is None and flat.dtype == np.float32 and not frame_data:
-            together = lane_kernel(energy)
+            together = batched_kernel(energy)
         if together is not None:
             values, gradients = together(flat)
         else:
@@ -130,7 +130,7 @@ def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Te
     return energy.energy(x, *frame_data).sum(-1)
 
 
-def held_on(energy: Any, device: torch.device) -> Any:
+def on_device(energy: Any, device: torch.device) -> Any:
     """The same energy with its arrays as tensors on a device: evaluating its definition copies nothing."""
     twin = copy.copy(energy)
     for name, value in vars(energy).items():
@@ -155,8 +155,8 @@ class PhysicsLoss:
         self.static = static_terms(cloth, recipe)
         self._contact = self.contact
         if not kernels:
-            self.inertia, self._contact = held_on(self.inertia, device), held_on(self.contact, device)
-            self.static = {name: held_on(term, device) for name, term in self.static.items()}
+            self.inertia, self._contact = on_device(self.inertia, device), on_device(self.contact, device)
+            self.static = {name: on_device(term, device) for name, term in self.static.items()}
 
     def __call__(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Tensor]:
         """Joules of each window and frame, term -> (N, T).

@@ -2,7 +2,7 @@
 
 pyacvd's clusters give the number of vertices that was asked for, but a ragged rim. So rim vertices are spread
 evenly along the cut lines of the dense sheet, and the inner ones move towards a weighted mean of the
-triangles around them, kept on the form, between Delaunay flips.
+triangles around them, kept on the surface, between Delaunay flips.
 """
 
 import warnings

@@ -11,12 +11,12 @@ import torch
 from torch import Tensor
 
 from reference_sim.trajectory import Trajectory
-from snug.dresser import DressedBody
+from snug.dressed_body import DressedBody
 from snug.skinning import skin
 from snug.trained_model import TrainedModel, find_kind
 
 WARM_UP = 10  # frames run and thrown away before the clock starts
-HELD_FRAMES = 30  # frames for which a pose is held before its output counts as static
+QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
 
 
 class RollOutError(ValueError):
@@ -29,20 +29,20 @@ def roll_out(
     motion: Any,
     betas: np.ndarray | None = None,
     *,
-    held_pose: bool = False,
+    quasi_static: bool = False,
 ) -> Trajectory:
     """Positions (T, V, 3) [m], world, float64; the state starts at zero and is carried from frame to frame.
 
     frame_seconds holds the wall time of each frame: network and skinning, nothing else (inputs and joint
-    transforms are ready before; every method needs those). held_pose gives instead, for each frame, the
+    transforms are ready before; every method needs those). quasi_static gives instead, for each frame, the
     output after that pose was held still for a second: what the network thinks is static. It is not timed
     (NaN). Raises RollOutError.
     """
-    if not held_pose:
+    if not quasi_static:
         return ready_to_roll_out(model, dressed, motion, betas)()
     features = _features(model, dressed, motion, betas, still=True)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
-    posed = _held(model, features, rest, weights, dressed.transforms(motion.poses, betas))
+    posed = _quasi_static(model, features, rest, weights, dressed.transforms(motion.poses, betas))
     origins = dressed.pelvis(motion, betas)
     return _trajectory(model, dressed, motion, posed, origins, np.full(len(posed), np.nan))
 
@@ -188,11 +188,11 @@ def _one_by_one(
 
 
 @torch.inference_mode()
-def _held(
+def _quasi_static(
     model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
 ) -> np.ndarray:
     """All frames as a batch, each pose repeated."""
     state = None
-    for _ in range(HELD_FRAMES if find_kind(model.kind).sequences else 1):
+    for _ in range(QUASI_STATIC_FRAMES if find_kind(model.kind).sequences else 1):
         offsets, state = model.network(features[:, None], state)
     return skin(rest + offsets[:, 0], weights, transforms).numpy()

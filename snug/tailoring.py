@@ -1,7 +1,7 @@
-"""The form a garment is cut from: a smooth solid around the body, as a signed field on a grid.
+"""The implicit surface a garment is cut from: a smooth solid around the body, as a signed field on a grid.
 
 A shirt that followed the skin would be pressed into the waist and between the legs, where cloth never goes.
-So the form is a union of three solids, each grown by its own distance:
+So the solid is a union of three solids, each grown by its own distance:
 
 - the body itself, by `clearance` (this shapes shoulders and neck);
 - the torso, one convex section per height, which below the armpits never narrows again on the way down:
@@ -26,7 +26,7 @@ from snug.remeshing import boundary_loops
 
 Array = NDArray[np.float64]
 
-SPACING = 0.012  # [m] grid of the form: finer than any cloth edge that the tests ask for
+SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
 DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
 TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
@@ -45,7 +45,7 @@ def joint(body, name) -> Array:
 
 
 @dataclass(frozen=True)
-class Form:
+class ImplicitSurface:
     """Signed field, negative inside, on a grid over x >= 0 (three more planes beyond, mirrored).
 
     origin: (3,) [m] of the first node; spacing [m]; values: (nx, ny, nz) [m], close to a distance near zero.
@@ -152,11 +152,11 @@ def _sleeve(body, edges, points, nodes, cuff, ease, clearance, normals) -> Array
     return np.maximum(field, (shoulder - x)[:, None, None])
 
 
-def build_form(
+def build_surface(
     body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
     flare: float = 0.0,
-) -> Form:  # fmt: skip
-    """The form between the heights `hem` and `top`, of a shirt out to x = `cuff`, else of a skirt (all [m]).
+) -> ImplicitSurface:  # fmt: skip
+    """The surface between heights `hem` and `top`, of a shirt out to x = `cuff`, else of a skirt (all [m]).
 
     `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin, or
     to the hips of a skirt; `flare` [m] is how much further the hem stands off than that place, all around.
@@ -184,8 +184,8 @@ def build_form(
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
-    # The fast sign is a quarter of the time; it moves the distance by under a millimetre, and what the form
-    # promises about clearance is enforced on the finished mesh.
+    # The fast sign is a quarter of the time; it moves the distance by under a millimetre, and what is
+    # promised about clearance is enforced on the finished mesh.
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
     hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals)
@@ -200,11 +200,11 @@ def build_form(
     soft = ndimage.gaussian_filter(values, 1.0)
     values = 2 * soft - ndimage.gaussian_filter(soft, 1.0)
     origin = low - [ghost * SPACING, 0, 0]
-    return Form(origin, SPACING, values, ndimage.spline_filter(values, order=3))
+    return ImplicitSurface(origin, SPACING, values, ndimage.spline_filter(values, order=3))
 
 
 @dataclass(frozen=True)
-class Cut:
+class CutPlane:
     """A plane through `point` (3,) [m]: on the side of its `normal` (3,), what has |x| < reach [m] is cut.
 
     bend [1/m] curves it in z: bend (z - z0)^2 [m] beyond the plane.
@@ -235,14 +235,16 @@ class Cut:
         return slope
 
 
-def cut_sheet(form: Form, cuts: list[Cut]) -> tuple[Array, NDArray[np.int64]]:
-    """The form's surface as a dense mesh between the cuts: points (N,3) [m], faces (M,3), wound outward."""
+def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, NDArray[np.int64]]:
+    """The surface as a dense mesh between the cuts: points (N,3) [m], faces (M,3), wound outward."""
     import pyvista
 
     grid = pyvista.ImageData(
-        dimensions=form.values.shape, spacing=(form.spacing,) * 3, origin=tuple(map(float, form.origin))
+        dimensions=surface.values.shape,
+        spacing=(surface.spacing,) * 3,
+        origin=tuple(map(float, surface.origin)),
     )
-    grid["field"] = form.values.ravel(order="F")
+    grid["field"] = surface.values.ravel(order="F")
     sheet = grid.contour([0.0], scalars="field")
     for cut in cuts:
         sheet["cut"] = cut.beyond(np.asarray(sheet.points, dtype=np.float64))
@@ -257,15 +259,15 @@ def cut_sheet(form: Form, cuts: list[Cut]) -> tuple[Array, NDArray[np.int64]]:
     points = np.asarray(sheet.points, dtype=np.float64)
     faces = np.asarray(sheet.regular_faces, dtype=np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
-    if np.sum(np.cross(b - a, c - a) * form.gradient((a + b + c) / 3)) < 0:
+    if np.sum(np.cross(b - a, c - a) * surface.gradient((a + b + c) / 3)) < 0:
         faces = faces[:, ::-1]
     return points, faces
 
 
-def outlines(points: Array, faces: NDArray[np.int64], cuts: list[Cut]) -> list[list[tuple[str, Array]]]:
+def outlines(points: Array, faces: NDArray[np.int64], cuts: list[CutPlane]) -> list[list[tuple[str, Array]]]:
     """Per boundary loop of a cut sheet its named curves (P,3) [m], end to end along the winding.
 
-    Errors: ValueError where the form is open but no cut was made.
+    Errors: ValueError where the surface is open but no cut was made.
     """
     found = []
     for loop in boundary_loops(faces):
@@ -282,7 +284,7 @@ def outlines(points: Array, faces: NDArray[np.int64], cuts: list[Cut]) -> list[l
         for begin, end in pairwise(stops):
             middle = np.flatnonzero(on[:, begin + 1 : end].all(axis=1))
             if len(middle) != 1 or end - begin < 2:
-                raise ValueError("the form has an opening that no cut made")
+                raise ValueError("the surface has an opening that no cut made")
             curves.append((cuts[int(middle[0])].name, points[ring[begin : end + 1]]))
         found.append(curves)
     return found

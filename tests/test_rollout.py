@@ -46,9 +46,9 @@ def test_every_frame_is_timed():
 def test_held_pose_forgets_the_past_and_the_velocity():
     dressed, motion = tube_dress(), swaying()
     model = untrained_model("snug", dressed, [motion], seed=0)
-    held = roll_out(model, dressed, motion, held_pose=True)
+    held = roll_out(model, dressed, motion, quasi_static=True)
     reordered = type(motion)("back", motion.poses[::-1], motion.translations[::-1] * 2.0)
-    back = roll_out(model, dressed, reordered, held_pose=True)
+    back = roll_out(model, dressed, reordered, quasi_static=True)
     pelvis, other = dressed.pelvis(motion)[:, None], dressed.pelvis(reordered)[:, None]
     assert np.abs((held.positions - pelvis) - (back.positions - other)[::-1]).max() < 1e-5
     assert np.isnan(held.frame_seconds).all()

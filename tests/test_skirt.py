@@ -13,9 +13,9 @@ from benchmarks.presets import find_preset
 from benchmarks.scenes import dressed_scene
 from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from snug.body import Body
-from snug.dresser import DressedBody
+from snug.dressed_body import DressedBody
 from snug.garments import GarmentError, tailor_skirt, tailor_tshirt
-from snug.motion import make_motion
+from snug.motion_library import make_motion
 from snug.recipe import DEFAULT
 from snug.rollout import roll_out
 from snug.train import train, untrained_model

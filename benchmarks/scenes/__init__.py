@@ -40,7 +40,7 @@ SMALL_SCENES = (
 
 @dataclass(frozen=True)
 class Wear:
-    """A garment of snug.garments.PATTERNS, and the name that its scenes have before the motion's.
+    """A garment of snug.garments.GARMENT_TEMPLATES, and the name that its scenes have before the motion's.
 
     swings: whether its motions are those that stop within a frame, instead of the run's own.
     """

@@ -35,7 +35,7 @@ _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
 
 
 @lru_cache(maxsize=16)
-def lane_kernel(energy: Any) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] | None:
+def batched_kernel(energy: Any) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] | None:
     """x (N, V, 3) float32 -> values (N,) [J], gradients (N, V, 3) [N] of this energy; None if it has none."""
     if type(energy) is StretchStVK:
         Dm_inverse = energy.Dm_inverse.reshape(-1, 4).astype(np.float32)
