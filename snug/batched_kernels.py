@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
 
 LANES = 16
 # No assumption on NaN or infinity: the guard of training must see them.
@@ -34,23 +34,29 @@ _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
 )  # fmt: skip
 
 
+Kernel = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
 @lru_cache(maxsize=16)
-def batched_kernel(energy: Any) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] | None:
+def batched_kernel(energy: Energy) -> Kernel | None:
     """x (N, V, 3) float32 -> values (N,) [J], gradients (N, V, 3) [N] of this energy; None if it has none."""
-    if type(energy) is StretchStVK:
-        Dm_inverse = energy.Dm_inverse.reshape(-1, 4).astype(np.float32)
-        areas = energy.areas.astype(np.float32)
-        lame = (np.float32(energy.lam), np.float32(energy.mu))
-        return _runner(_strain, energy.stencils, (Dm_inverse, areas, *lame))
-    if type(energy) is BendHinge:
-        constants = (energy.stiffness.astype(np.float32), energy.rest_angles.astype(np.float32))
-        return _runner(_bending, energy.stencils, constants)
-    if type(energy) is Gravity:
-        return _weighed(energy)
-    return None
+    make = KERNELS.get(type(energy))
+    return make(energy) if make else None
 
 
-def _weighed(energy: Gravity) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+def _membrane(energy: Any) -> Kernel:
+    Dm_inverse = energy.Dm_inverse.reshape(-1, 4).astype(np.float32)
+    areas = energy.areas.astype(np.float32)
+    lame = (np.float32(energy.lam), np.float32(energy.mu))
+    return _runner(_strain, energy.stencils, (Dm_inverse, areas, *lame))
+
+
+def _hinges(energy: Any) -> Kernel:
+    constants = (energy.stiffness.astype(np.float32), energy.rest_angles.astype(np.float32))
+    return _runner(_bending, energy.stencils, constants)
+
+
+def _weight(energy: Any) -> Kernel:
     weights = energy.weights.astype(np.float32)
     zero = np.float32(energy.weights.sum() * energy.origin_height)
 
@@ -62,7 +68,7 @@ def _weighed(energy: Gravity) -> Callable[[np.ndarray], tuple[np.ndarray, np.nda
     return run
 
 
-def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Any:
+def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Kernel:
     stencils = stencils.astype(np.int32)
 
     def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,6 +84,14 @@ def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> An
         return values.ravel()[:count], gradients.reshape(-1, vertices, 3)[:count]
 
     return run
+
+
+# Energies that have a kernel here, and what makes it. An energy without one is none the less trained.
+KERNELS: dict[type[Energy], Callable[[Any], Kernel]] = {
+    StretchStVK: _membrane,
+    BendHinge: _hinges,
+    Gravity: _weight,
+}
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")

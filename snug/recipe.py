@@ -8,6 +8,7 @@ heavy, so that a command can list recipes without loading torch.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
@@ -49,7 +50,8 @@ class Recipe:
         of each window; in between anchors walk with the cloth.
     mixed: frames of mixed motions (snug.motion_augmentation) for each frame of a training motion, up to
         20,000; not for what learns simulated vertices. mixed_turn [rad], mixed_lift: see there.
-    terms: energies in the loss; leaving one out is an ablation, and it is then never evaluated.
+    terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
+        snug.trainable_energies. Leaving one out is an ablation, and it is then never evaluated.
     material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
         (edges, hinges, uniform mass and squared contact of PBNS, see snug.baselines.springs; it has its own
         stiffness and margin of contact).
@@ -105,9 +107,7 @@ class Recipe:
         ):
             if getattr(self, option) not in allowed:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
-        unknown = [term for term in self.terms if term not in TERMS]
-        if unknown:
-            raise RecipeError(f"recipe option terms: unknown energy {unknown[0]!r}; known are {TERMS}")
+        self._demand_known(term for term in self.terms if term not in TERMS)
         if min(self.window, self.batch, self.window_stride, self.even) < 1:
             raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
         if "inertia" in self.terms and self.window < 3:
@@ -125,6 +125,18 @@ class Recipe:
         for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
+
+    @staticmethod
+    def _demand_known(terms: Iterable[str]) -> None:
+        """Raises RecipeError for what is no energy of the simulator that can be trained on."""
+        for term in terms:
+            from snug.trainable_energies import find_energy
+
+            try:
+                find_energy(term)
+            except ValueError as error:
+                here = ", ".join(TERMS)
+                raise RecipeError(f"recipe option terms: {error}; the recipes here have {here}") from error
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for a model file or run.json."""
