@@ -95,7 +95,7 @@ KERNELS: dict[type[Energy], Callable[[Any], Kernel]] = {
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
-def _arctan2(y, x):
+def _arctan2(y: np.float32, x: np.float32) -> np.float32:
     """In float32, without a branch; (0, 0) gives 0."""
     along, across = abs(x), abs(y)
     t = min(along, across) / (max(along, across) + np.float32(1e-37))
@@ -111,19 +111,26 @@ def _arctan2(y, x):
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _take(x, i, u, corner):
+def _take(x: np.ndarray, i: int, u: np.ndarray, corner: int) -> None:
     for j in range(3 * LANES):
         u[3 * LANES * corner + j] = x[i, j]
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _give(u, corner, gradient, i):
+def _give(u: np.ndarray, corner: int, gradient: np.ndarray, i: int) -> None:
     for j in range(3 * LANES):
         gradient[i, j] += u[3 * LANES * corner + j]
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _bending(x, hinges, stiffness, rest, values, gradients):
+def _bending(
+    x: np.ndarray,
+    hinges: np.ndarray,
+    stiffness: np.ndarray,
+    rest: np.ndarray,
+    values: np.ndarray,
+    gradients: np.ndarray,
+) -> None:
     """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, see bend_hinge._half."""
     L = LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
@@ -165,7 +172,16 @@ def _bending(x, hinges, stiffness, rest, values, gradients):
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
+def _strain(
+    x: np.ndarray,
+    faces: np.ndarray,
+    Dm_inverse: np.ndarray,
+    areas: np.ndarray,
+    lam: np.float32,
+    mu: np.float32,
+    values: np.ndarray,
+    gradients: np.ndarray,
+) -> None:
     """E = A (lambda/2 tr(G)^2 + mu tr(G^2)), dE/dx_a = A F S b_a, see stretch_stvk._gradient."""
     L = LANES
     u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)

@@ -213,7 +213,7 @@ def _samples(contact: ContactPenalty) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _byte_normals(positions, faces):
+def _byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     normals = np.empty(positions.shape, np.int8)
     for frame in range(len(positions)):
         normals[frame] = np.rint(np.float32(127.0) * vertex_normals(positions[frame], faces))
@@ -221,7 +221,9 @@ def _byte_normals(positions, faces):
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def _interpolated(faces, face, parts, vectors, c):
+def _interpolated(
+    faces: np.ndarray, face: np.integer, parts: np.ndarray, vectors: np.ndarray, c: int
+) -> np.float32:
     """Component c of what vectors (P, 3) of the body's vertices are at an anchor."""
     v, w = np.float32(parts[0]) / np.float32(PARTS), np.float32(parts[1]) / np.float32(PARTS)
     u = np.float32(1.0) - v - w
@@ -229,7 +231,17 @@ def _interpolated(faces, face, parts, vectors, c):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _planes(frames, rows, positions, normals, faces, anchor_faces, barycentric, out_points, out_normals):
+def _planes(
+    frames: np.ndarray,
+    rows: np.ndarray,
+    positions: np.ndarray,
+    normals: np.ndarray,
+    faces: np.ndarray,
+    anchor_faces: np.ndarray,
+    barycentric: np.ndarray,
+    out_points: np.ndarray,
+    out_normals: np.ndarray,
+) -> None:
     for n in range(len(frames)):
         x, m = positions[rows[n]], normals[rows[n]]
         anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
@@ -246,7 +258,16 @@ def _planes(frames, rows, positions, normals, faces, anchor_faces, barycentric, 
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def _above(x0, x1, x2, skin, m, faces, face, parts):
+def _above(
+    x0: np.float32,
+    x1: np.float32,
+    x2: np.float32,
+    skin: np.ndarray,
+    m: np.ndarray,
+    faces: np.ndarray,
+    face: np.uint32,
+    parts: np.ndarray,
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Height of a sample above its anchor's plane, times the length of the normal; and that normal."""
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
     whole = np.float32(1.0) / np.float32(PARTS)
@@ -264,9 +285,12 @@ def _above(x0, x1, x2, skin, m, faces, face, parts):
 # No assumption on NaN or infinity: the guard of training must see them.
 @numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
 def _energy(
-    x, stencils, weights, stiffness, margin, power, frames, rows, positions, normals, faces, adjacency,
-    centroids, homes, region, slack, walk, anchor_faces, barycentric, values, gradients,
-):  # fmt: skip
+    x: np.ndarray, stencils: np.ndarray, weights: np.ndarray, stiffness: np.ndarray, margin: np.float32,
+    power: int, frames: np.ndarray, rows: np.ndarray, positions: np.ndarray, normals: np.ndarray,
+    faces: np.ndarray, adjacency: np.ndarray, centroids: np.ndarray, homes: np.ndarray, region: np.float32,
+    slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
+    gradients: np.ndarray,
+) -> None:  # fmt: skip
     """k max(margin - d, 0)^power of each sample, summed: values (N,), and added up: gradients (N, V, 3).
 
     stencils, faces: uint32, for a signed index is first asked whether it counts from the end.

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from snug.body import Body
 from snug.remeshing import boundary_loops, corner_angles, remesh, triangle_areas
 from snug.tailoring import CutPlane, ImplicitSurface, cut_sheet, outlines
 
@@ -14,7 +15,7 @@ SMALLEST_ANGLE = 15.0  # [degrees]
 
 
 def mesh_garment(
-    body, surface: ImplicitSurface, cuts: list[CutPlane], vertices: int, clearance: float
+    body: Body, surface: ImplicitSurface, cuts: list[CutPlane], vertices: int, clearance: float
 ) -> tuple[Array, Index]:
     """The whole garment, positions (V,3) [m] and faces (F,3), of `vertices` vertices within 1 %.
 
@@ -59,7 +60,7 @@ def _mirrored(points: Array, faces: Index) -> tuple[Array, Index]:
     return whole, np.concatenate([faces, twin[faces][:, ::-1]])
 
 
-def _kept_off(body, points: Array, faces: Index, cuts: list[CutPlane], clearance: float) -> Array:
+def _kept_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], clearance: float) -> Array:
     """Points pushed outward, along their cuts, until no sample is nearer to the skin than `clearance`.
 
     Errors: ValueError if it cannot be met.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
+from snug.body import Body
 from snug.garment_mesh import mesh_garment
 from snug.remeshing import boundary_loops
 from snug.tailoring import TORSO_BONES, CutPlane, ImplicitSurface, build_surface, dominated_by, joint
@@ -56,7 +57,7 @@ class Garment:
         """Vertices (n,) of the hem, in order."""
         return self.loops["hem"]
 
-    def body_transported(self, body, poses: Array, translations: Array) -> Array:
+    def body_transported(self, body: Body, poses: Array, translations: Array) -> Array:
         """Where the pins are (T,P,3) [m] on the body in poses (T,24,3) [rad] at translations (T,3) [m]."""
         if not len(self.pins):
             return np.empty((len(poses), 0, 3))  # and torch, which poses the joints, is not loaded
@@ -65,7 +66,7 @@ class Garment:
         turned = np.einsum("tpab,pb->tpa", blended[..., :3], self.rest_positions[self.pins])
         return turned + blended[..., 3]
 
-    def rest_for(self, body, betas: ArrayLike | None) -> Array:
+    def rest_for(self, body: Body, betas: ArrayLike | None) -> Array:
         """Rest positions (V,3) [m] on the body of shape `betas`: each vertex moves as the skin below it does.
 
         The displacement of the nearest body vertex, smoothed over the garment.
@@ -100,14 +101,14 @@ def _adjacency(faces: Index, count: int) -> csr_array:
     return coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count)).tocsr()
 
 
-def nearest_body_vertices(body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
+def nearest_body_vertices(body: Body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
     """Nearest template vertex (V,), of those that follow one of `bones`, to each position (V,3) [m]."""
     allowed = np.flatnonzero(dominated_by(body, bones))
     return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
 
 
 def tailor_tshirt(
-    body,
+    body: Body,
     *,
     vertices: int = 1000,
     ease: float = 0.06,
@@ -127,7 +128,7 @@ def tailor_tshirt(
 
 
 def tailor_tunic(
-    body,
+    body: Body,
     *,
     vertices: int = 1000,
     ease: float = 0.06,
@@ -145,7 +146,7 @@ def tailor_tunic(
 
 
 def tailor_skirt(
-    body,
+    body: Body,
     *,
     vertices: int = 1000,
     ease: float = 0.04,
@@ -220,7 +221,7 @@ def _demand_in_range(name: str, parameters: Mapping[str, float]) -> None:
             )
 
 
-def _shirt(name: str, body, vertices: int, cut: Mapping[str, float]) -> Garment:
+def _shirt(name: str, body: Body, vertices: int, cut: Mapping[str, float]) -> Garment:
     """A garment with two sleeves, a neck and a hem."""
     _demand_in_range(name, {"vertices": vertices, **cut})
     shoulder, elbow = joint(body, "left_shoulder"), joint(body, "left_elbow")
@@ -242,8 +243,8 @@ def _shirt(name: str, body, vertices: int, cut: Mapping[str, float]) -> Garment:
 
 
 def _tailored(
-    name: str, body, vertices: int, cut: Mapping[str, float], surface: ImplicitSurface, cuts: list[CutPlane],
-    bones: Sequence[str], smoothing: int = 0,
+    name: str, body: Body, vertices: int, cut: Mapping[str, float], surface: ImplicitSurface,
+    cuts: list[CutPlane], bones: Sequence[str], smoothing: int = 0,
 ) -> Garment:  # fmt: skip
     """The garment sewn from a surface and its cuts, whose weights come from those bones, smoothed."""
     try:

@@ -41,7 +41,7 @@ from snug.baselines.springs import SquaredContact, spring_terms
 from snug.batched_kernels import KERNELS, batched_kernel
 from snug.device import CPU
 from snug.recipe import TERMS, Recipe
-from snug.trainable_energies import make_energy
+from snug.trainable_energies import find_energy
 
 STATIC = ("strain", "bending", "gravity")
 Planes = tuple[Any, Any] | Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -60,7 +60,7 @@ def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
     """
     of_material = dict(zip(STATIC, MATERIALS[recipe.material](cloth)))
     terms = {name: of_material[name] for name in STATIC if name in recipe.terms}
-    return terms | {name: make_energy(name, cloth) for name in recipe.terms if name not in TERMS}
+    return terms | {name: find_energy(name)(cloth) for name in recipe.terms if name not in TERMS}
 
 
 def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:

@@ -30,7 +30,19 @@ def triangle_adjacency(faces: np.ndarray) -> np.ndarray:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def walk_to_foot(x0, x1, x2, face, skin, faces, adjacency, centroids, home, reach, corners):
+def walk_to_foot(
+    x0: np.float32,
+    x1: np.float32,
+    x2: np.float32,
+    face: np.uint32,
+    skin: np.ndarray,
+    faces: np.ndarray,
+    adjacency: np.ndarray,
+    centroids: np.ndarray,
+    home: np.ndarray,
+    reach: np.float32,
+    corners: np.ndarray,
+) -> tuple[np.uint32, np.float32, np.float32]:
     """Face, and weights of its second and third corner, where an anchor comes to rest for a sample at x.
 
     centroids (Q, 3) and home (3,) [m] at rest, reach [m^2]: the rule of regions, squared. corners (1, 3, 3):

@@ -15,6 +15,7 @@ e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. On
 the other half is its mirror image, so the garment is exactly symmetric.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,9 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from snug.body import Body
 from snug.remeshing import boundary_loops
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
 DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
@@ -33,13 +36,13 @@ TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", 
 ARM_BONES = ("left_shoulder", "left_elbow")
 
 
-def dominated_by(body, names) -> NDArray[np.bool_]:
+def dominated_by(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
     """Which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
     wanted = [body.joint_names.index(name) for name in names]
     return np.isin(np.argmax(body.skinning_weights, axis=1), wanted)
 
 
-def joint(body, name) -> Array:
+def joint(body: Body, name: str) -> Array:
     """Rest position (3,) [m] of the joint called `name`."""
     return np.asarray(body.joint_template, dtype=np.float64)[body.joint_names.index(name)]
 
@@ -83,9 +86,7 @@ def _smooth_minimum(a: Array, b: Array, reach: float) -> Array:
     return np.minimum(a, b) - overlap * overlap / (4.0 * reach)
 
 
-def _section_support(
-    points: Array, edges: NDArray[np.int64], levels: Array, axis: int, normals: Array
-) -> Array:
+def _section_support(points: Array, edges: Index, levels: Array, axis: int, normals: Array) -> Array:
     """Support function (L,K) of the body's sections at `levels` along `axis`; -inf where there is none."""
     others = [i for i in range(3) if i != axis]
     start, end = points[edges[:, 0]], points[edges[:, 1]]
@@ -120,7 +121,10 @@ def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
     return np.stack([(height - row).max(axis=1) - grown for row, grown in zip(support, growth, strict=True)])
 
 
-def _torso(body, edges, points, nodes, levels, ease, flare, clearance, normals) -> Array:
+def _torso(
+    body: Body, edges: Index, points: Array, nodes: Sequence[Array], levels: tuple[float, float, float],
+    ease: float, flare: float, clearance: float, normals: Array,
+) -> Array:  # fmt: skip
     """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m]."""
     x, y, z = nodes
     support = _filled(_section_support(points, edges, y, 1, normals))
@@ -140,7 +144,10 @@ def _torso(body, edges, points, nodes, levels, ease, flare, clearance, normals) 
     return np.maximum(field, (y - joint(body, "left_shoulder")[1])[None, :, None])
 
 
-def _sleeve(body, edges, points, nodes, cuff, ease, clearance, normals) -> Array:
+def _sleeve(
+    body: Body, edges: Index, points: Array, nodes: Sequence[Array], cuff: float, ease: float,
+    clearance: float, normals: Array,
+) -> Array:  # fmt: skip
     """Field (nx,ny,nz) of the left sleeve."""
     x, y, z = nodes
     shoulder = joint(body, "left_shoulder")[0]
@@ -153,7 +160,7 @@ def _sleeve(body, edges, points, nodes, cuff, ease, clearance, normals) -> Array
 
 
 def build_surface(
-    body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
+    body: Body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
     flare: float = 0.0,
 ) -> ImplicitSurface:  # fmt: skip
     """The surface between heights `hem` and `top`, of a shirt out to x = `cuff`, else of a skirt (all [m]).
@@ -189,7 +196,7 @@ def build_surface(
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
     hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals)
-    if not skirt:
+    if cuff is not None:
         sleeve = _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals)
         hanging = _smooth_minimum(hanging, sleeve, ARMPIT_FILLET)
     values = np.minimum(hanging, distance - clearance)  # a blend would add girth wherever both agree
@@ -235,7 +242,7 @@ class CutPlane:
         return slope
 
 
-def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, NDArray[np.int64]]:
+def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, Index]:
     """The surface as a dense mesh between the cuts: points (N,3) [m], faces (M,3), wound outward."""
     import pyvista
 
@@ -264,7 +271,7 @@ def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, ND
     return points, faces
 
 
-def outlines(points: Array, faces: NDArray[np.int64], cuts: list[CutPlane]) -> list[list[tuple[str, Array]]]:
+def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tuple[str, Array]]]:
     """Per boundary loop of a cut sheet its named curves (P,3) [m], end to end along the winding.
 
     Errors: ValueError where the surface is open but no cut was made.

@@ -8,20 +8,16 @@ by its definition in torch and automatic gradients.
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 
 from reference_sim import energies
-from reference_sim.cloth import Cloth
 from reference_sim.energies import Energy
 
 
-def make_energy(name: str, cloth: Cloth) -> Energy:
-    """The energy of that name for this rest state, its options at their defaults. Raises ValueError."""
-    return find_energy(name)(cloth)
+def find_energy(name: str) -> Callable[..., Energy]:
+    """What makes the energy of that name from a Cloth, its options at their defaults.
 
-
-def find_energy(name: str) -> type[Energy]:
-    """The class whose `name` it is. Raises ValueError for an unknown name, and for what cannot be trained.
-
+    Raises ValueError for an unknown name, and for what cannot be trained.
     That is what is made of more than a cloth, what must be prepared for each step of a simulation (see
     Energy.prepare), and what finds its stencils anew as vertices move (Energy.dynamic).
     """
