@@ -201,7 +201,7 @@ class Trainer:
         if trusted and self.hidden_states:
             self.hidden_states.keep(batch.frames[:, -1], after, self.group)
         if self.contact and posed:
-            with self.clock.part("renewal"):
+            with self.clock.part("requery"):
                 self.contact.settle(frames, trusted=trusted)
                 if trusted:
                     self.contact.requery(frames, posed, x)
