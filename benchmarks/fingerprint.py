@@ -163,7 +163,7 @@ def _names_of(path: str) -> tuple[frozenset[str], dict[str, str]]:
     body = ast.parse((ROOT / path).read_text(encoding="utf-8")).body
     own = {alias.name for node in body if isinstance(node, ast.ImportFrom) for alias in node.names}
     for node in body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "HOME":
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "MODULE_OF":
             return frozenset(own), ast.literal_eval(node.value)
     return frozenset(own), {}
 

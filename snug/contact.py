@@ -15,11 +15,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numba
 import numpy as np
 
 from reference_sim.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
+from reference_sim.kernel_cache import njit
 from reference_sim.obstacle import DEFAULT_REGION, vertex_normals
 from snug.surface_walk import SLACK, triangle_adjacency, walk_to_foot
 
@@ -212,7 +212,7 @@ def _samples(contact: ContactPenalty) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return contact.stencils.astype(np.uint32), weights, stiffness, np.float32(contact.margin)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     normals = np.empty(positions.shape, np.int8)
     for frame in range(len(positions)):
@@ -220,7 +220,7 @@ def _byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return normals
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, inline="always", error_model="numpy")
 def _interpolated(
     faces: np.ndarray, face: np.integer, parts: np.ndarray, vectors: np.ndarray, c: int
 ) -> np.float32:
@@ -230,7 +230,7 @@ def _interpolated(
     return u * vectors[faces[face, 0], c] + v * vectors[faces[face, 1], c] + w * vectors[faces[face, 2], c]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _planes(
     frames: np.ndarray,
     rows: np.ndarray,
@@ -257,7 +257,7 @@ def _planes(
                 out_normals[n, s, c] /= length
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, inline="always", error_model="numpy")
 def _above(
     x0: np.float32,
     x1: np.float32,
@@ -283,7 +283,7 @@ def _above(
 
 
 # No assumption on NaN or infinity: the guard of training must see them.
-@numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
 def _energy(
     x: np.ndarray, stencils: np.ndarray, weights: np.ndarray, stiffness: np.ndarray, margin: np.float32,
     power: int, frames: np.ndarray, rows: np.ndarray, positions: np.ndarray, normals: np.ndarray,

@@ -8,9 +8,9 @@ of another limb, a thigh that comes up through the hem: that takes a search (snu
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from reference_sim.kernel_cache import njit
 from reference_sim.triangle import closest_on_triangle
 
 SLACK = 0.001  # m: beyond the margin, and still followed
@@ -29,7 +29,7 @@ def triangle_adjacency(faces: np.ndarray) -> np.ndarray:
     return adjacency.reshape(-1, 3)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def walk_to_foot(
     x0: np.float32,
     x1: np.float32,

@@ -1,6 +1,6 @@
 """Energies of the simulator as terms of the training loss, found by the name that each gives itself.
 
-Whatever stands in the registry `reference_sim.energies.HOME` can be named in `Recipe.terms`, if the rest
+Whatever stands in the registry `reference_sim.energies.MODULE_OF` can be named in `Recipe.terms`, if the rest
 state of the garment is all that it needs. No other list has to be edited: a term without a kernel is trained
 by its definition in torch and automatic gradients.
 """
@@ -21,7 +21,7 @@ def find_energy(name: str) -> Callable[..., Energy]:
     That is what is made of more than a cloth, what must be prepared for each step of a simulation (see
     Energy.prepare), and what finds its stencils anew as vertices move (Energy.dynamic).
     """
-    classes = [getattr(energies, home) for home in energies.HOME]
+    classes = [getattr(energies, class_name) for class_name in energies.MODULE_OF]
     terms = [term for term in classes if issubclass(term, Energy) and term is not Energy]
     named = [term for term in terms if term.name == name]
     if not named:

@@ -16,7 +16,7 @@ FILES = {
     "reference_sim/cloth.py": "class Cloth:\n    pass\n",
     "reference_sim/stretch.py": "K = 1.0\n",
     "reference_sim/bend.py": "K = 2.0\n",
-    "reference_sim/terms/__init__.py": "HOME = {'Stretch': 'stretch', 'Bend': 'bend'}\n",
+    "reference_sim/terms/__init__.py": "MODULE_OF = {'Stretch': 'stretch', 'Bend': 'bend'}\n",
     "reference_sim/terms/stretch.py": "class Stretch:\n    pass\n",
     "reference_sim/terms/bend.py": "class Bend:\n    pass\n",
     "snug/network.py": "import torch\n",

@@ -47,7 +47,7 @@ def own(tmp_path, monkeypatch):
     """A recipe with the user's term, whose file and whose line in the registry are there."""
     (tmp_path / "tether.py").write_text(SOURCE)
     monkeypatch.setattr(energies, "__path__", [*energies.__path__, str(tmp_path)])
-    monkeypatch.setitem(energies.HOME, "Tether", "tether")
+    monkeypatch.setitem(energies.MODULE_OF, "Tether", "tether")
     yield replace(PLAIN, name="tethered", terms=(*TERMS, "tether"))
     sys.modules.pop("reference_sim.energies.tether", None)
 

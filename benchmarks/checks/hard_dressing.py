@@ -56,7 +56,7 @@ def shirt(
     energies: list[Energy] = [StretchStVK(cloth), BendHinge(cloth)]
     energies += [Gravity(cloth, acceleration=gravity * GRAVITY), ContactPenalty(cloth)]
     left_behind = jump or turn
-    guess = x if left_behind else obstacle.carried(x, 1, cloth.rest_positions)
+    guess = x if left_behind else obstacle.transported(x, 1, cloth.rest_positions)
     return prepared(cloth, energies, dt, x, v, guess=guess, obstacle=obstacle, frame=1)
 
 

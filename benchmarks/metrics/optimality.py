@@ -116,7 +116,7 @@ def first_guess(
     if scene.obstacle is None:
         guess = previous + scene.dt * velocity
     else:
-        guess = scene.obstacle.carried(previous, frame, scene.cloth.rest_positions)
+        guess = scene.obstacle.transported(previous, frame, scene.cloth.rest_positions)
     pins = scene.cloth.pins
     guess[pins] = previous[pins] if scene.pin_positions is None else scene.pin_positions(frame)
     return np.ascontiguousarray(guess)
