@@ -18,8 +18,8 @@ from benchmarks.studies.hard_motion_cases import HARD_MOTIONS
 from benchmarks.studies.hard_motion_stage import HardStage, RollOut, Trained
 from benchmarks.wardrobe import open_wardrobe
 from reports import study_tables
-from snug.dresser import DressedBody
-from snug.motion import make_motion
+from snug.dressed_body import DressedBody
+from snug.motion_library import make_motion
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions, rotation_matrices
 from snug.train import untrained_model

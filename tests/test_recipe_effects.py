@@ -16,7 +16,7 @@ from benchmarks.recipe_trials import HELD_OUT, learned, steps_within
 from benchmarks.results import RunFolder
 from benchmarks.wardrobe import Wardrobe
 from reports.findings import recipes
-from snug.motion import TEST, TRAIN
+from snug.motion_library import TEST, TRAIN
 from snug.recipe import DEFAULT, PAPER, Recipe
 from snug.training_set import TrainingError
 

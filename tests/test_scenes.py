@@ -21,7 +21,7 @@ from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
 from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from snug.body import Body
-from snug.motion import make_motion
+from snug.motion_library import make_motion
 
 SMOKE = find_preset("smoke")
 TINY = dataclasses.replace(SMOKE, garment_vertices=300, frames=8)

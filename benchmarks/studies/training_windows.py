@@ -27,7 +27,7 @@ from .long_roll_outs import SUITE
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.trained_model import TrainedModel
     from snug.training_set import Batch
 
@@ -40,7 +40,7 @@ STRIDE = 18  # frames from one window that is looked at to the next: the searche
 
 def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     """Those of every network of the run that has a past and learned from the energies alone."""
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.trained_model import TrainedModel, find_kind
     from snug.training_set import TrainingError
 
