@@ -235,10 +235,11 @@ def test_absent_devices_are_one_line(capsys, tmp_path):
 @pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")
 def test_the_harness_hands_the_device_on(tmp_path):
     """An absent device is refused where the plan is made, and would be refused where training starts."""
-    from benchmarks.plan import Network
-    from benchmarks.run import check_device
     from benchmarks.training import train_network
     from benchmarks.wardrobe import Wardrobe
+
+    from benchmarks.plan import Network
+    from benchmarks.run import check_device
 
     dressed, motion = tube_dress(), swaying(12)
     wardrobe = Wardrobe(dressed.body, {"tshirt": dressed.garment}, {"sway": motion})

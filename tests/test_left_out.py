@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from meshes import patch
 
 from benchmarks.presets import find_preset
 from benchmarks.scenes import SMALL_SCENES, dressed_scene
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Inertia, StretchStVK
 

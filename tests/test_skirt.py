@@ -5,13 +5,13 @@ import dataclasses
 import igl
 import numpy as np
 import pytest
+from benchmarks.hem_dynamics import held_simulation
+from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from meshes import edge_counts, girth
 
-from benchmarks.hem_dynamics import held_simulation
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.scenes import dressed_scene
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from snug.body import Body
 from snug.dressed_body import DressedBody
 from snug.garments import GarmentError, tailor_skirt, tailor_tshirt
