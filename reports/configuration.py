@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import Any
 
-from benchmarks.results import Row
+import pandas as pd
+
 from reports.numbers import duration, number
 
 _FIRST = (
@@ -14,14 +15,25 @@ _FIRST = (
 )  # fmt: skip
 
 
-def configuration(config: dict[str, Any], rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Groups {"title", "pairs": [[name, value], ...]}, all of run.json, whatever it holds."""
+# What the rows mean, not how they were made: the tables say it.
+_DECLARED = ("metrics", "scenes_declared", "cases")
+
+
+def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Groups {"title", "pairs": [[name, value], ...]}, all of run.json, whatever it holds.
+
+    Of the scenes and methods that are declared in full, the names alone.
+    """
+    config = {name: value for name, value in config.items() if name not in _DECLARED}
+    for name in ("scenes", "methods"):
+        if isinstance(config.get(name), dict):
+            config[name] = list(config[name])
     said = {name: config[name] for name in _FIRST if config.get(name) not in (None, [], "")}
     run = [[_title(name), _text(value)] for name, value in said.items() if not isinstance(value, dict)]
     wall = _wall_seconds(config)
     run += [["Wall time", duration(wall)]] if wall is not None else []
     for name in ("dtype", "threads", "hardware"):
-        values = sorted({str(getattr(row, name)) for row in rows if getattr(row, name) not in ("", None)})
+        values = sorted(set(frame[name].astype(str)) - {""})
         if values and not (name == "hardware" and config.get("hardware")):
             run.append([f"{_title(name)} of the rows", ", ".join(values)])
     groups: list[dict[str, Any]] = [{"title": "Run", "pairs": run}]
@@ -82,7 +94,7 @@ def moment(text: Any) -> datetime | None:
         return None
 
 
-def _wall_seconds(config: dict[str, Any]) -> float | None:
+def _wall_seconds(config: Mapping[str, Any]) -> float | None:
     start, end = moment(config.get("started")), moment(config.get("finished"))
     if start is None or end is None or (start.tzinfo is None) != (end.tzinfo is None):
         return None

@@ -1,0 +1,146 @@
+"""Means over scenes and seeds of the rows of a run.
+
+Only finite values of cells that ended ok, or stalled at some frames, enter a mean; a mean says when one
+of its cells stalled. Nothing is filled in for a cell that failed.
+The mean is first taken over the scenes of one seed, then over seeds; the spread is the standard
+deviation over seeds (n - 1), absent for a single seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import pandas as pd
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean of a metric, its spread over seeds, and what went into it.
+
+    `complete` says that every seed has every scene in which anybody has the metric; otherwise the mean is over
+    fewer cells than its neighbours in a table, and the table must say so. `stalled` says that a solver left
+    some frames of some cell unconverged, `seeded` that another seed would give another value. `by_seed`: the
+    mean over scenes of each seed. `lost`: seeds of which nothing usable is left, as of a network that
+    diverged. `pairing_group`: means of one group begin with the same draws at equal seeds; empty for none.
+    """
+
+    value: float
+    spread: float | None
+    scenes: int
+    seeds: int
+    complete: bool
+    stalled: bool = False
+    seeded: bool = True
+    by_seed: Mapping[int, float] = field(default_factory=dict, compare=False)
+    lost: int = 0
+    pairing_group: str = field(default="", compare=False)
+
+    @property
+    def fewer(self) -> str:
+        """Words behind a number or verdict: over how many scenes or seeds, where these are not all."""
+        if self.lost:
+            return f" ({self.seeds} of {self.seeds + self.lost} seeds)"
+        return "" if self.complete else f" ({self.scenes} {'scene' if self.scenes == 1 else 'scenes'} only)"
+
+
+def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
+    """A Mean for each group of the usable rows, by keys such as ("garment", "method", "metric").
+
+    The keys hold "method" and "metric". In the order of the rows.
+    """
+    own = list(keys)
+    places, cells = ([key for key in own if key != name] for name in ("method", "metric"))
+    tried = frame[frame["status"] != "skipped"]
+    asked = tried.groupby(places)["scene"].nunique()
+    failed = tried[~tried["usable"]].groupby(cells)["seed"].agg(set)
+    usable = frame[frame["usable"]]
+    seeds = usable.groupby([*own, "seed"], sort=False)["value"].agg(["mean", "count"])
+    by_seed: dict[tuple, dict[int, float]] = {}
+    for key, value in seeds["mean"].items():
+        assert isinstance(key, tuple)
+        by_seed.setdefault(key[:-1], {})[int(key[-1])] = float(value)
+    across = seeds.groupby(own, sort=False).agg(
+        value=("mean", "mean"), spread=("mean", "std"), fewest=("count", "min")
+    )
+    about = usable.assign(stalled=usable["status"] == "stalled").groupby(own, sort=False)
+    across = across.join(
+        about.agg(
+            scenes=("scene", "nunique"),
+            stalled=("stalled", "any"),
+            seeded=("seeded", "any"),
+            pairing_group=("pairing_group", "first"),
+        )
+    )
+    found = {}
+    for line in across.itertuples():
+        group = dict(zip(own, line.Index))
+        values = by_seed[line.Index]
+        lost = failed.get(_key(group, cells), set()) - values.keys()
+        found[line.Index] = Mean(
+            value=float(line.value),
+            spread=None if pd.isna(line.spread) else float(line.spread),
+            scenes=int(line.scenes),
+            seeds=len(values),
+            complete=not lost and int(line.fewest) == int(asked[_key(group, places)]),
+            stalled=bool(line.stalled),
+            seeded=bool(line.seeded),
+            by_seed=values,
+            lost=len(lost),
+            pairing_group=str(line.pairing_group),
+        )
+    index = (
+        pd.MultiIndex.from_tuples(found, names=own)
+        if found
+        else pd.MultiIndex.from_arrays([[]] * len(own), names=own)
+    )
+    return pd.Series(list(found.values()), index=index, dtype=object)
+
+
+def _key(group: Mapping[str, str], names: Sequence[str]) -> tuple | str:
+    return group[names[0]] if len(names) == 1 else tuple(group[name] for name in names)
+
+
+def mean_of(
+    frame: pd.DataFrame, method: str, metric: str, scenes: Iterable[str] | None = None
+) -> Mean | None:
+    """The mean over the scenes (all by default) and seeds that have the metric, None if there are none."""
+    rows = frame if scenes is None else frame[frame["scene"].isin(list(scenes))]
+    rows = rows[(rows["metric"] == metric) | ~rows["usable"]]
+    return means(rows, "method", "metric").get((method, metric))
+
+
+def value_of(
+    frame: pd.DataFrame, method: str, metric: str, scenes: Iterable[str] | None = None
+) -> float | None:
+    """The mean alone, or None."""
+    mean = mean_of(frame, method, metric, scenes)
+    return None if mean is None else mean.value
+
+
+def shared_scenes(frame: pd.DataFrame, methods: Iterable[str], metric: str) -> list[str]:
+    """The scenes where each of the methods has the metric, with all of its seeds."""
+    rows = frame[frame["usable"] & (frame["metric"] == metric)]
+    kept = list(dict.fromkeys(frame["scene"]))
+    for method in methods:
+        own = rows[rows["method"] == method]
+        seeds = own.groupby("scene")["seed"].nunique()
+        full = set(seeds[seeds == own["seed"].nunique()].index)
+        kept = [scene for scene in kept if scene in full]
+    return kept
+
+
+def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean | None, Mean | None]:
+    """Both means over the scenes that the two methods share, None where they share none.
+
+    Where one of them was not measured at all, the other's mean is over its own scenes.
+    """
+    both = shared_scenes(frame, (one, other), metric)
+    first, second = (mean_of(frame, method, metric, both or None) for method in (one, other))
+    if first is None or second is None:
+        return first, second
+    if not both:
+        return None, None
+    asked = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
+    first, second = (replace(m, complete=len(both) == asked and not m.lost) for m in (first, second))
+    return first, second
