@@ -9,8 +9,6 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-from .results import CLIP
-
 if TYPE_CHECKING:
     import numpy as np
 
@@ -26,7 +24,7 @@ def clip(body: Body, motion: Motion, frames: int) -> Motion:
     sums = np.concatenate([[0.0], np.cumsum(speed)])
     steps = min(frames - 1, len(speed))
     start = int(np.argmax(sums[steps:] - sums[: len(sums) - steps]))
-    return dataclasses.replace(motion.cut(start, start + steps + 1), name=motion.name + CLIP)
+    return dataclasses.replace(motion.cut(start, start + steps + 1), name=f"{motion.name}@clip")
 
 
 def joint_speeds(body: Body, motion: Motion) -> np.ndarray:

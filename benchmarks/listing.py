@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from .meetings import default_suites
 from .method import MethodEntry
 from .methods import METHODS
 from .presets import PRESETS, find_preset
-from .results import CLIP
-from .scenes import SMALL_SCENES, WORN
-from .studies import STUDIES
+from .scenes import GARMENT_SCENES, SCENES
+from .selection import default_suites
 from .suites import SUITES
-from .suites.extremes import MAPS, REFUSALS, STEPS
-from .suites.validation import CHECKS
+from .validation.registry import CASES
 
 
 def listing() -> str:
@@ -21,26 +18,31 @@ def listing() -> str:
     from snug.motion import SWING_TEST, SWING_TRAIN, TEST, TRAIN
 
     dressed = [
-        (wear.prefix + name, f"a body in {wear.words}; unseen in training")
-        for wear in WORN
-        for name in (SWING_TEST if wear.swings else (*TEST, *SWING_TEST))
+        (scene.name, f"{scene.description}; unseen in training")
+        for scenes in GARMENT_SCENES
+        for scene in map(scenes.scene, SWING_TEST if scenes.dynamic else (*TEST, *SWING_TEST))
     ]
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),
         (
-            f"scenes; of a dressed body also its liveliest part, as {dressed[0][0]}{CLIP}",
-            [*((s.name, s.description) for s in SMALL_SCENES), *dressed],
+            f"scenes; of a dressed body also its liveliest part, as {dressed[0][0]}@clip",
+            [*((s.name, s.description) for s in SCENES), *dressed],
         ),
         (
             "methods, and the suites in which they take part without being named",
             ((m.name, f"{m.description} {_where(m)}") for m in METHODS),
         ),
         ("training motions", ((name, "") for name in TRAIN)),
-        ("training motions of garments that swing", ((name, "") for name in SWING_TRAIN)),
+        ("training motions of garments with dynamics", ((name, "") for name in SWING_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
-        ("validation checks", ((c.name, c.description) for c in CHECKS)),
-        ("extreme cases", [*((c.name, c.description) for c in (*STEPS, *REFUSALS)), *map(_map, MAPS)]),
-        ("studies", ((s.name, f"{s.suite}: {s.description}") for s in STUDIES)),
+        *(
+            (
+                f"cases of suite {suite.name}",
+                [(c.name, c.description) for c in CASES if c.suite == suite.name],
+            )
+            for suite in SUITES
+            if any(case.suite == suite.name for case in CASES)
+        ),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
 
@@ -48,11 +50,6 @@ def listing() -> str:
 def _where(method: MethodEntry) -> str:
     suites = default_suites(method.name, find_preset("quick"))
     return f"[{', '.join(suites)}]" if suites else "[when named]"
-
-
-def _map(name: str) -> tuple[str, str]:
-    cases = MAPS[name]
-    return f"{name}/*", f"{len(cases)} points over stiffness and time step, {cases[0].name} the first"
 
 
 def _section(title: str, rows: Iterable[tuple[str, str]]) -> str:

@@ -4,49 +4,80 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from reference_sim import Trajectory
 
     from .scene import BuiltScene, Scene
 
 
-class Method(Protocol):
-    """What a method does; one object serves one cell."""
+class Method:
+    """What the harness asks of a method; one object serves one cell. Derive from it, or write the same names.
+
+    No method takes times: the harness times the whole of run().
+    """
 
     def prepare(self, scene: BuiltScene) -> None:
         """Load, compile, warm up: all that a user pays once. Not timed."""
+        raise NotImplementedError
 
     def run(self) -> Trajectory:
         """The work, frame by frame. Timed. Failure is a status in the trajectory, not an exception."""
+        raise NotImplementedError
+
+    def quasi_static(self) -> Trajectory | None:
+        """Its answer to each frame's pose held still; None where that is the simulator's. Not timed."""
+        return None
+
+    def batch(self, copies: int) -> Callable[[], np.ndarray]:
+        """What computes so many bodies at once when called, (T, copies, V, 3) [m]; that call is timed.
+
+        Asked only of methods that are declared `batched`.
+        """
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
 class MethodEntry:
     """The declaration of a method: cheap to list. Its module is imported when a cell needs it.
 
+    label: its name for people. module: has make(*, models, seed, **options), which gives a Method.
     needs_body: whether it works on dressed scenes alone. trained: the kind of network it needs, if any.
     seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
     dtype: the numbers it computes with; trajectories and metrics are float64 in any case.
     needs_no_obstacle: whether it knows no contact. package: what it needs installed besides this project.
-    cut_short: whether it stops before the minimum on purpose, so that running out of iterations is its end.
+    truncated: whether it stops before the minimum on purpose, so that running out of iterations is its end.
+    batched: whether it computes many bodies at once. gives_first_frame: whether it computes frame 0 too; a
+    simulator is given it. conserving: whether conservation laws are asked of it. role, family, level, base,
+    pairing_group: see benchmarks.results.Row.
     """
 
     name: str
     description: str
     module: str
-    options: Mapping[str, Any] = field(default_factory=dict)
+    label: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     needs_body: bool = False
     trained: str | None = None
     seeded: bool = False
     dtype: str = "float64"
-    cut_short: bool = False
+    truncated: bool = False
     needs_no_obstacle: bool = False
     package: str | None = None
+    batched: bool = False
+    gives_first_frame: bool = False
+    conserving: bool = False
+    role: str = "baseline"
+    family: str = ""
+    level: float | None = None
+    base: str = ""
+    pairing_group: str = ""
 
     def skip(self, scene: Scene) -> str | None:
         """Why this method cannot do that scene, or None."""

@@ -10,7 +10,7 @@ class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
     frames: at most so many frames of each motion, at 30 per second; clip_frames: of its liveliest part.
-    steps: optimiser steps per kind of network, for ablations those of what they vary. further: whether the
+    steps: optimiser steps per kind of network, or per training. further: whether the
     ablations and further baselines of a suite take part without being named. settle_frames: frames from the
     T-pose into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along
     each side. gap_samples: frames of a trajectory at which suite speed solves the step again to know the gap
@@ -29,16 +29,16 @@ class Preset:
     steps: dict[str, int]
     sheet_cells: int
     sheet_frames: int
-    newton_cuts: tuple[int, ...]
+    iteration_budgets: tuple[int, ...]
     gap_samples: int
     repeats: int
     repeat_seconds: float
     cell_seconds: float
     further: bool = False
 
-    def steps_of(self, model: str) -> int:
-        """Optimiser steps of the network of that name; 0 for one that is not trained."""
-        return self.steps.get(model, self.steps.get(model.partition("-")[0], 0))
+    def steps_of(self, training: str, kind: str) -> int:
+        """Optimiser steps of that training of snug.recipe, by its kind; 0 for an untrained network."""
+        return self.steps.get(training, self.steps.get(kind, 0))
 
 
 PRESETS = (
@@ -51,10 +51,17 @@ PRESETS = (
         frames=20,
         clip_frames=10,
         settle_frames=12,
-        steps={"snug": 60, "supervised": 60, "pbns": 60, "santesteban2019": 10, "tailornet": 60},
+        steps={
+            "snug": 60,
+            "dynamic": 60,
+            "supervised": 60,
+            "pbns": 60,
+            "santesteban2019": 10,
+            "tailornet": 60,
+        },
         sheet_cells=6,
         sheet_frames=10,
-        newton_cuts=(1, 4),
+        iteration_budgets=(1, 4),
         gap_samples=3,
         repeats=2,
         repeat_seconds=0.5,
@@ -69,10 +76,17 @@ PRESETS = (
         frames=150,
         clip_frames=36,
         settle_frames=30,
-        steps={"snug": 5300, "supervised": 4000, "pbns": 6000, "santesteban2019": 1000, "tailornet": 4000},
+        steps={
+            "snug": 5300,
+            "dynamic": 5300,
+            "supervised": 4000,
+            "pbns": 6000,
+            "santesteban2019": 1000,
+            "tailornet": 4000,
+        },
         sheet_cells=14,
         sheet_frames=45,
-        newton_cuts=(1, 2, 4, 8),
+        iteration_budgets=(1, 2, 4, 8),
         gap_samples=4,
         repeats=3,
         repeat_seconds=1.5,
@@ -87,11 +101,13 @@ PRESETS = (
         frames=100_000,
         clip_frames=100_000,
         settle_frames=60,
-        steps=dict.fromkeys(("snug", "supervised", "pbns", "santesteban2019", "tailornet"), 60_000),
+        steps=dict.fromkeys(
+            ("snug", "dynamic", "supervised", "pbns", "santesteban2019", "tailornet"), 60_000
+        ),
         further=True,
         sheet_cells=30,
         sheet_frames=90,
-        newton_cuts=(1, 2, 4, 8),
+        iteration_budgets=(1, 2, 4, 8),
         gap_samples=20,
         repeats=3,
         repeat_seconds=120.0,

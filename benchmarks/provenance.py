@@ -9,8 +9,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+# For a reader; what a task depends on is found from the source: see benchmarks.source.
 PACKAGES = (
-    "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pyvista", "pyacvd",
+    "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis", "ipctk",
+    "pyvista", "pyacvd",
 )  # fmt: skip
 
 
@@ -81,5 +83,5 @@ def hardware_line(facts: dict[str, Any]) -> str:
 
 
 def versions() -> dict[str, str]:
-    """The installed version of each package that can move a number."""
+    """The installed version of each package that computes."""
     return {name: package_version(name) for name in PACKAGES}

@@ -16,13 +16,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-CLIP = "@clip"  # how the name of a scene ends that is part of a motion
-NOT_FALLING = "the error does not fall here"  # how the reason of such a row begins, see benchmarks.curves
+FORMAT = 2  # of run.json, results.csv and the cache; written into run.json
+OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
 
 COLUMNS = (
     "suite", "scene", "method", "seed", "metric", "unit", "value", "status", "reason", "expected",
-    "tolerance", "preset", "commit", "hardware", "dtype", "threads", "terms",
+    "tolerance", "preset", "commit", "hardware", "dtype", "threads", "terms", "garment", "motion", "part",
+    "family", "level", "role", "base", "seeded", "pairing_group",
+)  # fmt: skip
+ROLES = (
+    "reference", "reference-variant", "solver", "external", "warm-started", "network", "ablation", "baseline",
+    "bound", "",
 )  # fmt: skip
 
 
@@ -35,8 +40,14 @@ class Row:
     """One measured number: a (suite, scene, method, seed, metric) and what came out.
 
     `value`, `expected` and `tolerance` are None where absent (an empty cell in the file); a skipped
-    row has a reason and no value. `terms` names the energies of the scene, joined by "+". Raises
-    ResultsError for an unknown status, a non-finite value called ok, or a skip without a reason.
+    row has a reason and no value. `terms` names the energies of the scene, joined by "+".
+
+    Of the scene: garment and motion, and whether the motion is "whole" or a "clip"; empty without a body.
+    Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
+    that number; base, the method that it varies or starts from; seeded, whether another seed gives another
+    answer; pairing_group, shared by methods that begin with the same weights and draws when seeds are equal.
+
+    Raises ResultsError for an unknown status, a non-finite value called ok, or a skip without a reason.
     """
 
     suite: str
@@ -56,6 +67,15 @@ class Row:
     dtype: str = "float64"
     threads: int = 1
     terms: str = ""
+    garment: str = ""
+    motion: str = ""
+    part: str = ""
+    family: str = ""
+    level: float | None = None
+    role: str = ""
+    base: str = ""
+    seeded: bool = False
+    pairing_group: str = ""
 
     def __post_init__(self) -> None:
         label = f"{self.scene} x {self.method} / {self.metric}"
@@ -72,8 +92,9 @@ class Row:
         return self.status in ("ok", "skipped")
 
 
-_OPTIONAL_NUMBERS = ("value", "expected", "tolerance")
+_OPTIONAL_NUMBERS = ("value", "expected", "tolerance", "level")
 _WHOLE_NUMBERS = ("seed", "threads")
+_TRUTHS = {"true": True, "false": False}
 
 
 def row_to_cells(row: Row) -> dict[str, str]:
@@ -85,6 +106,8 @@ def row_to_cells(row: Row) -> dict[str, str]:
             cells[name] = ""
         elif name in _OPTIONAL_NUMBERS:
             cells[name] = repr(float(value))
+        elif isinstance(value, bool):
+            cells[name] = str(value).lower()
         else:
             cells[name] = " ".join(str(value).split())
     return cells
@@ -98,7 +121,9 @@ def cells_to_row(cells: dict[str, str]) -> Row:
             values[name] = float(cells[name]) if cells[name] else None
         for name in _WHOLE_NUMBERS:
             values[name] = int(cells[name])
-    except ValueError as error:
+        name = "seeded"
+        values[name] = _TRUTHS[cells[name]]
+    except (ValueError, KeyError) as error:
         raise ResultsError(f"column {name}: {error}") from None
     return Row(**values)
 
@@ -154,21 +179,21 @@ class RunFolder:
         return self.path / "trajectories"
 
     @property
-    def records(self) -> Path:
-        return self.path / "records"
+    def cache(self) -> Path:
+        return self.path / "cache"
 
     def relative(self, path: Path) -> str:
-        """The name of a file inside the folder, as records keep it."""
+        """The name of a file inside the folder, as the cache keeps it."""
         return path.relative_to(self.path).as_posix()
 
     def trajectory_path(self, scene: str, method: str, seed: int = 0) -> Path:
-        """trajectories/<scene>/<method>.vtkhdf; a slash, as in "dressed/walk", becomes a hyphen."""
+        """trajectories/<scene>/<method>.vtkhdf; a slash, as in "tshirt/walk", becomes a hyphen."""
         suffix = "" if seed == 0 else f"-seed{seed}"
         return self.trajectories / scene.replace("/", "-") / f"{method.replace('/', '-')}{suffix}.vtkhdf"
 
-    def held_path(self, scene: str, method: str, seed: int = 0) -> Path:
+    def quasi_static_path(self, scene: str, method: str, seed: int = 0) -> Path:
         """A method's answer to each frame held still, beside its trajectory."""
-        return self.trajectory_path(scene, f"{method}-held", seed)
+        return self.trajectory_path(scene, f"{method}-quasi-static", seed)
 
     def start_path(self, scene: str) -> Path:
         """The settled start (V,3) [m] of a dressed scene."""
@@ -198,6 +223,8 @@ class RunFolder:
             raise ResultsError(f"{self.config_path}: not readable as JSON ({error})") from None
         if not isinstance(config, dict):
             raise ResultsError(f"{self.config_path}: holds no JSON object")
+        if config.get("format") != FORMAT:
+            raise ResultsError(f"{self.config_path}: {OLD}")
         return config
 
     def write_rows(self, rows: Iterable[Row]) -> None:
@@ -219,6 +246,8 @@ class RunFolder:
         rows = []
         with stream:
             reader = csv.DictReader(stream)
+            if tuple(reader.fieldnames or ()) == COLUMNS[: COLUMNS.index("garment")]:
+                raise ResultsError(f"{self.rows_path}: {OLD}")
             if tuple(reader.fieldnames or ()) != COLUMNS:
                 raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
             for cells in reader:

@@ -1,77 +1,227 @@
-"""The rows of results.csv that a cell becomes."""
+"""From outcomes to the rows of results.csv."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from statistics import median
 from typing import Any
 
 from snug.recipe import learns_from_simulation
 
-from .cell import Outcome
-from .clock import SPREAD, median, spread
-from .methods import find_method
-from .named_metrics import MM, unit_of
+from .metrics import find_metric
+from .plan import Plan, network_of
 from .results import Row
+from .schedule import Schedule
+from .tasks.case import RunCase
+from .tasks.cell import UNBELIEVABLE, Cell
+from .tasks.task import Outcome, Task, TaskId
+from .validation.case import timed_out
+
+MS = 1e3
+SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
+GAP = "gap/relative"
+NOT_FALLING = "the error does not fall here"  # how the reason of a gap above that of a coarser method begins
+ROUND_OFF = 1e-6  # a gap below it counts as none: who is called lower there is chance
+
+Outcomes = Mapping[TaskId, Outcome]
 
 
-def model_costs(
-    name: str | None, trained: Mapping[str, Any] | None, data_seconds: float | None
-) -> dict[str, float]:
-    """cost/data, cost/setup, cost/train and cost/memory of a method that uses this network; nothing without
-    one.
-
-    trained: what its record says, of whatever version. data_seconds: None where nobody knows them any more;
-    then there is no cost/data.
-    """
-    if name is None or not trained:
-        return {}
-    data = data_seconds if learns_from_simulation(name) else 0.0
-    known = {} if data is None else {"cost/data": data}
-    costs = {"cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes"}
-    return known | {metric: trained[key] for metric, key in costs.items() if key in trained}
+def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
+    """The rows of everything that has an outcome; cells first, with remarks where an error does not fall."""
+    schedule = Schedule(plan)
+    cells = [row for cell in plan.cells for row in rows_of_cell(cell, schedule, outcomes)]
+    cases = [row for task in tasks if isinstance(task, RunCase) for row in _rows_of_case(task, outcomes)]
+    return [*remarked(cells), *cases]
 
 
-def clock_costs(outcome: Outcome) -> dict[str, float]:
-    """What clock and process give: cost/frame, cost/batch [ms], cost/spread [%], cost/peak [MB].
+def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator[Row]:
+    """The rows of a cell in each of its suites; a cell without metrics is one row with its reason."""
+    outcome = outcomes.get(("cell", cell.name))
+    if outcome is None:
+        return
+    measured = outcomes.get(("metrics", cell.name))
+    if outcome.files and measured is None:
+        return  # interrupted before it was measured
+    metrics: dict[str, float] = {}
+    status, reason = outcome.status, outcome.reason or outcome.remark
+    if outcome.files:
+        assert measured is not None
+        if measured.status == "skipped":
+            status, reason = "skipped", f"{outcome.remark}; no metrics of it are there".lstrip("; ")
+        elif measured.failed:
+            status, reason = "failed", f"metrics: {measured.reason}"
+        else:
+            costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
+            metrics = {**measured.result, **costs, **model_costs(cell, schedule, outcomes)}
+            reason = reason or remark
+    batch = outcomes.get(("batch", cell.name), Outcome())
+    if batch.reason.startswith(UNBELIEVABLE):  # it worked on behind the clock in its run too
+        status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
+    for suite in cell.suites:
+        yield from _rows(cell, suite, outcome, status, reason, metrics)
+
+
+def _rows(
+    cell: Cell, suite: str, outcome: Outcome, status: str, reason: str, metrics: Mapping[str, float]
+) -> Iterator[Row]:
+    scene, entry = cell.scene, cell.entry
+    base = Row(
+        suite=suite, scene=scene.name, method=cell.method, seed=cell.seed, metric="cost/frame", unit="ms",
+        status=status if status != "ok" else "failed", reason=reason, terms=outcome.result.get("terms", ""),
+        dtype=entry.dtype, commit=outcome.commit, garment=scene.garment, motion=scene.motion, part=scene.part,
+        family=entry.family or entry.name, level=entry.level, role=entry.role, base=entry.base,
+        seeded=entry.seeded, pairing_group=entry.pairing_group,
+    )  # fmt: skip
+    if not metrics:
+        yield base
+    for name, value in metrics.items():
+        metric, why, ended = find_metric(name), reason, status
+        if name == "cost/spread" and value > 100.0 * SPREAD:
+            why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
+        judged: dict[str, Any] = {}
+        if metric.reference_tolerance is not None and entry.role == "reference":
+            judged = {"expected": 0.0, "tolerance": metric.reference_tolerance}
+            if value > metric.reference_tolerance:
+                ended, why = "failed", f"{value:.3g} in a frame that claims to have converged"
+        if not math.isfinite(value):
+            why, ended = why or f"{name} is not finite", "failed" if status == "ok" else status
+        yield dataclasses.replace(
+            base, metric=name, unit=metric.unit, value=float(value) if math.isfinite(value) else None,
+            status=ended, reason=why, **judged,
+        )  # fmt: skip
+
+
+def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str, float], str]:
+    """What clock and process give: cost/frame, cost/batch [ms], cost/spread [%], cost/peak [MB]; and a remark
+    on what did not go well.
 
     A frame's time is the median of the repeats, each the time of the whole run over the frames computed.
     """
-    if not outcome.seconds:
+    first, remark = outcomes["cell", cell.name], ""
+    batch = outcomes.get(("batch", cell.name), Outcome("skipped"))
+    if batch.status not in ("ok", "skipped"):
+        remark = f"many at once: {batch.status}: {batch.reason}"
+    seconds = [first.result["seconds"]]
+    for number in range(1, repeats):
+        again = outcomes.get(("repeat", f"{cell.name}-{number}"), Outcome("skipped"))
+        if again.status == "ok":
+            seconds.append(again.result["seconds"])
+        elif again.status != "skipped":
+            remark = remark or f"repeat {number}: {again.status}: {again.reason}"
+    costs = {"cost/frame": MS * median(seconds) / first.result["frames"]}
+    if len(seconds) > 1:
+        costs["cost/spread"] = 100.0 * (max(seconds) - min(seconds)) / median(seconds)
+    if batch.status == "ok":
+        costs["cost/batch"] = MS * batch.result["seconds"]
+    costs["cost/peak"] = first.result["peak"]
+    return costs, remark
+
+
+def model_costs(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str, float]:
+    """cost/data, cost/setup, cost/train and cost/memory of the cell's network, where it has one."""
+    network, plan = network_of(cell), schedule.plan
+    trained = outcomes.get(schedule.network(network).id) if network else None
+    if network is None or trained is None or not trained.result:
         return {}
-    costs = {"cost/frame": MM * median(outcome.seconds) / outcome.frames}
-    if len(outcome.seconds) > 1:
-        costs["cost/spread"] = 100.0 * spread(outcome.seconds)
-    if outcome.batch_seconds is not None:
-        costs["cost/batch"] = MM * outcome.batch_seconds
-    if outcome.peak is not None:
-        costs["cost/peak"] = outcome.peak
-    return costs
+    names = {"cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes"}
+    costs = {metric: trained.result[name] for metric, name in names.items()}
+    if not learns_from_simulation(network.name):
+        return {"cost/data": 0.0} | costs
+    motions = plan.motions.train_of(network.garment)
+    data = [outcomes.get(schedule.data(motion, network.garment).id, Outcome()) for motion in motions]
+    return {"cost/data": sum(outcome.seconds for outcome in data)} | costs
 
 
-def rows_of(outcome: Outcome, metrics: Mapping[str, float]) -> list[Row]:
-    """The rows of a cell in each of its suites; a cell without metrics is one row with its reason."""
-    cell = outcome.cell
-    rows = []
-    for suite in cell.suites:
-        base = Row(
-            suite, cell.scene.name, cell.method, cell.seed, "cost/frame", "ms", None,
-            outcome.status if outcome.status != "ok" else "failed", outcome.reason,
-            terms=outcome.terms, dtype=find_method(cell.method).dtype, commit=outcome.commit,
-        )  # fmt: skip
-        if not metrics:
-            rows.append(base)
-        for metric, value in metrics.items():
-            finite = math.isfinite(value)
-            status = outcome.status if finite else ("failed" if outcome.status == "ok" else outcome.status)
-            reason = outcome.reason if finite else outcome.reason or f"{metric} is not finite"
-            if metric == "cost/spread" and value > 100.0 * SPREAD:
-                reason = reason or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
-            rows.append(
-                dataclasses.replace(
-                    base, metric=metric, unit=unit_of(metric), value=float(value) if finite else None,
-                    status=status, reason=reason,
-                )
-            )  # fmt: skip
-    return rows
+def _rows_of_case(task: RunCase, outcomes: Outcomes) -> Iterator[Row]:
+    """A case that died, or that hung, has a row too; one that --only leaves out has none."""
+    outcome = outcomes.get(task.id)
+    if outcome is None or outcome.status == "skipped":
+        return
+    died = not outcome.result
+    row = timed_out(task.case, outcome.reason, outcome.status) if died else Row(**outcome.result)
+    reason = "; ".join(filter(None, (row.reason, outcome.remark)))
+    yield dataclasses.replace(row, commit=outcome.commit, reason=reason)
+
+
+def remarked(rows: Iterable[Row]) -> list[Row]:
+    """The rows, with a reason at each gap above that of a coarser method of its family.
+
+    More iterations or sweeps, or a smaller tolerance, need not lower it: a step's gap is judged from the
+    method's own past, and cloth that folds otherwise has other minima. So a rise is no failure, but whoever
+    reads the curve has to know of it.
+    """
+    rows = list(rows)
+    groups: dict[tuple[str, str, int], list[Row]] = {}
+    for row in rows:
+        if row.metric == GAP and row.value is not None:
+            for family in _curves(row):
+                groups.setdefault((row.scene, family, row.seed), []).append(row)
+    remarks: dict[tuple[str, str, int, str], str] = {}
+    for (scene, _, seed), members in groups.items():
+        for method, remark in rises(members).items():
+            remarks.setdefault((scene, method, seed, GAP), remark)
+    return [
+        dataclasses.replace(row, reason=row.reason or remarks.get(place, ""))
+        if (place := (row.scene, row.method, row.seed, row.metric)) in remarks
+        else row
+        for row in rows
+    ]
+
+
+def _curves(row: Row) -> tuple[str, ...]:
+    """The curves along which it should fall: by its level, or as the reference among its tolerances."""
+    if row.role == "reference":
+        return ("simulation-tolerance",)
+    return (row.family,) if row.level is not None and row.family != "simulation-dt" else ()
+
+
+def rises(gaps: Iterable[Row]) -> dict[str, str]:
+    """For each method whose gap is above that of a coarser one of its family: a remark that says so."""
+    remarks: dict[str, str] = {}
+    lowest = ("", math.inf)
+    for row in sorted(gaps, key=_fineness):
+        assert row.value is not None
+        if row.value > max(lowest[1], ROUND_OFF):
+            remarks[row.method] = f"{NOT_FALLING}: {lowest[0]}, the coarser one, has a gap of {lowest[1]:.2g}"
+        if row.value < lowest[1]:
+            lowest = row.method, row.value
+    return remarks
+
+
+REFERENCE_TOLERANCE = 1e-6
+
+
+def _fineness(row: Row) -> float:
+    """Grows with the effort: with iterations, and as a tolerance falls."""
+    if row.role in ("reference", "reference-variant"):
+        return -(REFERENCE_TOLERANCE if row.level is None else row.level)
+    return row.level or 0.0
+
+
+def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
+    """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
+    metrics = {row.metric for row in rows if any(row.method == cell.method for cell in plan.cells)}
+    found = {}
+    for name in sorted(metrics):
+        try:
+            found[name] = _fields(find_metric(name), "name", "reference_tolerance")
+        except KeyError:
+            continue  # of a case, which describes itself
+    scenes = {
+        scene.name: _fields(scene, "name", "module", "sizes", "options", "metrics") for scene in plan.scenes
+    }
+    entries = {cell.method: cell.entry for cell in plan.cells}
+    words = ("label", "description", "role", "family", "level", "base", "seeded", "dtype")
+    methods = {name: {word: getattr(entry, word) for word in words} for name, entry in entries.items()}
+    cases = {
+        case.name: {"description": case.description, "suite": case.suite, "options": dict(case.options)}
+        for case in plan.cases
+    }
+    return {"metrics": found, "methods": methods, "scenes": scenes, "cases": cases}
+
+
+def _fields(entry: Any, *without: str) -> dict[str, Any]:
+    names = [field.name for field in dataclasses.fields(entry) if field.name not in without]
+    return {name: getattr(entry, name) for name in names}

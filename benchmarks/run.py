@@ -14,31 +14,22 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
-from .clock import one_thread
-from .meetings import MEETINGS
-from .plan import (
-    Motions,
-    OwnBody,
-    Plan,
-    PlanError,
-    choose_cells,
-    choose_motions,
-    choose_studies,
-    choose_suites,
-    names_no_motion,
-)
+from .cache import DEFAULT_ONLY, STATES
+from .plan import Motions, OwnBody, Plan, PlanError
 from .presets import PRESETS, find_preset
-from .records import DEFAULT_ONLY, STATES
+from .provenance import usable_cores
 from .results import ResultsError, RunFolder
-from .workers import worker_count
+from .selection import Request, choose, choose_motions, choose_suites, names_no_motion
+from .timing import one_thread
 
 PROGRAM = "benchmarks.run"
+WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 EXAMPLES = """examples:
   python -m benchmarks.run                                    the quick run: every suite's quick subset
   python -m benchmarks.run --preset smoke                     everything once, tiny, about 2 minutes
   python -m benchmarks.run --suite garments -o reports/runs/mine
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
-  python -m benchmarks.run --scenes 'dressed/*' --methods snug,skinning,simulation --seeds 0,1,2
+  python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2
   python -m benchmarks.run --motions clips/ --test-motions 01_01
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
@@ -103,7 +94,7 @@ def make_parser() -> argparse.ArgumentParser:
         "stale,missing; the finished is reused)")  # fmt: skip
     add("--fresh", action="store_true", help="reuse nothing from the folder")
     add("--workers", type=int, metavar="N",
-        help="processes side by side for ground truth, training, metrics and studies (default 2, or the "
+        help="processes side by side for ground truth, training, metrics and cases (default 2, or the "
         "cores there are); cells always run alone")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
     add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
@@ -126,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     if options.dry_run:
-        from .outlook import describe
+        from .dry_run import describe
 
         print(describe(plan))
         return 0
@@ -134,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         with held(plan.folder):
-            from .stages import execute
+            from .execution import execute
 
             return execute(plan)
     except HeldError as error:
@@ -153,38 +144,25 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     check_device(options.device)
     folder = choose_folder(options.out)
     only = choose_states(split(options.only), fresh=options.fresh)
-    workers = worker_count() if options.workers is None else options.workers
+    workers = min(WORKERS, usable_cores()) if options.workers is None else options.workers
     if workers < 1:
         raise PlanError(f"--workers {workers}: give a whole number, 1 or more")
-    scenes = split(options.scenes)
-    motions = Motions((), (), {})
+    scenes, methods = tuple(split(options.scenes)), tuple(split(options.methods))
+    motions = Motions()
     if options.motions or options.test_motions or not names_no_motion(scenes):
         motions = choose_motions(options.motions, split(options.test_motions), preset)
-    cells, checks, cases = choose_cells(
-        suites,
-        full=bool(options.suite),
-        preset=preset,
-        motions=motions,
-        scenes=scenes,
-        methods=split(options.methods),
-        seeds=seeds,
-    )
-    kept = [s for s in suites if s in MEETINGS and any(s in cell.suites for cell in cells)]
-    studies = choose_studies(suites, scenes, split(options.methods))
-    for suite, items in (("validation", checks), ("extremes", cases)):
-        kept += [suite] * bool(items or any(study.suite == suite for study in studies))
+    request = Request(
+        suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=scenes,
+        methods=methods, seeds=seeds,
+    )  # fmt: skip
+    cells, cases = choose(request)
+    asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
     return Plan(
         preset=preset,
-        suites=tuple(kept),
+        suites=tuple(suite for suite in suites if suite in asked),
         cells=cells,
-        checks=checks,
         cases=cases,
-        studies=studies,
-        train=motions.train,
-        test=motions.test,
-        swing_train=motions.swing_train,
-        swing_test=motions.swing_test,
-        files=motions.files,
+        motions=motions,
         body=choose_body(options.body),
         seeds=seeds,
         device=options.device,
@@ -202,7 +180,7 @@ def choose_body(path: str | None) -> OwnBody | None:
         return None
     from snug.body import Body
 
-    from .fingerprint import digest_of_file
+    from .source import digest_of_file
 
     Body.from_file(path)
     return OwnBody(Path(path), digest_of_file(Path(path)))
@@ -274,7 +252,7 @@ def _check_run(folder: Path) -> None:
     try:
         RunFolder(folder).read_config()
     except ResultsError as error:
-        raise PlanError(f"--out {error}; name another folder, or put that file right") from None
+        raise PlanError(f"--out {error}; name another folder") from None
 
 
 if __name__ == "__main__":

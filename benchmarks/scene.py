@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,43 +17,58 @@ if TYPE_CHECKING:
     from snug.garments import Garment
     from snug.motion import Motion
 
+    from .assets import Assets
     from .presets import Preset
-    from .wardrobe import Wardrobe
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
     """The declaration of a scene: cheap to list. Its module is imported when it is built.
 
-    `garment` names what a body wears in it; it then needs the wardrobe, and networks work on no other.
-    `obstacle` says that there is another thing to touch.
+    sizes: values of the preset that build() of the module takes as options; options: further ones.
+    garment: what a body wears in it; it then needs the assets, and networks work on no other. motion: its
+    name, and part, whether it is "whole" or a "clip". obstacle: whether there is another thing to touch.
+    metrics: names of the modules of benchmarks.metrics that are measured here; None for all that apply.
+    counterpart: another scene that metrics compare each method's roll-out with, by the same method.
     """
 
     name: str
     description: str
     module: str
+    sizes: tuple[str, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     garment: str = ""
+    motion: str = ""
+    part: str = ""
     obstacle: bool = False
+    metrics: tuple[str, ...] | None = None
+    counterpart: str = ""
 
     @property
     def dressed(self) -> bool:
         """Whether there is a body that wears a garment."""
         return bool(self.garment)
 
-    def build(self, preset: Preset, wardrobe: Wardrobe | None = None) -> BuiltScene:
-        """Make everything the scene declares. Deterministic. A dressed scene needs the wardrobe."""
-        if self.dressed and wardrobe is None:
-            raise ValueError(f"scene {self.name} needs a wardrobe: a body, a garment and the motion")
-        return importlib.import_module(self.module).build(self.name, preset, wardrobe)
+    def at(self, preset: Preset) -> Scene:
+        """The scene with the sizes of a preset among its options."""
+        sizes = {name: getattr(preset, name) for name in self.sizes}
+        return replace(self, sizes=(), options={**sizes, **self.options})
+
+    def build(self, assets: Assets | None = None) -> BuiltScene:
+        """Make everything the scene declares. Deterministic. A dressed scene needs the assets."""
+        if self.dressed and assets is None:
+            raise ValueError(f"scene {self.name} needs assets: a body, a garment and the motion")
+        return importlib.import_module(self.module).build(self, assets, **self.options)
 
 
 @dataclass(frozen=True)
 class Dressed:
-    """Who wears what and moves how: what a network may know of a scene."""
+    """Who wears what and moves how: what a network may know of a scene. betas: (S,) shape, or the mean."""
 
     body: Body
     garment: Garment
     motion: Motion
+    betas: np.ndarray | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

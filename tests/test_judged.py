@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks import judged
 from benchmarks.agenda import Agenda
-from benchmarks.check import run_check
 from benchmarks.outlook import describe
 from benchmarks.plan import Cell, Plan
 from benchmarks.presets import find_preset
@@ -18,8 +17,8 @@ from benchmarks.results import Row, RunFolder
 from benchmarks.scenes import dressed_scene
 from benchmarks.studies import STUDIES
 from benchmarks.study import Study
-from benchmarks.suites.extremes import CASES
-from benchmarks.suites.validation import CHECKS
+from benchmarks.validation.case import Case
+from benchmarks.validation.registry import CASES, KNOWN_ANSWERS, STRESS_TESTS
 from snug.recipe import DEFAULT
 
 
@@ -29,11 +28,11 @@ def test_a_check_is_computed_once_and_again_when_it_declares_something_else(tmp_
         seeds=(0,), device="cpu", folder=tmp_path, command="",
     )  # fmt: skip
     agenda, records = Agenda(plan), Records(RunFolder(tmp_path))
-    check, done = next(c for c in CHECKS if c.smoke), []
+    check, done = next(c for c in KNOWN_ANSWERS if c.smoke), []
 
     def run(item):
         done.append(item)
-        return run_check(item)
+        return item.run()
 
     first = judged.rows_of([check], run, agenda, records)
     assert judged.rows_of([check], run, agenda, records) == first and len(done) == 1
@@ -49,11 +48,11 @@ def test_a_check_that_is_kept_though_it_is_out_of_date_says_so(tmp_path):
         preset=find_preset("smoke"), suites=("validation",), cells=(), checks=(), cases=(), train=(), test=(),
         seeds=(0,), device="cpu", folder=tmp_path, command="",
     )  # fmt: skip
-    agenda, check = Agenda(plan), next(c for c in CHECKS if c.smoke)
-    judged.rows_of([check], run_check, agenda, Records(RunFolder(tmp_path)))
+    agenda, check = Agenda(plan), next(c for c in KNOWN_ANSWERS if c.smoke)
+    judged.rows_of([check], Case.run, agenda, Records(RunFolder(tmp_path)))
     finer = dataclasses.replace(check, tolerance=1e-30)
     only = Records(RunFolder(tmp_path), only=("missing",))
-    (row,) = judged.rows_of([finer], run_check, agenda, only)
+    (row,) = judged.rows_of([finer], Case.run, agenda, only)
     assert row.status == "ok" and row.reason == "kept though declared changed"
 
 
@@ -63,7 +62,7 @@ def test_every_check_and_case_has_an_identity_of_its_own(tmp_path):
         device="cpu", folder=tmp_path, command="",
     )  # fmt: skip
     agenda, records = Agenda(plan), Records(RunFolder(tmp_path))
-    works = [judged.work_of(item, agenda) for item in (*CHECKS, *CASES)]
+    works = [judged.work_of(item, agenda) for item in CASES]
     assert len({records.path(work) for work in works}) == len(works)
     assert all("reports/" not in path for work in works for path in work.code)
 
@@ -73,10 +72,10 @@ def test_a_case_depends_on_how_it_is_judged_and_on_the_body_that_it_reads_but_no
         preset=find_preset("smoke"), suites=(), cells=(), checks=(), cases=(), train=(), test=(), seeds=(0,),
         device="cpu", folder=Path(), command="",
     )  # fmt: skip
-    works = {case.name: judged.work_of(case, Agenda(plan)) for case in CASES}
+    works = {case.name: judged.work_of(case, Agenda(plan)) for case in STRESS_TESTS}
     for work in works.values():
-        assert {"benchmarks/suites/extremes.py", "benchmarks/checks/verdict.py"} < set(work.code)
-        assert "benchmarks/suites/extreme_cases.py" not in work.code
+        assert {f"benchmarks/validation/{name}.py" for name in ("case", "convergence_check")} < set(work.code)
+        assert "benchmarks/validation/stress_tests.py" not in work.code
     assert "snug/data/body.npz" in works["shirt_step"].inputs["files"]
     assert "files" not in works["twisted"].inputs
 

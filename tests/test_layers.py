@@ -30,10 +30,10 @@ LIGHT = (
     "benchmarks/method.py", "benchmarks/presets.py",
     "benchmarks/results.py", "benchmarks/provenance.py", "benchmarks/scenes/__init__.py",
     "benchmarks/methods/__init__.py", "benchmarks/suites/__init__.py", "benchmarks/suites/garments.py",
-    "benchmarks/suites/speed.py", "benchmarks/suites/validation.py", "benchmarks/suites/extremes.py",
-    "benchmarks/suites/extreme_cases.py", "benchmarks/guarded.py",
-    "benchmarks/check.py", "benchmarks/suites/validation_exact.py", "benchmarks/suites/validation_orders.py",
-    "benchmarks/suites/validation_references.py",
+    "benchmarks/suites/speed.py", "benchmarks/guarded.py",
+    "benchmarks/validation/case.py", "benchmarks/validation/registry.py", "benchmarks/validation/exact.py",
+    "benchmarks/validation/orders.py", "benchmarks/validation/references.py",
+    "benchmarks/validation/stress_tests.py", "benchmarks/validation/isolated.py",
 )  # fmt: skip
 HEAVY = ("torch", "vtk", "vtkmodules", "pyvista", "pandas", "igl", "numba", "matplotlib", "scipy", "skfem")
 

@@ -9,7 +9,6 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.checks.meshes import cylinder_patch, icosphere, right_grid, torus
 from benchmarks.curves import CURVES, remarked
 from benchmarks.methods import METHODS
 from benchmarks.metrics.curvature import (
@@ -29,6 +28,7 @@ from benchmarks.metrics.time_error import LADDER, time_errors
 from benchmarks.presets import find_preset
 from benchmarks.results import Row
 from benchmarks.scenes import hanging_sheet, sheet_on_sphere
+from benchmarks.validation.meshes import cylinder_patch, icosphere, right_grid, torus
 from reference_sim import Obstacle, Potential, minimise, simulate
 from reference_sim.energies import Inertia, Step
 

@@ -17,22 +17,22 @@ import pytest
 from faults import FAULTS, Fault
 from witnesses import WITNESSES
 
-from benchmarks.suites.validation import CHECKS
+from benchmarks.validation.registry import KNOWN_ANSWERS
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("reference_sim", "benchmarks")
 ENOUGH = 2  # checks that fail before the others are left out
 RUNNER = """
 import json, sys
-from benchmarks.suites.validation import CHECKS, run_check
+from benchmarks.validation.registry import KNOWN_ANSWERS
 names, enough = json.loads(sys.argv[1]), int(sys.argv[2])
 caught, ran = [], 0
-for check in CHECKS:
-    if check.name in names if names else check.smoke:
+for case in KNOWN_ANSWERS:
+    if case.name in names if names else case.smoke:
         ran += 1
-        row = run_check(check)
+        row = case.run()
         if row.status != "ok":
-            caught.append([check.name, row.reason])
+            caught.append([case.name, row.reason])
         if len(caught) == enough:
             break
 print(json.dumps([ran, caught]))
@@ -84,13 +84,13 @@ def test_a_fault_is_caught(fault, tmp_path):
 @pytest.mark.parametrize("title", WITNESSES)
 def test_a_check_fails_where_it_should(title, tmp_path):
     fault = next(fault for fault in FAULTS if fault.title == title)
-    _, caught = outcome(planted(fault, tmp_path), WITNESSES[title], len(CHECKS))
+    _, caught = outcome(planted(fault, tmp_path), WITNESSES[title], len(KNOWN_ANSWERS))
     assert {name for name, _ in caught} == set(WITNESSES[title])
 
 
 def test_every_judged_check_has_a_fault_that_it_notices():
     witnessed = [name for names in WITNESSES.values() for name in names]
-    assert sorted(witnessed) == sorted(check.name for check in CHECKS if check.tolerance is not None)
+    assert sorted(witnessed) == sorted(case.name for case in KNOWN_ANSWERS if case.tolerance is not None)
 
 
 @pytest.mark.parametrize("fault", [f for f in FAULTS if f.fast], ids=lambda fault: fault.title)

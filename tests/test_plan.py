@@ -10,7 +10,7 @@ import pytest
 from benchmarks import plan
 from benchmarks.plan import Motions, PlanError, choose_cells, choose_motions
 from benchmarks.presets import find_preset
-from benchmarks.suites import extremes
+from benchmarks.validation import stress_tests
 
 SMOKE = find_preset("smoke")
 
@@ -56,7 +56,7 @@ def test_patterns_choose_scenes_methods_checks_and_cases():
     found, checks, cases = cells(("speed", "validation", "extremes"), scenes=["*sheet*", "free_fall"])
     assert {cell.scene.name for cell in found} == {"hanging_sheet", "sheet_on_sphere", "free_fall"}
     assert [check.name for check in checks] == ["free_fall"]
-    assert cases == extremes.MAPS["map_sheet"]
+    assert cases == stress_tests.MAPS["map_sheet"]
     _, checks, cases = cells(("validation", "extremes"), methods=["sim*"])
     assert len(checks) >= 10 and len(cases) >= 8
 

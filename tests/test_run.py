@@ -16,7 +16,8 @@ from benchmarks import methods, run
 from benchmarks.methods import METHODS
 from benchmarks.plan import PlanError
 from benchmarks.results import RunFolder
-from benchmarks.suites import extremes, validation
+from benchmarks.validation.registry import KNOWN_ANSWERS
+from benchmarks.validation.stress_tests import MAPS, STEPS
 from reference_sim import Trajectory
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -70,8 +71,8 @@ def test_the_help_names_every_exit_status(capsys):
 def test_the_list_names_everything(capsys):
     assert run.main(["--list"]) == 0
     words = capsys.readouterr().out
-    names = [m.name for m in METHODS] + [c.name for c in validation.CHECKS]
-    names += [c.name for c in (*extremes.STEPS, *extremes.REFUSALS)] + [f"{name}/*" for name in extremes.MAPS]
+    names = [m.name for m in METHODS] + [c.name for c in KNOWN_ANSWERS]
+    names += [c.name for c in STEPS] + [f"{name}/*" for name in MAPS]
     for name in [*names, "dressed/", "garments", "paper", "walk"]:
         assert name in words
 

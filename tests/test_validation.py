@@ -1,39 +1,39 @@
-"""The validation suite: every check passes, and its own machinery judges as it should."""
+"""Known answers: every case passes, and a number is judged as it should be."""
 
 from __future__ import annotations
 
-import collections
 import dataclasses
 import math
 
 import pytest
 
-from benchmarks.check import Check
-from benchmarks.checks.slope import order
 from benchmarks.plan import Motions, choose_cells
 from benchmarks.presets import find_preset
-from benchmarks.suites.validation import CHECKS, run_check
+from benchmarks.validation.case import Case
+from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
 
 
-@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.name)
-def test_a_check_passes(check):
-    row = run_check(check)
+@pytest.mark.parametrize("case", KNOWN_ANSWERS, ids=lambda case: case.name)
+def test_a_known_answer_is_found(case):
+    row = case.run()
     assert row.status == "ok", row.reason
+    assert (row.suite, row.scene, row.method, row.metric) == ("validation", case.name, "simulation", "check")
 
 
 def test_there_are_enough_of_every_kind():
-    names = [check.name for check in CHECKS]
+    names = [case.name for case in CASES]
     assert len(set(names)) == len(names)
-    judged = [check for check in CHECKS if check.tolerance is not None]
+    judged = [case for case in KNOWN_ANSWERS if case.tolerance is not None]
     assert len(judged) >= 40
     assert sum(name.endswith("_order") for name in names) >= 9
-    assert all(check.reason for check in CHECKS)
+    assert all(case.reason for case in KNOWN_ANSWERS)
     # A number is judged against a number: declared, or solved by the check itself.
-    modules = collections.Counter(check.module for check in judged if check.expected is None)
-    assert set(modules) <= {"membrane", "few_masses", "statics", "clamped_stretch"}
+    modules = {case.module.rpartition(".")[2] for case in judged if case.expected is None}
+    assert modules <= {"membrane", "oscillators", "statics", "clamped_stretch"}
 
 
-def test_the_smallest_preset_runs_the_quick_ones_unless_a_check_is_named():
+def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
     def chosen(preset, scenes=()):
         nothing = Motions((), (), {})
         return choose_cells(
@@ -41,9 +41,9 @@ def test_the_smallest_preset_runs_the_quick_ones_unless_a_check_is_named():
             scenes=scenes, methods=(), seeds=(0,),
         )[1]  # fmt: skip
 
-    assert chosen("quick") == CHECKS
-    assert chosen("smoke") == tuple(check for check in CHECKS if check.smoke)
-    assert [check.name for check in chosen("smoke", ["slit_annulus_inner"])] == ["slit_annulus_inner"]
+    assert chosen("quick") == KNOWN_ANSWERS
+    assert chosen("smoke") == tuple(case for case in KNOWN_ANSWERS if case.smoke)
+    assert [case.name for case in chosen("smoke", ["slit_annulus_inner"])] == ["slit_annulus_inner"]
 
 
 @pytest.mark.parametrize(
@@ -61,22 +61,24 @@ def test_the_smallest_preset_runs_the_quick_ones_unless_a_check_is_named():
     ],
 )
 def test_how_a_number_is_judged(monkeypatch, found, expected, tolerance, status):
-    from benchmarks.checks import geometry
+    from benchmarks.validation import curvature
 
-    monkeypatch.setattr(geometry, "torus_order", lambda: found)
-    check = Check(
-        name="planted", description="", reason="planted", module="geometry", function="torus_order",
+    monkeypatch.setattr(curvature, "torus_order", lambda: found)
+    case = Case(
+        name="planted", description="", reason="planted", module=curvature.__name__, function="torus_order",
         expected=expected, tolerance=tolerance,
     )  # fmt: skip
-    row = run_check(check)
+    row = case.run()
     assert row.status == status and (status == "ok" or row.reason)
     assert row.tolerance == tolerance
     if isinstance(found, tuple):
         assert (row.value, row.expected) == found
-    broken = run_check(dataclasses.replace(check, function="nothing"))
+    broken = dataclasses.replace(case, function="nothing").run()
     assert broken.status == "failed" and "nothing" in broken.reason
 
 
 def test_order_is_the_slope():
-    assert order([4e-3, 1e-3, 2.5e-4], [1, 0.5, 0.25]) == pytest.approx(2)
-    assert math.isnan(order([1.0, 0.0], [1, 0.5])) and math.isnan(order([1.0, math.inf], [1, 0.5]))
+    assert fitted_order([4e-3, 1e-3, 2.5e-4], [1, 0.5, 0.25]) == pytest.approx(2)
+    assert math.isnan(fitted_order([1.0, 0.0], [1, 0.5])) and math.isnan(
+        fitted_order([1.0, math.inf], [1, 0.5])
+    )

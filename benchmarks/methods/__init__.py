@@ -1,70 +1,39 @@
-"""The visible tuple of methods: one line each. Nothing is imported until a cell needs it."""
+"""The visible tuple of methods. Nothing is imported until a cell needs it."""
 
 from __future__ import annotations
 
 from ..method import MethodEntry
-from .learned import LEARNED
+from .learned import LEARNED, network
 from .solvers import SOLVERS
-
-_SIMULATION = "benchmarks.methods.simulation"
-_NETWORKS = "benchmarks.methods.networks"
 
 METHODS = (
     MethodEntry(
         name="simulation",
+        label="Simulation",
         description="the reference: backward Euler minimised to tolerance 1e-6",
-        module=_SIMULATION,
+        module="benchmarks.methods.simulation",
+        role="reference",
+        conserving=True,
     ),
     MethodEntry(
         name="skinning",
+        label="Skinning alone",
         description="the garment follows the body's joints, nothing else: the free baseline",
         module="benchmarks.methods.skinning",
         needs_body=True,
         dtype="float32",
+        gives_first_frame=True,
+        conserving=True,
     ),
-    MethodEntry(
-        name="untrained",
-        description="the SNUG network with a random last layer (SNUG itself starts as skinning)",
-        module=_NETWORKS,
-        options={"kind": "untrained"},
-        needs_body=True,
-        dtype="float32",
-        trained="untrained",
-        seeded=True,
-    ),
-    MethodEntry(
-        name="snug",
-        description="recurrent network trained on the energies alone (Santesteban et al. 2022)",
-        module=_NETWORKS,
-        options={"kind": "snug"},
-        needs_body=True,
-        dtype="float32",
-        trained="snug",
-        seeded=True,
-    ),
-    MethodEntry(
-        name="supervised",
-        description="the SNUG network trained on simulated vertices instead",
-        module=_NETWORKS,
-        options={"kind": "supervised"},
-        needs_body=True,
-        dtype="float32",
-        trained="supervised",
-        seeded=True,
-    ),
-    MethodEntry(
-        name="pbns",
-        description="static pose-space deformation trained on the energies (Bertiche et al. 2021)",
-        module=_NETWORKS,
-        options={"kind": "pbns"},
-        needs_body=True,
-        dtype="float32",
-        trained="pbns",
-        seeded=True,
-    ),
+    network("untrained", "SNUG, untrained",
+            "the SNUG network with a random last layer (SNUG itself starts as skinning)",
+            role="baseline", conserving=False),
+    network("snug", "SNUG", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
+    network("supervised", "Supervised", "the SNUG network trained on simulated vertices instead"),
+    network("pbns", "PBNS", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
     *LEARNED,
     *SOLVERS,
-)
+)  # fmt: skip
 
 
 def find_method(name: str) -> MethodEntry:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,14 +9,15 @@ import numpy as np
 
 from reference_sim import Trajectory
 
+from ..method import Method
 from ..scene import BuiltScene
-from .networks import model_path
+from .network import model_path
 
 WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
 
 
 @dataclass
-class CleanedNetwork:
+class CleanedNetwork(Method):
     """A model read from its file, and the body that its garment is pushed out of.
 
     The posed body is ready before, as joint transforms are: whoever draws the body has it.
@@ -46,24 +46,21 @@ class CleanedNetwork:
         from snug.clean_up import MARGIN
 
         positions = np.empty((self.motion.frames, self.dressed.vertices, 3))
-        seconds = np.empty(self.motion.frames)
         for frame in range(self.motion.frames):
-            start = time.perf_counter()
             positions[frame] = self.clean(next(self.frames), frame)
-            seconds[frame] = time.perf_counter() - start
         finite = bool(np.isfinite(positions).all())
         return Trajectory(
             positions=positions,
             faces=np.asarray(self.dressed.garment.faces),
             times=np.arange(len(positions)) / self.motion.fps,
-            frame_seconds=seconds,
+            frame_seconds=np.full(len(positions), np.nan),
             status="ok" if finite else "diverged",
             reason="" if finite else "the network gave a position that is not finite",
             provenance={"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN},
             frame_fields={},
         )
 
-    def held(self) -> Trajectory:
+    def quasi_static(self) -> Trajectory:
         """What the network holds to be static, cleaned up as well. Never on the clock."""
         from snug.rollout import roll_out
 

@@ -1,48 +1,86 @@
-"""Methods that run when named: further baselines, ablations of SNUG, its swing, clean-up, the free bound."""
+"""Methods that run when named: further baselines, ablations of SNUG, its dynamics, clean-up, the bound."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from snug.recipe import ABLATIONS
 
 from ..method import MethodEntry
-from .solvers import hybrids
+from .solvers import warm_started
 
 
-def _network(name: str, description: str) -> MethodEntry:
+def network(name: str, label: str, description: str, **changes: Any) -> MethodEntry:
     """The entry of a network that snug.recipe.TRAININGS knows under the same name."""
-    return MethodEntry(
-        name=name,
-        description=description,
-        module="benchmarks.methods.networks",
-        options={"kind": name},
-        needs_body=True,
-        dtype="float32",
-        trained=name,
-        seeded=True,
-    )
+    fields: dict[str, Any] = {
+        "name": name,
+        "label": label,
+        "description": description,
+        "module": "benchmarks.methods.network",
+        "options": {"kind": name},
+        "needs_body": True,
+        "dtype": "float32",
+        "trained": name,
+        "seeded": True,
+        "batched": True,
+        "gives_first_frame": True,
+        "conserving": True,
+        "role": "network",
+        "pairing_group": name,
+    } | changes
+    return MethodEntry(**fields)
 
 
-def _cleaned(kind: str) -> MethodEntry:
+def _cleaned(kind: str, label: str) -> MethodEntry:
     """The entry of that network with the collision clean-up behind it."""
     words = f"{kind}, then vertices within 2 mm of the skin pushed out; both are timed"
-    return replace(_network(kind, words), name=f"{kind}+cleanup", module="benchmarks.methods.clean_up")
+    return replace(
+        network(kind, f"{label}, cleaned up", words), name=f"{kind}+cleanup",
+        module="benchmarks.methods.clean_up", batched=False, base=kind, pairing_group=kind,
+    )  # fmt: skip
 
+
+def _ablation(recipe: str) -> MethodEntry:
+    words = _LABELS.get(recipe, recipe.replace("-", " "))
+    return network(
+        f"snug-{recipe}", f"SNUG, {words}", f"ablation: SNUG, recipe {recipe}", role="ablation", base="snug",
+        pairing_group="snug",
+    )  # fmt: skip
+
+
+_LABELS = {
+    "no-noise": "first states of zero",
+    "noise-alone": "first states of noise, none remembered",
+    "window6": "windows of 6",
+    "window12": "windows of 12",
+    "springs": "springs instead of StVK",
+}
 
 LEARNED = (
-    _network("pbns-springs", "PBNS with its own mass-spring material instead of StVK"),
-    _network("santesteban2019", "fit by shape and one GRU of 1500, trained on simulated vertices"),
-    _network("tailornet", "low and high frequencies by static networks, trained on simulated vertices"),
-    _network("snug-dynamic", "SNUG that learns its swing from a simulation, the rest from the energies"),
-    _network("snug-paper", "SNUG by the paper's text, its closest points remembered"),
-    *(_network(f"snug-{recipe.name}", f"ablation: SNUG, recipe {recipe.name}") for recipe in ABLATIONS),
-    *hybrids("snug-dynamic", "lbfgs", "snug-dynamic"),
-    *map(_cleaned, ("snug", "pbns", "supervised", "santesteban2019", "tailornet")),
+    network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),
+    network("santesteban2019", "Santesteban 2019",
+            "fit by shape and one GRU of 1500, trained on simulated vertices"),
+    network("tailornet", "TailorNet",
+            "low and high frequencies by static networks, trained on simulated vertices"),
+    network("snug-dynamic", "SNUG, dynamic",
+            "SNUG that learns its dynamics from a simulation, the rest from the energies",
+            base="snug", pairing_group="snug"),
+    network("snug-paper", "SNUG, paper's text", "SNUG by the paper's text, its closest points remembered",
+            base="snug", pairing_group="snug"),
+    *(_ablation(recipe.name) for recipe in ABLATIONS),
+    *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
+    *(_cleaned(kind, label) for kind, label in (("snug", "SNUG"), ("pbns", "PBNS"),
+                                                ("supervised", "Supervised"),
+                                                ("santesteban2019", "Santesteban 2019"),
+                                                ("tailornet", "TailorNet"))),
     MethodEntry(
-        name="free-bound",
+        name="direct-optimisation",
+        label="Vertices optimised directly",
         description="no network: the vertices of a whole clip optimised directly, the least energy found",
-        module="benchmarks.methods.free_bound",
+        module="benchmarks.methods.direct_optimisation",
         needs_body=True,
+        gives_first_frame=True,
+        role="bound",
     ),
-)
+)  # fmt: skip

@@ -8,11 +8,12 @@ from typing import Any
 
 from reference_sim import Trajectory, simulate
 
+from ..method import Method
 from ..scene import BuiltScene
 
 
 @dataclass
-class Simulation:
+class Simulation(Method):
     """Steps minimised until the gradient is within tolerance, or stopped after `max_iterations` a step."""
 
     options: dict[str, Any]

@@ -6,19 +6,19 @@ skinning is all that tells them apart.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
 
 from reference_sim import Trajectory
 
+from ..method import Method
 from ..scene import BuiltScene
 
 WARM_UP = 10
 
 
-class Skinning:
+class Skinning(Method):
     """One linear blend a frame; joint transforms are ready before, as for the networks."""
 
     def prepare(self, scene: BuiltScene) -> None:
@@ -43,25 +43,21 @@ class Skinning:
 
         frames = self.motion.frames
         posed = np.empty((frames, *self.rest.shape))
-        seconds = np.empty(frames)
         with torch.inference_mode():
             for frame in range(frames):
-                start = time.perf_counter()
-                vertices = skin(self.rest, self.weights, self.transforms[frame])
-                seconds[frame] = time.perf_counter() - start
-                posed[frame] = vertices.numpy()
+                posed[frame] = skin(self.rest, self.weights, self.transforms[frame]).numpy()
         return Trajectory(
             positions=posed + self.pelvis[:, None],
             faces=self.faces,
             times=np.arange(frames) / self.motion.fps,
-            frame_seconds=seconds,
+            frame_seconds=np.full(frames, np.nan),
             status="ok",
             reason="",
             provenance={"method": "skinning"},
             frame_fields={},
         )
 
-    def held(self) -> Trajectory:
+    def quasi_static(self) -> Trajectory:
         """Its answer to poses held still: the same."""
         return self.run()
 

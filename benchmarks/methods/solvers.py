@@ -4,97 +4,132 @@ from __future__ import annotations
 
 from ..method import MethodEntry
 
-MOVED = "simulation-moved"
 _SIMULATION = "benchmarks.methods.simulation"
 _LBFGS = "benchmarks.methods.truncated_lbfgs"
 
 
-def _cut(name: str, unit: str, description: str, module: str, cuts: tuple[int, ...], **options) -> tuple:
-    """One entry for each number of iterations; cheap to list, as all of this file."""
+def _truncated(
+    family: str, label: str, unit: str, description: str, module: str, counts: tuple[int, ...], **options
+) -> tuple[MethodEntry, ...]:
+    """One entry for each number of iterations."""
     return tuple(
         MethodEntry(
-            name=f"{name}-{cut}",
-            description=description.format(f"{cut} {unit}{'s' * (cut > 1)}"),
+            name=f"{family}-{count}",
+            label=f"{label}, {_counted(count, unit)}",
+            description=description.format(_counted(count, unit)),
             module=module,
-            options={"iterations": cut, **options},
-            cut_short=True,
+            options={"iterations": count, **options},
+            truncated=True,
+            role="solver",
+            family=family,
+            level=count,
         )
-        for cut in cuts
+        for count in counts
     )
 
 
-def hybrids(guess: str, solver: str, trained: str | None) -> tuple[MethodEntry, ...]:
-    """A network or skinning, and some iterations from there."""
+def warm_started(
+    base: str, label: str, solver: str, *, trained: str | None, pairing_group: str = ""
+) -> tuple[MethodEntry, ...]:
+    """A network or skinning, and some iterations of "newton" or "lbfgs" from there."""
     return tuple(
         MethodEntry(
-            name=f"{guess}+{solver}-{cut}",
-            description=f"each step from {guess}'s frame by {cut} iteration{'s' * (cut > 1)} of {solver}",
-            module="benchmarks.methods.hybrids",
-            options={"guess": guess, "solver": solver, "iterations": cut},
+            name=f"{base}+{solver}-{count}",
+            label=f"{label} + {_LABELS[solver]}, {_counted(count, 'iteration')}",
+            description=f"each step from {base}'s frame by {_counted(count, 'iteration')} of {solver}",
+            module="benchmarks.methods.warm_started",
+            options={"guess": base, "solver": solver, "iterations": count},
             needs_body=True,
             trained=trained,
             seeded=trained is not None,
-            cut_short=True,
+            truncated=True,
+            role="warm-started",
+            family=f"{base}+{solver}",
+            level=count,
+            base=base,
+            pairing_group=pairing_group,
         )
-        for cut in (1, 2, 4, 8)
+        for count in (1, 2, 4, 8)
     )
 
+
+def _counted(count: int, unit: str) -> str:
+    return f"{count} {unit}{'s' * (count > 1)}"
+
+
+_LABELS = {"newton": "Newton", "lbfgs": "L-BFGS"}
 
 SOLVERS = (
     *(
         MethodEntry(
-            name=f"simulation-{tolerance:.0e}".replace("e-0", "e-"),
-            description=f"the reference, minimised to tolerance {tolerance:.0e}",
+            name=f"simulation-1e-{power}",
+            label=f"Simulation to 1e-{power}",
+            description=f"the reference, minimised to tolerance 1e-0{power}",
             module=_SIMULATION,
-            options={"tolerance": tolerance},
+            options={"tolerance": float(f"1e-{power}")},
+            role="reference-variant",
+            family="simulation-tolerance",
+            level=float(f"1e-{power}"),
         )
-        for tolerance in (1e-2, 1e-4, 1e-8)
+        for power in (2, 4, 8)
     ),
     *(
         MethodEntry(
             name=f"simulation-dt/{substeps}",
+            label=f"Simulation, step dt/{substeps}",
             description=f"the reference with {substeps} time steps a frame",
             module=_SIMULATION,
             options={"substeps": substeps},
+            role="reference-variant",
+            family="simulation-dt",
+            level=substeps,
         )
         for substeps in (2, 4, 8)
     ),
     MethodEntry(
-        name=MOVED,
-        description="the reference again, its start moved by 1e-9 m: the floor of vertex distances",
-        module="benchmarks.methods.restart",
+        name="simulation-perturbed",
+        label="Simulation, start moved",
+        description="the reference again, its start moved by 1e-9 m: how far two right answers lie apart",
+        module="benchmarks.methods.perturbed_start",
+        role="reference-variant",
+        family="simulation-perturbed",
     ),
-    *_cut(
-        "newton", "iteration", "Newton's method on the true Hessian, cut after {} a step",
+    *_truncated(
+        "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
         "benchmarks.methods.truncated_newton", (1, 2, 4, 8),
     ),
-    *_cut("lbfgs", "iteration", "L-BFGS, factored preconditioner, cut after {}", _LBFGS, (5, 10, 20, 40)),
-    *_cut(
-        "gradient-descent", "iteration", "preconditioned gradient descent, cut after {}", _LBFGS, (10, 40),
-        memory=0,
+    *_truncated(
+        "lbfgs", "L-BFGS", "iteration", "L-BFGS, factored preconditioner, stopped after {}", _LBFGS,
+        (5, 10, 20, 40),
     ),
-    *_cut(
-        "vbd", "sweep", "vertex block descent on our energies, {} a step",
+    *_truncated(
+        "gradient-descent", "Gradient descent", "iteration",
+        "preconditioned gradient descent, stopped after {}", _LBFGS, (10, 40), memory=0,
+    ),
+    *_truncated(
+        "vbd", "Vertex block descent", "sweep", "vertex block descent on our energies, {} a step",
         "benchmarks.methods.vertex_block_descent", (5, 20, 80),
     ),
-    *_cut(
-        "xpbd", "sweep", "position-based dynamics with our energies, {} a step",
+    *_truncated(
+        "xpbd", "XPBD", "sweep", "position-based dynamics with our energies, {} a step",
         "benchmarks.methods.xpbd", (10, 40, 160),
     ),
     *(
         MethodEntry(
             name=f"newton-{solver.lower()}",
+            label=f"newton's {solver}",
             description=f"newton's {solver} on its own energies, {iterations} x {substeps} a frame",
-            module="benchmarks.methods.peers",
+            module="benchmarks.methods.external_solvers",
             options={"solver": solver, "iterations": iterations, "substeps": substeps},
             dtype="float32",
             needs_no_obstacle=True,
             package="newton",
+            role="external",
         )
         for solver, iterations, substeps in (("VBD", 10, 20), ("XPBD", 1, 128))
     ),
-    *hybrids("skinning", "lbfgs", None),
-    *hybrids("skinning", "newton", None),
-    *hybrids("snug", "lbfgs", "snug"),
-    *hybrids("snug", "newton", "snug"),
+    *warm_started("skinning", "Skinning", "lbfgs", trained=None),
+    *warm_started("skinning", "Skinning", "newton", trained=None),
+    *warm_started("snug", "SNUG", "lbfgs", trained="snug", pairing_group="snug"),
+    *warm_started("snug", "SNUG", "newton", trained="snug", pairing_group="snug"),
 )  # fmt: skip

@@ -1,1 +1,45 @@
-"""What is measured of a trajectory. Curvature, distance and penetration know no energy."""
+"""The visible tuple of metrics: one module each. See benchmarks.metric for what a module holds."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+from functools import cache
+from types import ModuleType
+
+from ..metric import Metric
+
+MODULES = (
+    "energy",
+    "curvature",
+    "shape",
+    "geometry",
+    "optimality",
+    "exact",
+    "dynamics",
+    "conservation",
+    "time_error",
+    "cost",
+)
+
+
+@cache
+def modules() -> dict[str, ModuleType]:
+    """Name -> module, in the order of MODULES; loads them."""
+    return {name: importlib.import_module(f"{__name__}.{name}") for name in MODULES}
+
+
+@cache
+def declared() -> dict[str, Metric]:
+    """Name -> metric, of all modules."""
+    return {metric.name: metric for module in modules().values() for metric in module.METRICS}
+
+
+def find_metric(name: str) -> Metric:
+    """The declaration of a metric, also by a pattern such as "energy/*". Raises KeyError."""
+    metrics = declared()
+    if name in metrics:
+        return metrics[name]
+    family, _, last = name.rpartition("/")
+    metric = metrics[f"{family}/*"]
+    return replace(metric, name=name, title=metric.title.format(last.replace("_", " ").capitalize()))

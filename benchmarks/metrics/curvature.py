@@ -17,11 +17,54 @@ to where the wrinkles are, as vertex-by-vertex errors are not.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..metric import Metric
+
+if TYPE_CHECKING:
+    from ..metric import RollOut
+
 Floats = NDArray[np.float64]
+
+METRICS = (
+    Metric(
+        name="curvature/mean", unit="1/m", title="Mean curvature", table="curvature",
+        definition="magnitude of the mean curvature, mean over interior vertices by area and over frames",
+    ),
+    Metric(
+        name="curvature/error", unit="1/m", title="Mean-curvature error", table="curvature",
+        lower_is_better=True,
+        definition="|H - H_ref| of the same vertices and frames, mean by the reference's areas",
+    ),
+    Metric(
+        name="curvature/histogram", unit="1/m", title="Histogram", table="curvature", lower_is_better=True,
+        definition="Wasserstein-1 distance between the area-weighted distributions of H at the same frame",
+    ),
+    Metric(
+        name="curvature/mean_difference", unit="1/m", title="Difference of means", table="curvature",
+        definition="area-weighted mean of H less that of the reference",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    found = {"curvature/mean": float(roll_out.curvature.means().mean())}
+    if roll_out.reference is None:
+        return found
+    frames = min(len(roll_out.positions), len(roll_out.reference.positions))
+    ours, theirs = (series.first(frames) for series in (roll_out.curvature, roll_out.reference.curvature))
+    return found | {
+        "curvature/error": float(curvature_error(ours, theirs).mean()),
+        "curvature/histogram": float(histogram_distance(ours, theirs).mean()),
+        "curvature/mean_difference": float((ours.means() - theirs.means()).mean()),
+    }
+
+
+def series(roll_out: RollOut) -> dict[str, Floats]:
+    return {"curvature/mean": roll_out.curvature.means()}
 
 
 def boundary_mask(faces: NDArray[np.int64], vertices: int) -> NDArray[np.bool_]:
@@ -81,6 +124,10 @@ class CurvatureSeries:
     def means(self) -> Floats:
         """(T,) area-weighted mean over interior vertices [1/m]."""
         return _weighted(self.curvature, self.area)
+
+    def first(self, frames: int) -> CurvatureSeries:
+        """The series of the first frames."""
+        return CurvatureSeries(self.curvature[:frames], self.area[:frames])
 
 
 def curvature_series(positions: Floats, faces: NDArray[np.int64]) -> CurvatureSeries:

@@ -16,12 +16,35 @@ from numpy.typing import NDArray
 
 from reference_sim.energies.gravity import Gravity
 
+from ..metric import Metric
+
 if TYPE_CHECKING:
     from reference_sim.energies import Energy
 
+    from ..metric import RollOut
     from ..scene import BuiltScene
 
 FIRST_FULL_FRAME = 2
+
+
+def _energy(term: str, definition: str, title: str = "") -> Metric:
+    return Metric(
+        name=f"energy/{term}", unit="J", title=title or term.capitalize(), definition=definition,
+        table="energies", lower_is_better=True,
+    )  # fmt: skip
+
+
+METRICS = (
+    _energy("strain", "membrane energy of the declared material, mean over the frames with two before them"),
+    _energy("bending", "energy of the hinges, mean over frames"),
+    _energy("gravity", "weight times height above the pelvis's own height at rest, mean over frames"),
+    _energy("inertia", "sum of m / (2 dt^2) |x - 2 x' + x''|^2 over vertices, x' and x'' the method's "
+            "own last two frames; mean over frames"),
+    _energy("collision", "cubic penalty of vertices, edge midpoints and centroids nearer to the body than "
+            "the margin, contact planes searched at the method's own positions; mean over frames"),
+    _energy("total", "sum of all terms that the scene declares, and inertia"),
+    _energy("*", "energy of that term, mean over frames", "{}"),
+)  # fmt: skip
 
 
 def energy_series(
@@ -77,3 +100,11 @@ def _terms_at(
 def mean_energy(series: NDArray[np.float64]) -> float:
     """Mean over the frames that have two before them [J per frame]; over all, where there are only two."""
     return float(series[FIRST_FULL_FRAME:].mean() if len(series) > FIRST_FULL_FRAME else series.mean())
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    return {f"energy/{term}": mean_energy(series) for term, series in roll_out.energies.items()}
+
+
+def series(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
+    return {f"energy/{term}": series for term, series in roll_out.energies.items()}

@@ -9,10 +9,96 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..metric import Metric
+
 if TYPE_CHECKING:
     from reference_sim import Obstacle
 
+    from ..metric import RollOut
+
 Floats = NDArray[np.float64]
+
+MM = 1e3
+DEEP = 5e-3  # [m] below the skin: what an eye sees
+
+METRICS = (
+    Metric(
+        name="distance/rms", unit="mm", title="Distance", table="penetration", lower_is_better=True,
+        definition="root mean square distance between the same vertices of method and simulation",
+    ),
+    Metric(
+        name="distance/p95", unit="mm", title="95 %", table="penetration", lower_is_better=True,
+        definition="95 % of these distances are smaller",
+    ),
+    Metric(
+        name="distance/sensitivity", unit="mm", title="Sensitivity", table="penetration",
+        definition="distance between the simulation and the same from a start moved by 1e-9 m: cloth that "
+        "wrinkles has several minima, and no distance below this one means anything",
+    ),
+    Metric(
+        name="penetration/vertices", unit="%", title="Below the skin", table="penetration",
+        lower_is_better=True, definition="vertices inside the body, none left out, mean over frames",
+    ),
+    Metric(
+        name="penetration/deep", unit="%", title="Deep", table="penetration", lower_is_better=True,
+        definition="vertices more than 5 mm inside the body",
+    ),
+    Metric(
+        name="penetration/depth_p99", unit="mm", title="Depth, 99 %", lower_is_better=True,
+        definition="99 % of all vertices and frames are less deep; 0 outside",
+    ),
+    Metric(
+        name="penetration/own_part_p999", unit="mm", title="Own part", table="penetration",
+        lower_is_better=True,
+        definition="99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold of a "
+        "hip does not count",
+    ),
+    Metric(
+        name="drift/hem", unit="mm", title="Hem drift", table="penetration",
+        definition="how far the hem's mean height above the pelvis has risen from first to last frame",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    return _distances(roll_out) | _depths(roll_out)
+
+
+def _distances(roll_out: RollOut) -> dict[str, float]:
+    if roll_out.reference is None:
+        return {}
+    reference = roll_out.reference
+    frames = min(len(roll_out.positions), len(reference.positions))
+    x, y = roll_out.positions[:frames], reference.positions[:frames]
+    found = {
+        "distance/rms": rms(x, y),
+        "distance/p95": MM * float(np.percentile(np.linalg.norm(x - y, axis=2), 95)),
+    }
+    perturbed = roll_out.group.find(role="reference-variant", family="simulation-perturbed")
+    if perturbed is not None:
+        found["distance/sensitivity"] = rms(perturbed.positions, reference.positions)
+    return found
+
+
+def _depths(roll_out: RollOut) -> dict[str, float]:
+    scene, x = roll_out.scene, roll_out.positions
+    if scene.obstacle is None:
+        return {}
+    own = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)
+    found = {
+        "penetration/vertices": 100.0 * float(roll_out.inside.share.mean()),
+        "penetration/deep": 100.0 * float((roll_out.inside.depth > DEEP).mean()),
+        "penetration/depth_p99": MM * float(np.percentile(roll_out.inside.depth, 99)),
+        "penetration/own_part_p999": MM * float(np.percentile(own, 99.9)),
+    }
+    if scene.dressed is not None and scene.origin_heights is not None:
+        found["drift/hem"] = MM * hem_drift(x, scene.dressed.garment.hem, scene.origin_heights)
+    return found
+
+
+def rms(x: Floats, y: Floats) -> float:
+    """Root mean square distance [mm] between the vertices of x and y (T,V,3) [m], over all frames."""
+    return MM * float(np.sqrt((distance_rms(x, y) ** 2).mean()))
 
 
 def whole_frames(positions: Floats) -> Floats:

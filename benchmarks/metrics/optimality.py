@@ -27,14 +27,52 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..metric import Metric
 from .energy import FIRST_FULL_FRAME
 
 if TYPE_CHECKING:
+    from ..metric import RollOut
     from ..scene import BuiltScene
+
+SUITES = ("speed",)  # each sample is four minimisations
 
 ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
 FINDERS = ("simulator", "newton", "from_frame", "frame")
 ALIKE = 1e-9  # of the denominator: minima this near are one
+
+METRICS = (
+    Metric(
+        name="gap/relative", unit="1", title="Energy gap", table="speed", lower_is_better=True,
+        definition="how far sampled frames lie above the minimum of their own time step, as a share of what "
+        "skinning, or the first guess, lies above it; a past that is wrong does not show in it",
+    ),
+    Metric(
+        name="gap/energy", unit="J", title="Energy gap", table="speed", lower_is_better=True,
+        definition="the same in joules, mean over sampled frames",
+    ),
+    Metric(
+        name="gap/local", unit="1", title="Local gap", lower_is_better=True,
+        definition="the same share for the minimum that lies below the frame itself",
+    ),
+    Metric(
+        name="gradient/norm", unit="1", title="Gradient", table="speed", lower_is_better=True,
+        definition="largest component of the gradient left in a step, in mean vertex weights",
+    ),
+    *(
+        Metric(
+            name=f"gap/found_by_{finder}", unit="frames", title=f"Found by {finder.replace('_', ' ')}",
+            definition="sampled frames whose lowest minimum was found so",
+        )
+        for finder in FINDERS
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    group = roll_out.group
+    return optimality(
+        roll_out.scene, roll_out.positions, samples=group.gap_samples, skinned=group.skinned
+    ).metrics()
 
 
 @dataclass

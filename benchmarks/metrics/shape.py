@@ -2,11 +2,49 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ..metric import Metric
+
+if TYPE_CHECKING:
+    from ..metric import RollOut
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+METRICS = (
+    Metric(
+        name="deformation/edges", unit="%", title="Edges", table="shape",
+        definition="|length / rest length - 1|, mean over edges and frames",
+    ),
+    Metric(
+        name="deformation/areas", unit="%", title="Areas", table="shape",
+        definition="|area / rest area - 1|, mean over faces and frames",
+    ),
+    Metric(
+        name="dihedral/mean", unit="deg", title="Folds", table="shape",
+        definition="angle between the normals of the two faces of an inner edge, mean over edges and frames",
+    ),
+    Metric(
+        name="intersections/triangles", unit="%", title="Self-cut", table="shape", lower_is_better=True,
+        definition="triangles that pass through another one of the same cloth, mean over frames",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    from .intersections import intersecting_share
+
+    cloth, x = roll_out.scene.cloth, roll_out.positions
+    return {
+        "deformation/edges": 100.0 * float(edge_change(x, cloth.edges, cloth.edge_lengths).mean()),
+        "deformation/areas": 100.0 * float(area_change(x, cloth.faces, cloth.areas).mean()),
+        "dihedral/mean": float(np.rad2deg(dihedral_angle(x, cloth.hinges).mean())),
+        "intersections/triangles": 100.0 * float(intersecting_share(x, cloth.faces).mean()),
+    }
 
 
 def edge_change(positions: Floats, edges: Indices, rest_lengths: Floats) -> Floats:

@@ -11,30 +11,29 @@ import numpy as np
 from reference_sim import Cloth, Material, Obstacle, Trajectory, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
 from snug.garments import Garment
+from snug.motion import Motion
 
-from ..presets import Preset
-from ..scene import BuiltScene, Dressed
-from ..wardrobe import Wardrobe
-from . import worn_in
+from ..assets import Assets
+from ..scene import BuiltScene, Dressed, Scene
 
 HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
 
 
-def build(name: str, preset: Preset, wardrobe: Wardrobe) -> BuiltScene:
-    """The built scene of "<what is worn>/<motion>"."""
-    body, garment = wardrobe.body, wardrobe.garments[worn_in(name).garment]
-    motion = wardrobe.motions[name.split("/", 1)[1]]
+def build(scene: Scene, assets: Assets, *, settle_frames: int) -> BuiltScene:
+    """The built scene of a garment and a motion, or of the clip of it."""
+    body, garment = assets.body, assets.garments[scene.garment]
+    motion = assets.motion_of(scene)
     cloth = Cloth(garment.rest_positions, garment.faces, Material(), pins=garment.pins)
     handles = garment.carried(body, motion.poses, motion.translations)
     energies = declared_energies(cloth)
-    obstacle = Obstacle(wardrobe.posed_body(motion.name), body.faces, rest_positions=body.shaped())
+    obstacle = Obstacle(assets.posed_body(motion), body.faces, rest_positions=body.shaped())
     return BuiltScene(
-        name=name,
+        name=scene.name,
         cloth=cloth,
         energies=energies,
         dt=1.0 / motion.fps,
         frames=motion.frames,
-        settle=lambda: settled(cloth, energies, wardrobe, garment, motion, preset.settle_frames),
+        settle=lambda: settled(cloth, energies, assets, garment, motion, settle_frames),
         obstacle=obstacle,
         origin_heights=body.joints()[0, 1] + motion.translations[:, 1],
         dressed=Dressed(body, garment, motion),
@@ -48,7 +47,7 @@ def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
 
 
 def settled(
-    cloth: Cloth, energies: tuple[Energy, ...], wardrobe: Wardrobe, garment: Garment, motion, frames: int
+    cloth: Cloth, energies: tuple[Energy, ...], assets: Assets, garment: Garment, motion: Motion, frames: int
 ) -> np.ndarray:
     """Positions (V,3) [m] of the cloth at rest on the body in the motion's first pose.
 
@@ -56,7 +55,7 @@ def settled(
     """
     from snug.motion import transition
 
-    body = wardrobe.body
+    body = assets.body
     first = motion.poses[0]
     t_pose = np.zeros_like(first)
     t_pose[0] = first[0]

@@ -7,8 +7,7 @@ import numpy as np
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 
-from ..presets import Preset
-from ..scene import BuiltScene
+from ..scene import BuiltScene, Scene
 from .sheet import square_sheet
 
 SIZE = 0.4  # [m]
@@ -16,11 +15,11 @@ SWING = 0.15  # [m] to either side
 PERIOD = 1.0  # [s]
 
 
-def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
-    """The built scene; the wardrobe is not looked at."""
-    flat, faces = square_sheet(preset.sheet_cells, SIZE)
+def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
+    """The built scene; no assets are needed."""
+    flat, faces = square_sheet(sheet_cells, SIZE)
     positions = np.stack([flat[:, 0], -flat[:, 2], flat[:, 1]], axis=1)  # upright, in the plane of x and y
-    pole = np.arange(preset.sheet_cells + 1)  # the edge at the smallest x
+    pole = np.arange(sheet_cells + 1)  # the edge at the smallest x
     cloth = Cloth(positions, faces, Material(), pins=pole)
     dt = 1.0 / 30.0
 
@@ -30,11 +29,11 @@ def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
         return positions[pole] + [0.0, 0.0, SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0]
 
     return BuiltScene(
-        name=name,
+        name=scene.name,
         cloth=cloth,
         energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
         dt=dt,
-        frames=preset.sheet_frames,
+        frames=sheet_frames,
         settle=lambda: positions,
         pin_positions=handles,
     )

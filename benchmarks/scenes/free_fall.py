@@ -15,20 +15,19 @@ from reference_sim import Cloth, Material
 from reference_sim.energies import Gravity
 from reference_sim.material import GRAVITY
 
-from ..presets import Preset
-from ..scene import BuiltScene
+from ..scene import BuiltScene, Scene
 from .sheet import square_sheet
 
 VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s]
 
 
-def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
-    """The built scene with its exact answer; the wardrobe is not looked at."""
-    positions, faces = square_sheet(preset.sheet_cells, 0.4)
+def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
+    """The built scene with its exact answer; no assets are needed."""
+    positions, faces = square_sheet(sheet_cells, 0.4)
     cloth = Cloth(positions, faces, Material())
-    dt, frames = 1.0 / 30.0, preset.sheet_frames
+    dt, frames = 1.0 / 30.0, sheet_frames
     return BuiltScene(
-        name=name,
+        name=scene.name,
         cloth=cloth,
         energies=(Gravity(cloth),),
         dt=dt,

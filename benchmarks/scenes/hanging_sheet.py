@@ -5,24 +5,23 @@ from __future__ import annotations
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 
-from ..presets import Preset
-from ..scene import BuiltScene
+from ..scene import BuiltScene, Scene
 from .sheet import square_sheet
 
 SIZE = 0.4  # [m]
 
 
-def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
-    """The built scene; the wardrobe is not looked at."""
-    positions, faces = square_sheet(preset.sheet_cells, SIZE)
+def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
+    """The built scene; no assets are needed."""
+    positions, faces = square_sheet(sheet_cells, SIZE)
     # Tilted by half a degree: a flat sheet hanging flat is a saddle, from which symmetry alone would choose.
     positions[:, 1] += 0.01 * positions[:, 0]
-    cloth = Cloth(positions, faces, Material(), pins=(0, preset.sheet_cells))
+    cloth = Cloth(positions, faces, Material(), pins=(0, sheet_cells))
     return BuiltScene(
-        name=name,
+        name=scene.name,
         cloth=cloth,
         energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
         dt=1.0 / 30.0,
-        frames=preset.sheet_frames,
+        frames=sheet_frames,
         settle=lambda: cloth.rest_positions,
     )

@@ -7,8 +7,7 @@ import numpy as np
 from reference_sim import Cloth, Material, Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 
-from ..presets import Preset
-from ..scene import BuiltScene
+from ..scene import BuiltScene, Scene
 from .sheet import square_sheet
 
 RADIUS = 0.12  # [m]
@@ -16,17 +15,17 @@ SIZE = 0.5  # [m]
 GAP = 0.02  # [m] between sphere and sheet at the start
 
 
-def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
-    """The built scene; the wardrobe is not looked at."""
-    positions, faces = square_sheet(preset.sheet_cells, SIZE)
+def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
+    """The built scene; no assets are needed."""
+    positions, faces = square_sheet(sheet_cells, SIZE)
     # Off the sphere's axis by a little: centred, it would balance on a symmetry.
     positions += [0.004, RADIUS + GAP, 0.002]
     cloth = Cloth(positions, faces, Material())
     points, triangles = sphere(RADIUS, 24)
-    frames = preset.sheet_frames
+    frames = sheet_frames
     obstacle = Obstacle(points, triangles)
     return BuiltScene(
-        name=name,
+        name=scene.name,
         cloth=cloth,
         energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth)),
         dt=1.0 / 30.0,

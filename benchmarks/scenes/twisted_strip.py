@@ -7,8 +7,7 @@ import numpy as np
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 
-from ..presets import Preset
-from ..scene import BuiltScene
+from ..scene import BuiltScene, Scene
 from .sheet import sheet
 
 LENGTH, WIDTH = 0.4, 0.12  # [m]
@@ -16,14 +15,14 @@ TURN = np.pi  # of each end, against the other
 CLOSER = 0.1  # share of the length by which the ends approach, so that the strip may fold
 
 
-def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
-    """The built scene; the wardrobe is not looked at."""
-    across = max(2, preset.sheet_cells // 2)
+def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
+    """The built scene; no assets are needed."""
+    across = max(2, sheet_cells // 2)
     positions, faces = sheet((round(across * LENGTH / WIDTH), across), (LENGTH, WIDTH))
     ends = np.flatnonzero(np.abs(np.abs(positions[:, 0]) - LENGTH / 2) < 1e-9)
     cloth = Cloth(positions, faces, Material(), pins=ends)
     side = np.sign(positions[ends, 0])
-    frames = preset.sheet_frames
+    frames = sheet_frames
 
     def handles(frame: int) -> np.ndarray:
         """Both ends turned about the strip's axis and moved together, with a smooth start and stop."""
@@ -40,7 +39,7 @@ def build(name: str, preset: Preset, wardrobe: object = None) -> BuiltScene:
         )
 
     return BuiltScene(
-        name=name,
+        name=scene.name,
         cloth=cloth,
         energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
         dt=1.0 / 30.0,

@@ -1,0 +1,82 @@
+"""What all dressed scenes share: one body, the garments tailored to it, and the motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from snug.body import Body
+    from snug.garments import Garment
+    from snug.motion import Motion
+
+    from .presets import Preset
+    from .scene import Scene
+
+
+@dataclass(frozen=True)
+class Assets:
+    """A body, what it may wear and the motions, all by name; each motion at most `preset.frames` long.
+
+    clips: motion -> its liveliest part. bodies: (motion, part) -> posed body (T,B,3) [m], where ready made.
+    """
+
+    body: Body
+    garments: dict[str, Garment]
+    motions: dict[str, Motion]
+    clips: dict[str, Motion]
+    bodies: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def named(self, names: Iterable[str]) -> list[Motion]:
+        """The motions of those names, in that order."""
+        return [self.motions[name] for name in names]
+
+    def motion_of(self, scene: Scene) -> Motion:
+        """The motion of a dressed scene, or the part of it."""
+        return (self.clips if scene.part == "clip" else self.motions)[scene.motion]
+
+    def only(self, scene: Scene) -> Assets:
+        """The same for this scene alone: little to hand to another process."""
+        names = {scene.motion} & self.motions.keys()
+        own = {name: self.motions[name] for name in names}
+        return replace(self, motions=own, clips={name: self.clips[name] for name in names}, bodies={})
+
+    def posed_body(self, motion: Motion) -> np.ndarray:
+        """The body (T,B,3) [m] in that motion."""
+        ready = self.bodies.get(motion.name)
+        return self.body.vertices(motion.poses, motion.translations) if ready is None else ready
+
+
+def open_assets(
+    preset: Preset,
+    motions: Iterable[Motion],
+    garments: Iterable[str],
+    *,
+    body: Path | None = None,
+) -> Assets:
+    """Load the body, or that of a file, tailor these garments and no other; motions are cut to the preset's
+    length.
+    """
+    from snug.body import Body
+    from snug.garments import find_pattern
+
+    from .clips import clip
+
+    wearer = Body.from_file(body) if body else Body.load()
+    tailored = {
+        name: find_pattern(name).tailor(wearer, vertices=preset.garment_vertices) for name in garments
+    }
+    whole = [motion.cut(0, preset.frames) for motion in motions]
+    clips = {motion.name: clip(wearer, motion, preset.clip_frames) for motion in whole}
+    return Assets(wearer, tailored, {motion.name: motion for motion in whole}, clips)
+
+
+def embedded_motions(names: Iterable[str]) -> list[Motion]:
+    """Motions of the embedded library."""
+    from snug.motion import make_motion
+
+    return [make_motion(name) for name in names]

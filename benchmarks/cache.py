@@ -1,0 +1,147 @@
+"""What is finished in a run's folder, and for what inputs, code, packages and files: so that it is not done
+twice.
+
+An entry is written whole after the files that it speaks of. A run that is killed therefore loses what it was
+at, and nothing else. Stored files are compared with their hash before they are used again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+from collections.abc import Iterable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from .results import RunFolder, replacing
+from .source import code_of, data_of, digest, digest_of_file, packages_of
+from .tasks.task import Outcome, Task, TaskId
+
+STATES = ("finished", "failed", "stale", "missing")
+DEFAULT_ONLY = ("stale", "missing")
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """What the folder says of a task. state: one of STATES; why: what has changed, or what failed.
+
+    outcome: that of the entry, also of a stale one; None without one, or where its files are gone. content:
+    equal where what others read of it is. wanted: to be done now.
+    """
+
+    state: str
+    why: str = ""
+    outcome: Outcome | None = None
+    content: str = ""
+    wanted: bool = True
+
+
+def dependencies(task: Task) -> dict[str, str]:
+    """Name -> digest or version of each input, file of source, package and data file, to say what changed."""
+    code = code_of(*task.modules)
+    parts = {name: digest(value) for name, value in task.inputs.items()} | code
+    parts |= {f"package {name}": version for name, version in packages_of(code).items()}
+    return parts | data_of(code)
+
+
+class Cache:
+    """The entries of one run's folder. only: the states whose tasks are done again."""
+
+    def __init__(self, folder: RunFolder, *, only: Iterable[str] = DEFAULT_ONLY, commit: str = "") -> None:
+        self.folder, self.only, self.commit = folder, frozenset(only), commit
+
+    def find(self, task: Task, others: Mapping[TaskId, Found]) -> Found:
+        """Whether the task is done, and what came of it. others: what is known of those that it reads."""
+        state, why, entry = self._state(task, others)
+        outcome = None
+        if entry:
+            outcome = Outcome(**entry["outcome"], files=tuple(entry["files"]), commit=entry["commit"])
+            if state == "stale":
+                outcome = dataclasses.replace(outcome, remark=f"kept though {why} changed")
+        gone = state == "missing"
+        return Found(
+            state, why, None if gone else outcome, "" if gone else _content(entry), wanted=state in self.only
+        )
+
+    def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Found]) -> Found:
+        """Write the entry, after the files; gives what find() would."""
+        names = outcome.files
+        entry = {
+            "parts": dependencies(task),
+            "needs": _needs(task, others),
+            "written": datetime.now().astimezone().isoformat(timespec="seconds"),
+            "commit": self.commit,
+            "files": {name: digest_of_file(self.folder.path / name) for name in names},
+            "outcome": {name: getattr(outcome, name) for name in _KEPT},
+        }
+        with replacing(self.path(task)) as temporary:
+            temporary.write_text(json.dumps(entry, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        state = "failed" if outcome.failed else "finished"
+        return Found(state, _why(outcome), outcome, _content(entry), wanted=False)
+
+    def forget_all(self) -> None:
+        """Everything is missing from now on, and no training goes on from where an earlier one stopped."""
+        shutil.rmtree(self.folder.cache, ignore_errors=True)
+        for path in self.folder.models.rglob(".*.checkpoint.safetensors"):
+            path.unlink()
+
+    def path(self, task: Task) -> Path:
+        """cache/<kind>/<name>.json"""
+        return self.folder.cache / task.kind / f"{task.name}.json"
+
+    def _state(self, task: Task, others: Mapping[TaskId, Found]) -> tuple[str, str, dict[str, Any]]:
+        try:
+            entry = json.loads(self.path(task).read_text(encoding="utf-8"))
+            parts, files, needs = dict(entry["parts"]), dict(entry["files"]), dict(entry["needs"])
+            outcome = Outcome(**entry["outcome"], commit=entry["commit"])
+        except FileNotFoundError:
+            return "missing", "", {}
+        except (ValueError, KeyError, TypeError):
+            return "missing", "its entry cannot be read", {}
+        for name in files:
+            if not (self.folder.path / name).is_file():
+                return "missing", f"{name} is gone", entry
+        for name, content in files.items():
+            if _content_of_file(self.folder.path / name) != content:
+                return "stale", name, entry
+        now = dependencies(task)
+        changed = [name for name in now if parts.get(name) != now[name]]
+        changed += [name for name in parts if name not in now]
+        read = _needs(task, others)
+        changed += [name for name in read | needs if needs.get(name) != read.get(name)]
+        if changed:
+            return "stale", ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""), entry
+        return ("failed", _why(outcome), entry) if outcome.failed else ("finished", "", entry)
+
+
+_KEPT = ("status", "reason", "failed", "result", "seconds")
+
+
+def _needs(task: Task, others: Mapping[TaskId, Found]) -> dict[str, str]:
+    """Content of each task that it reads; of one that is out of date, or about to be done, a text that no
+    entry has; empty for one of which there is nothing.
+    """
+    found = {}
+    for id in (*task.needs, *task.reads):
+        other = others.get(id, Found("missing", wanted=False))
+        outdated = other.wanted or other.state == "stale"
+        found[" ".join(id)] = "out of date" if outdated else other.content
+    return found
+
+
+def _why(outcome: Outcome) -> str:
+    return f"{outcome.status}: {outcome.reason}" if outcome.failed else ""
+
+
+def _content(entry: Mapping[str, Any]) -> str:
+    """Equal where the files are, and where what the task measured is."""
+    return digest([entry["files"], entry["outcome"]]) if entry else ""
+
+
+def _content_of_file(path: Path) -> str:
+    try:
+        return digest_of_file(path)
+    except (OSError, KeyError):
+        return "damaged"

@@ -1,0 +1,103 @@
+"""What is printed at the end of a run: what came out, in one screen, and what its reader should know."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .results import Row
+from .rows import NOT_FALLING, SPREAD
+
+COLUMNS = (
+    ("energy/total", "total J"),
+    ("energy/strain", "strain J"),
+    ("energy/bending", "bend J"),
+    ("energy/inertia", "inertia J"),
+    ("gap/relative", "gap"),
+    ("curvature/error", "dH 1/m"),
+    ("distance/rms", "rms mm"),
+    ("penetration/vertices", "inside %"),
+    ("cost/frame", "ms/frame"),
+    ("cost/train", "train s"),
+)
+DASH = "-"
+FEWER = "*"
+
+
+def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
+    """Means over scenes and seeds of each suite and method; counts of checks and cases; stage times."""
+    parts = []
+    for suite in ("garments", "speed"):
+        of_suite = [row for row in rows if row.suite == suite]
+        for title, kept in _groups(suite, of_suite):
+            parts.append(_table(title, kept))
+    for suite in ("validation", "extremes"):
+        kept = [row for row in rows if row.suite == suite]
+        if kept:
+            counts = {s: sum(row.status == s for row in kept) for s in dict.fromkeys(r.status for r in kept)}
+            parts.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in counts.items()))
+    parts.append("stages: " + ", ".join(f"{stage['name']} {stage['seconds']:.0f} s" for stage in stages))
+    return "\n\n".join(parts)
+
+
+def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> list[str]:
+    """What whoever reads the times should know, in a line each. outdated: task -> what has changed since."""
+    rows, lines = list(rows), []
+    if reused:
+        lines.append(f"{reused} results taken from earlier runs in this folder")
+    lines += [f"{label}: {remark}" for label, remark in outdated.items()]
+    spreads = {f"{row.scene} x {row.method}": row.value or 0.0 for row in rows if row.metric == "cost/spread"}
+    wide = [f"{cell} ({percent:.0f} %)" for cell, percent in spreads.items() if percent > 100.0 * SPREAD]
+    if wide:
+        lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {', '.join(wide)}")
+    rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(NOT_FALLING)]
+    if rising:
+        lines.append(f"more iterations or a smaller tolerance, and a larger gap: {', '.join(rising)}")
+    return lines
+
+
+def _groups(suite: str, rows: list[Row]) -> list[tuple[str, list[Row]]]:
+    """Scenes of one garment together; of speed each by itself, as errors of different scenes do not add."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row.garment if suite == "garments" else row.scene, []).append(row)
+    if suite != "garments":
+        return [(f"speed, {scene}", own) for scene, own in groups.items()]
+    titled = []
+    for garment, own in groups.items():
+        count = len({row.scene for row in own})
+        of = f", {garment}" if len(groups) > 1 else ""
+        titled.append((f"garments{of}, mean of {count} scene{'s' * (count > 1)}", own))
+    return titled
+
+
+def _table(title: str, rows: list[Row]) -> str:
+    methods = list(dict.fromkeys(row.method for row in rows))
+    values: dict[tuple[str, str], list[float]] = {}
+    scenes: dict[str, set[str]] = {}
+    for row in rows:
+        if row.value is not None and row.status in ("ok", "stalled"):
+            values.setdefault((row.method, row.metric), []).append(row.value)
+            scenes.setdefault(row.metric, set()).add(row.scene)
+    seeds = {method: len({row.seed for row in rows if row.method == method}) for method in methods}
+
+    def shown(method: str, metric: str) -> str:
+        own = values.get((method, metric))
+        if not own:
+            return DASH
+        return f"{sum(own) / len(own):.4g}" + FEWER * (len(own) < seeds[method] * len(scenes[metric]))
+
+    columns = [(metric, head) for metric, head in COLUMNS if any((m, metric) in values for m in methods)]
+    lines = [[title, *(head for _, head in columns), "status"]]
+    for method in methods:
+        numbers = [shown(method, metric) for metric, _ in columns]
+        statuses = dict.fromkeys(row.status for row in rows if row.method == method)
+        lines.append([method, *numbers, ", ".join(statuses)])
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    text = "\n".join(
+        "  ".join(cell.ljust(w) if k in (0, len(widths) - 1) else cell.rjust(w)
+                  for k, (cell, w) in enumerate(zip(line, widths))).rstrip()
+        for line in lines
+    )  # fmt: skip
+    partly = any(cell.endswith(FEWER) for line in lines for cell in line)
+    return text + f"\n{FEWER} over fewer scenes or seeds than its neighbours" * partly

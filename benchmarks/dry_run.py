@@ -1,0 +1,56 @@
+"""What a run would do: every task, what its folder holds of it, and the time where it is known."""
+
+from __future__ import annotations
+
+from .cache import STATES, Cache, Found
+from .plan import Plan, runs
+from .results import RunFolder
+from .runner import Runner
+from .schedule import tasks_of
+
+
+def describe(plan: Plan) -> str:
+    """The plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
+    only = STATES if plan.fresh else plan.only
+    runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=only))
+    lines, wanted, cached = _head(plan), list[Found](), 0
+    stage = ""
+    for task, found, skip in runner.foresee():
+        if task.stage != stage:
+            stage = task.stage
+            lines.append(stage)
+        lines.append(f"  {task.title}: {_verdict(found, skip)}")
+        if not skip and found.wanted:
+            wanted.append(found)
+        cached += not skip and not found.wanted and found.outcome is not None
+    known = [found.outcome.seconds for found in wanted if found.outcome and found.outcome.seconds]
+    times = f", about {sum(known):.0f} s for the {len(known)} whose time is known" if known else ""
+    return "\n".join([*lines, f"{len(wanted)} tasks to run{times}; {cached} cached"])
+
+
+def _head(plan: Plan) -> list[str]:
+    skipped = sum(not runs(cell) for cell in plan.cells)
+    lines = [
+        f"preset {plan.preset.name}: {plan.preset.description}",
+        f"folder {plan.folder}",
+        f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
+        f"{plan.workers} workers, cells alone",
+        *([f"body {plan.body.path}"] if plan.body else []),
+        *(f"{garment} of about {plan.preset.garment_vertices} vertices" for garment in plan.garments),
+    ]
+    for garment in dict.fromkeys(network.garment for network in plan.networks):
+        how = "simulated for networks that learn from it" if garment in plan.simulated else "not simulated"
+        lines.append(f"training motions {', '.join(plan.motions.train_of(garment))} ({how})")
+    return [*lines, f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"]
+
+
+def _verdict(found: Found, skip: str) -> str:
+    if skip:
+        return f"skip ({skip})"
+    why = f" ({found.state}{': ' * bool(found.why)}{found.why})"
+    if found.wanted:
+        took = f", {found.outcome.seconds:.1f} s last time" if found.outcome and found.outcome.seconds else ""
+        return f"run{why}{took}"
+    if found.outcome is None:
+        return f"left out{why}"
+    return "cached" + (why if found.state != "finished" else "")

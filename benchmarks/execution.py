@@ -1,0 +1,204 @@
+"""run.json and results.csv of a run, and everything that it does from its first file to its report."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from . import provenance
+from .cache import Cache
+from .console import remarks, summary
+from .executor import LocalExecutor
+from .plan import Plan, runs
+from .results import FORMAT, Row, RunFolder, with_provenance
+from .rows import described, rows_of
+from .runner import Runner
+from .schedule import tasks_of
+from .tasks.task import one_line
+
+if TYPE_CHECKING:
+    from .assets import Assets
+
+
+def execute(plan: Plan) -> int:
+    """Run the plan. Returns 0 when all ended well, 1 when something failed or there is no report."""
+    log = RunLog(plan)
+    runner = Runner(tasks_of(plan), log.cache)
+    try:
+        assets = None
+        if plan.garments:
+            try:
+                assets = log.open_assets()
+            except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
+                runner.refuse(("start", "data", "network"), one_line(error))
+        runner.run(LocalExecutor(log.folder, assets, plan.workers), log)
+    except KeyboardInterrupt:
+        log.note("interrupted", True)
+        rows = rows_of(plan, runner.tasks, runner.known())
+        if rows or not log.folder.rows_path.is_file():  # nothing known is no reason to lose a table
+            log.write_rows(rows)
+        raise
+    rows = rows_of(plan, runner.tasks, runner.outcomes)
+    log.write_rows(rows)
+    log.note_outcomes(runner)
+    made = log.make_report()
+    print(summary(log.rows, log.stages), flush=True)
+    failed = [row for row in log.rows if not accepted(row)]
+    for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
+        print(line, file=sys.stderr)
+    broken = runner.broken()
+    for label, reason in broken.items():
+        print(f"{label}: {reason}", file=sys.stderr)
+    for line in remarks(log.rows, len(runner.reused), runner.outdated()):
+        print(line, file=sys.stderr)
+    if made:
+        print(log.folder.report_path.resolve(), flush=True)
+    return 0 if made and not (failed or broken) else 1
+
+
+def accepted(row: Row) -> bool:
+    """Whether a row lets the run end with status 0; an extreme case may fail honestly, never silently."""
+    return row.passed or (row.suite == "extremes" and row.status != "failed" and bool(row.reason))
+
+
+class RunLog:
+    """The configuration, the stages and the rows of one run. Making it makes the folder."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.folder = RunFolder(plan.folder)
+        self.hardware = provenance.hardware(plan.device)
+        self.commit = provenance.commit()
+        self.cache = Cache(self.folder, only=plan.only, commit=self.commit)
+        self.rows: list[Row] = []
+        self.stages: list[dict[str, Any]] = []
+        self.config: dict[str, Any] = {
+            "format": FORMAT,
+            "command": plan.command,
+            "preset": plan.preset.name,
+            "suites": list(plan.suites),
+            "motions": {
+                f"{what} {garment}": list(names(garment))
+                for garment in plan.garments
+                for what, names in (("train", plan.motions.train_of), ("test", plan.motions_of))
+            },
+            "body": [plan.body.path.name, plan.body.digest] if plan.body else "of the package",
+            "seeds": list(plan.seeds),
+            "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
+            "workers": plan.workers,
+            "commit": self.commit,
+            "started": now(),
+            "finished": None,
+            "hardware": self.hardware,
+            "versions": provenance.versions(),
+            "preset_values": dataclasses.asdict(plan.preset),
+            "stages": self.stages,
+            "earlier": self._earlier(),
+        }
+        plan.folder.mkdir(parents=True, exist_ok=True)
+        self.folder.remove_parts()
+        if plan.fresh:
+            self.cache.forget_all()
+        self.folder.write_config(self.config)
+
+    def _earlier(self) -> list[dict[str, Any]]:
+        """Earlier runs in this folder: their stages are the times of what this one reuses."""
+        if not self.folder.config_path.is_file():
+            return []
+        before = self.folder.read_config()
+        names = ("command", "commit", "started", "finished", "stages")
+        return [*before.get("earlier", []), {name: before.get(name) for name in names}]
+
+    def note(self, name: str, value: Any) -> None:
+        """Set an entry of run.json and write it."""
+        self.config[name] = value
+        self.folder.write_config(self.config)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Announce a stage and keep its wall time, also when it is interrupted."""
+        print(f"== {name}", file=sys.stderr, flush=True)
+        clock = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.stages.append({"name": name, "seconds": round(time.perf_counter() - clock, 3)})
+            self.folder.write_config(self.config)
+
+    def open_assets(self) -> Assets:
+        """Body, garments and motions of the dressed scenes. Raises ValueError where one cannot be made."""
+        plan = self.plan
+        from .assets import embedded_motions, open_assets
+
+        names = [name for garment in plan.garments for name in plan.motions_of(garment)]
+        names += [name for network in plan.networks for name in plan.motions.train_of(network.garment)]
+        names = list(dict.fromkeys(names))
+        files = plan.motions.files
+        with self.stage("body, garments and motions"):
+            motions = [files[name] for name in names if name in files]
+            motions += embedded_motions(name for name in names if name not in files)
+            assets = open_assets(plan.preset, motions, plan.garments, body=plan.body_file)
+        self.config["garments"] = {
+            garment.name: {
+                "vertices": len(garment.rest_positions),
+                "triangles": len(garment.faces),
+                "parameters": {name: float(value) for name, value in garment.parameters.items()},
+            }
+            for garment in assets.garments.values()
+        }
+        self.config["motions"]["frames"] = {name: assets.motions[name].frames for name in names}
+        self.note("motion_sources", {name: assets.motions[name].source for name in names})
+        return assets
+
+    def note_outcomes(self, runner: Runner) -> None:
+        """What became of ground truth, trainings and cells, and what the rows mean."""
+        of_kind: dict[str, dict[str, Any]] = {}
+        for task in runner.tasks:
+            outcome = runner.outcomes[task.id]
+            if task.silent:
+                failed = {"failed": f"{outcome.status}: {outcome.reason}"} if outcome.failed else {}
+                facts = {**outcome.result, **failed, "wall_seconds": round(outcome.seconds, 3)}
+                of_kind.setdefault(task.stage, {})[task.label] = facts
+        outcomes = [runner.outcomes["cell", cell.name] for cell in self.plan.cells if runs(cell)]
+        cells = {"run": len(outcomes), "failed": sum(outcome.failed for outcome in outcomes)}
+        self.config |= {"tasks": of_kind, "cells": cells, "outdated": runner.outdated()}
+        self.folder.write_config(self.config)
+
+    def write_rows(self, rows: Sequence[Row]) -> None:
+        """results.csv, and what run.json says of them. Only training uses an accelerator."""
+        everything = provenance.hardware_line(self.hardware)
+        processor = provenance.hardware_line(self.hardware | {"accelerator": None})
+        of_training = ("cost/setup", "cost/train")
+        self.rows = [
+            dataclasses.replace(row, hardware=everything if row.metric in of_training else processor)
+            for row in with_provenance(rows, preset=self.plan.preset.name, commit=self.commit)
+        ]
+        self.folder.write_rows(self.rows)
+        self.config |= described(self.plan, self.rows)
+        self.folder.write_config(self.config)
+
+    def make_report(self) -> bool:
+        """tables/, figures/ and report.pdf from the files; a failure is said and leaves the results."""
+        self.note("finished", now())
+        try:
+            with self.stage("report"):
+                from reports.build import build_report
+
+                _, problems = build_report(self.folder.path)
+        except Exception as error:
+            line = one_line(error)
+            print(f"no report ({line}); the results are in {self.folder.path}", file=sys.stderr)
+            return False
+        for problem in problems:
+            print(f"report: left out: {problem}", file=sys.stderr)
+        return True
+
+
+def now() -> str:
+    """The time as ISO text with its zone."""
+    return datetime.now().astimezone().isoformat(timespec="seconds")

@@ -1,0 +1,179 @@
+"""What executes tasks: processes of this machine. A cluster would stand behind the same four calls.
+
+A task that raises, hangs, or whose process dies is an outcome, not an end of the run.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import multiprocessing
+import queue
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Any, Protocol
+
+from .assets import Assets
+from .process import IsolatedProcess, WorkerDied
+from .results import RunFolder
+from .tasks.task import Context, Outcome, Task, TaskId, failure, tell_nobody
+
+POLL = 0.2  # [s] between looks at the progress
+COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
+
+Needed = Mapping[TaskId, Outcome]
+Done = tuple[Task, Outcome]
+
+
+class Executor(Protocol):
+    """Executes tasks whose needs are there; gives outcomes, in any order."""
+
+    def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
+        """Batches of untimed tasks, some side by side. bar: is told of units of progress."""
+
+    def alone(self, task: Task, needed: Needed) -> Outcome:
+        """A timed task, nothing beside it, in the process that it names."""
+
+    def release(self, process: str) -> None:
+        """No other task wants that process."""
+
+    def close(self) -> None:
+        """End everything."""
+
+
+class LocalExecutor:
+    """Single-threaded processes of this machine, at most `workers` side by side."""
+
+    def __init__(self, folder: RunFolder, assets: Assets | None, workers: int) -> None:
+        self.folder, self.assets, self.workers = folder, assets, workers
+        self._named: dict[str, IsolatedProcess] = {}
+
+    def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
+        count = min(self.workers, len(batches))
+        crew = [_Worker(self.folder, self.assets) for _ in range(count)]
+        idle: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
+        for worker in crew:
+            idle.put(worker)
+
+        def done(batch: Sequence[Task], needed: Needed) -> list[Done]:
+            worker = idle.get()
+            try:
+                return list(zip(batch, worker.do(batch, needed)))
+            finally:
+                idle.put(worker)
+
+        with ThreadPoolExecutor(max(count, 1)) as threads:  # one waits for each worker
+            left = {threads.submit(done, *batch) for batch in batches}
+            try:
+                while left:
+                    ended, left = wait(left, timeout=POLL, return_when=FIRST_COMPLETED)
+                    for worker in crew:
+                        worker.report(bar)
+                    for future in ended:
+                        yield from future.result()
+            except BaseException:
+                _end(left)
+                raise
+        for worker in crew:
+            worker.process.close()
+
+    def alone(self, task: Task, needed: Needed) -> Outcome:
+        process = self._named.get(task.process)
+        if process is None:
+            context = Context(self.folder, task.assets(self.assets))
+            process = self._named[task.process] = IsolatedProcess(_begin, context)
+        return _called(process, [task], needed)[0]
+
+    def release(self, process: str) -> None:
+        if process in self._named:
+            self._named.pop(process).close()
+
+    def close(self) -> None:
+        for name in list(self._named):
+            self.release(name)
+
+
+class _Worker:
+    """A process that does one batch after another, another process after one that was killed."""
+
+    def __init__(self, folder: RunFolder, assets: Assets | None) -> None:
+        self.context = Context(folder, assets)
+        self._renew()
+
+    def _renew(self) -> None:
+        # A queue for each process: one that is killed while it reports leaves a lock that nobody opens.
+        self.progress = multiprocessing.get_context("spawn").SimpleQueue()
+        self.process = IsolatedProcess(_begin, self.context, self.progress)
+        self.warm: set[tuple[str, str]] = set()
+
+    def do(self, batch: Sequence[Task], needed: Needed) -> list[Outcome]:
+        first = batch[0]
+        try:
+            if (first.kind, first.modules[0]) not in self.warm:
+                self.process.call(first.warm_up, seconds=COMPILING)
+                self.warm.add((first.kind, first.modules[0]))
+            self.process.call(_forget, seconds=None)
+        except Exception as error:
+            self._renew()
+            return [failure(error) for _ in batch]
+        outcomes = _called(self.process, batch, needed)
+        if not self.process.alive:
+            self._renew()
+        return outcomes
+
+    def report(self, bar: Any) -> None:
+        """Hand on what the process has told."""
+        progress = self.progress  # the worker may get another meanwhile
+        while not progress.empty():
+            bar.update(min(progress.get(), bar.total - bar.n))
+
+
+def _called(process: IsolatedProcess, batch: Sequence[Task], needed: Needed) -> list[Outcome]:
+    """Outcomes of a batch in that process, which is ended at the deadline. Raises nothing but interrupts."""
+    clock = time.perf_counter()
+    try:
+        return process.call(_perform, batch, needed, seconds=batch[0].deadline)
+    except WorkerDied as death:
+        ended = Outcome(death.status, str(death), failed=True, seconds=time.perf_counter() - clock)
+        return [ended] * len(batch)
+    except Exception as error:
+        return [failure(error)] * len(batch)
+
+
+def _end(futures: set[Future[Any]]) -> None:
+    """Begin no other batch, and end the workers until none is left that a thread waits for."""
+    left = {future for future in futures if not future.cancel()}
+    while left:
+        for child in multiprocessing.active_children():
+            child.kill()
+        _, left = wait(left, timeout=POLL)
+
+
+# --- in the process ----------------------------------------------------------------------------------------
+
+_context: Context
+
+
+def _begin(context: Context, progress: Any = None) -> None:
+    global _context
+    tell: Callable[[int], None] = tell_nobody if progress is None else progress.put
+    _context = dataclasses.replace(context, tell=tell, memo={})
+
+
+def _forget() -> None:
+    _context.memo.clear()
+
+
+def _perform(batch: Sequence[Task], needed: Needed) -> list[Outcome]:
+    found: list[Outcome] = []
+    clock = time.perf_counter()
+    try:
+        for outcome in type(batch[0]).run_together(batch, _context, needed):
+            seconds = time.perf_counter() - clock
+            found.append(dataclasses.replace(outcome, seconds=seconds))
+            clock += seconds
+    except Exception as error:
+        seconds = time.perf_counter() - clock
+        lost = dataclasses.replace(failure(error), seconds=seconds)
+        found += [lost] * (len(batch) - len(found))
+    return found

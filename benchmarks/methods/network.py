@@ -1,0 +1,57 @@
+"""The trained networks, rolled out one frame at a time as an application would run them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from reference_sim.trajectory import Trajectory
+
+from ..method import Method
+from ..scene import BuiltScene
+
+
+def model_path(models: Path, kind: str, seed: int) -> Path:
+    """Where the model of that kind and seed lies."""
+    return models / f"{kind}-seed{seed}.safetensors"
+
+
+@dataclass
+class Network(Method):
+    """A model read from its file. Features are made and the network is warmed up before the clock runs."""
+
+    path: Path
+
+    def prepare(self, scene: BuiltScene) -> None:
+        from snug.dresser import DressedBody
+        from snug.rollout import ready_to_roll_out
+        from snug.trained_model import TrainedModel
+
+        assert scene.dressed is not None
+        self.model = TrainedModel.load(self.path)
+        self.motion = scene.dressed.motion
+        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.frames = ready_to_roll_out(self.model, self.dressed, self.motion)
+
+    def run(self) -> Trajectory:
+        return self.frames()
+
+    def batch(self, copies: int) -> Callable[[], np.ndarray]:
+        """What computes so many bodies in this motion at once when called: (T, copies, V, 3) [m]."""
+        from snug.rollout import ready_for_many
+
+        return ready_for_many(self.model, self.dressed, self.motion, copies=copies)
+
+    def quasi_static(self) -> Trajectory:
+        """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""
+        from snug.rollout import roll_out
+
+        return roll_out(self.model, self.dressed, self.motion, held_pose=True)
+
+
+def make(*, models: Path, seed: int, kind: str) -> Network:
+    """The network of that name, "untrained" or one of snug.recipe.TRAININGS, and seed."""
+    return Network(model_path(models, kind, seed))

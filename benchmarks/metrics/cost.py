@@ -1,0 +1,34 @@
+"""What a method costs: declared here, taken from clocks, processes and trainings by benchmarks.rows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..metric import Metric
+
+if TYPE_CHECKING:
+    from ..metric import RollOut
+
+
+def _cost(name: str, unit: str, title: str, definition: str, table: str = "cost") -> Metric:
+    return Metric(
+        name=f"cost/{name}", unit=unit, title=title, definition=definition, table=table, lower_is_better=True
+    )
+
+
+METRICS = (
+    _cost("data", "s", "Data generation", "simulation of the training motions, settling included"),
+    _cost("setup", "s", "Making ready", "what a training does before its first step"),
+    _cost("train", "s", "Training", "wall time of the steps of the training"),
+    _cost("frame", "ms", "Frame", "time of the whole run over the frames computed, one frame at a time on "
+          "one thread; the median of repeated runs"),
+    _cost("batch", "ms", "In batch", "time per frame and body of 16 bodies at once"),
+    _cost("spread", "%", "Spread", "largest less smallest repeat, as a share of their median", ""),
+    _cost("memory", "MB", "Memory", "size of the network"),
+    _cost("peak", "MB", "Process", "most memory of the method's process until its run had ended"),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Nothing: a roll-out does not know what it has cost."""
+    return {}

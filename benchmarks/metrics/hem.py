@@ -1,0 +1,195 @@
+"""Does cloth move by itself, or only follow the pose? Measured on the hem, in the axes of the body's root.
+
+A method's dynamic part is what motion adds to its own static answer:
+
+    D(t, v) = x(t, v) - x_static(t, v),  less its mean over time for each hem vertex v
+
+with x_static the simulator's quasi-static solution of the same frames for a solver, and for a network its
+output once each pose has been held still. Neither the energy gap of a step nor the inertia term shows D: a
+dresser without memory has a small gap from its own history.
+
+    amplitude    rms D / rms D of the simulator
+    correlation  <D, D_sim> / (|D| |D_sim|)
+    gain, lag    g and l of the least-squares fit  s(t) = g s_static(t - l),  s the hem's yaw, or its
+                 displacement where the static hem does not turn
+    ringing      rms distance of the hem to where it ends, frames after the body has stopped
+    spectrum     sum |S - S_sim| / sum S_sim,  S(f) the rms over hem vertices of the acceleration's spectrum
+
+No import of ours: numpy alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+Array = np.ndarray
+
+AFTER = (0, 1, 2, 4, 8, 16)  # frames after the stop at which ringing is measured
+HELD = 24  # frames a body must hold still at the end to count as stopped
+TURNING = np.deg2rad(5.0)  # rms static yaw from which on gain and lag are those of the yaw
+SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to be a gain of
+MAX_LAG = 12.0  # frames
+SHORTEST = 8  # frames of which a motion can be said
+LEAST = 1e-6  # [m] rms of a dynamic part that is none
+
+
+def in_root_frame(positions: Array, rotations: Array, origins: Array) -> Array:
+    """Positions (T,V,3) [m] in the axes of the root: rotations (T,3,3) root to world, origins (T,3) [m]."""
+    return np.einsum("tji,tvj->tvi", rotations, positions - origins[:, None])
+
+
+def dynamic_part(moving: Array, static: Array) -> Array:
+    """D (T,H,3) [m] of a hem and of its static answer to the same frames, both (T,H,3) in the root frame."""
+    difference = moving - static
+    return difference - difference.mean(axis=0)
+
+
+def root_mean_square(part: Array) -> float:
+    """Of vectors (T,H,3): sqrt of the mean squared length."""
+    return float(np.sqrt((part**2).sum(axis=-1).mean()))
+
+
+def amplitude(part: Array, reference: Array) -> float:
+    """rms of D (T,H,3) over that of the reference's; nan where the reference has none."""
+    if root_mean_square(reference) < LEAST:
+        return float("nan")
+    return root_mean_square(part) / root_mean_square(reference)
+
+
+def correlation(part: Array, reference: Array) -> float:
+    """Cosine between D (T,H,3) and the reference's, as vectors of all numbers; nan where one is zero."""
+    if min(root_mean_square(part), root_mean_square(reference)) < LEAST:
+        return float("nan")
+    return float(np.vdot(part, reference) / (np.linalg.norm(part) * np.linalg.norm(reference)))
+
+
+def hem_yaw(hem: Array, axes: Array) -> Array:
+    """Turn (T,) [rad] of a hem (T,H,3) about the vertical since frame 0, world: best rotation of its shape.
+
+    axes: (T,3,3) root to world; the hem is given in the root's axes.
+    """
+    world = np.einsum("tij,tvj->tvi", axes, hem)
+    flat = (world - world.mean(axis=1, keepdims=True))[..., [2, 0]]  # z, x: the yaw is positive from z to x
+    z = flat[..., 0] + 1j * flat[..., 1]
+    # The rotation about the centroid nearest to frame 0's shape in the sense of least squares.
+    return np.unwrap(np.angle((z * z[0].conj()).sum(axis=1)))
+
+
+def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
+    """(g, l [frames]) for which g static(t - l) fits moving(t), both (T,) less their means; l within MAX_LAG.
+
+    Lags are tried in hundredths of a frame by linear interpolation; before its first frame a signal rests.
+    """
+    frames = np.arange(len(static), dtype=np.float64)
+    moving = moving - moving.mean()
+    best = (np.inf, 0.0, 0.0)
+    for lag in np.arange(-100 * MAX_LAG, 100 * MAX_LAG + 1) / 100:
+        shifted = np.interp(frames - lag, frames, static)
+        shifted = shifted - shifted.mean()
+        power = float(shifted @ shifted)
+        if power == 0:
+            continue
+        gain = float(moving @ shifted) / power
+        left = float(((moving - gain * shifted) ** 2).sum())
+        if gain > 0 and left < best[0]:
+            best = (left, gain, float(lag))
+    return best[1], best[2]
+
+
+def response(moving: Array, static: Array, axes: Array) -> tuple[float, float]:
+    """Gain and lag [frames] of a hem (T,H,3) in the root frame to its static one; nan where that rests."""
+    turn = hem_yaw(static, axes)
+    if turn.std() >= TURNING:
+        return gain_and_lag(hem_yaw(moving, axes), turn)
+    centre = static.mean(axis=1)
+    centre = centre - centre.mean(axis=0)
+    if np.sqrt((centre**2).sum(axis=1).mean()) < SHIFTING:
+        return float("nan"), float("nan")
+    along = np.linalg.svd(centre, full_matrices=False)[2][0]
+    return gain_and_lag(moving.mean(axis=1) @ along, centre @ along)
+
+
+def stop_frame(poses: Array, translations: Array) -> int | None:
+    """Last frame (its pose stays from then on) of a body that holds still for HELD frames, or None."""
+    still = np.all(poses == poses[-1], axis=tuple(range(1, poses.ndim)))
+    still &= np.all(translations == translations[-1], axis=1)
+    first = len(still) - int(np.argmin(still[::-1])) if not still.all() else 0
+    return first if first > 0 and len(still) - first > HELD else None
+
+
+def ringing(hem: Array, stop: int) -> Array:
+    """rms distance (6,) [m] of a hem (T,H,3) in the root frame to its last, AFTER frames after `stop`."""
+    away = hem[[stop + after for after in AFTER]] - hem[-1]
+    return np.sqrt((away**2).sum(axis=-1).mean(axis=-1))
+
+
+def acceleration_spectrum(hem: Array, dt: float) -> Array:
+    """S(f) of a hem (T,H,3): rms over vertices of the amplitude of its acceleration, Hann window."""
+    acceleration = np.diff(hem, n=2, axis=0) / dt**2
+    window = np.hanning(len(acceleration) + 2)[1:-1, None, None]
+    amplitudes = np.abs(np.fft.rfft(window * acceleration, axis=0))
+    return np.sqrt((amplitudes**2).sum(axis=-1).mean(axis=-1))
+
+
+def spectrum_distance(hem: Array, reference: Array, dt: float) -> float:
+    """sum |S - S_ref| / sum S_ref of two hems (T,H,3) over the same frames."""
+    ours, theirs = acceleration_spectrum(hem, dt), acceleration_spectrum(reference, dt)
+    return float(np.abs(ours - theirs).sum() / theirs.sum()) if theirs.any() else float("nan")
+
+
+@dataclass(frozen=True)
+class HemMotion:
+    """What dynamics are measured in: the body's root, when it stops, and the simulator's two answers.
+
+    axes: (T,3,3) root to world; origins: (T,3) [m]; stop: frame or None; hem: vertices (H,); simulated and
+    quasi_static: the simulator's positions (T,V,3) [m], world; dt [s].
+    """
+
+    axes: Array
+    origins: Array
+    stop: int | None
+    hem: Array
+    simulated: Array
+    quasi_static: Array
+    dt: float
+
+    def of(self, positions: Array) -> Array:
+        """The hem (T,H,3) in the root frame of positions (T,V,3) [m]."""
+        frames = len(positions)
+        return in_root_frame(positions[:, self.hem], self.axes[:frames], self.origins[:frames])
+
+    def curves(self, positions: Array) -> dict[str, Array]:
+        """To be drawn over time: yaw of the hem against the root [rad], its rms distance to its end [m]."""
+        hem = self.of(positions)
+        # In the root's own axes the root does not turn: what is left is the hem's lead and overshoot.
+        own = np.broadcast_to(np.eye(3), (len(hem), 3, 3))
+        away = np.sqrt(((hem - hem[-1]) ** 2).sum(axis=-1).mean(axis=-1))
+        return {"hem/yaw": hem_yaw(hem, own), "hem/from_end": away}
+
+    def measure(self, positions: Array, static: Array | None = None) -> dict[str, float]:
+        """Every dynamic metric of positions (T,V,3), [1], [frames] or [mm]; what is not defined is left out.
+
+        static: (T,V,3), the method's own answer to poses held still; None takes the simulator's.
+        """
+        frames = min(len(positions), len(self.simulated), len(self.quasi_static))
+        if frames < SHORTEST:
+            return {}
+        moving, simulated = self.of(positions[:frames]), self.of(self.simulated[:frames])
+        quiet = self.of(self.quasi_static[:frames])
+        own = quiet if static is None else self.of(static[:frames])
+        part, reference = dynamic_part(moving, own), dynamic_part(simulated, quiet)
+        gain, lag = response(moving, own, self.axes[:frames])
+        found = {
+            "dynamics/amplitude": amplitude(part, reference),
+            "dynamics/correlation": correlation(part, reference),
+            "dynamics/gain": gain,
+            "dynamics/lag": lag,
+            "dynamics/spectrum": spectrum_distance(moving, simulated, self.dt),
+        }
+        if self.stop is not None and self.stop + AFTER[-1] < frames:
+            distances = 1e3 * ringing(moving, self.stop)
+            found["dynamics/ringing"] = float(distances.mean())
+            found |= {f"dynamics/ringing/{after}": float(d) for after, d in zip(AFTER, distances)}
+        return {name: value for name, value in found.items() if np.isfinite(value)}

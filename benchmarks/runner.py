@@ -1,0 +1,177 @@
+"""The one loop: is a task cached? run it in its process, keep what came of it, go on.
+
+Dry run, resume, failures, what an interrupt leaves and exclusive timing are decided here and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from itertools import groupby
+from typing import Any, Protocol
+
+from .cache import Cache, Found
+from .executor import Executor
+from .tasks.task import Outcome, Task, TaskId
+
+BLOCKED = "blocked"  # in the result of a task whose needs had failed
+LEFT_OUT = "not asked for: --only names other states"
+
+
+class Log(Protocol):
+    """What is told of stages."""
+
+    def stage(self, name: str) -> AbstractContextManager[None]:
+        """Around all tasks of a stage."""
+
+
+class Runner:
+    """Runs or reuses tasks, in their order: those that others need come first.
+
+    outcomes: of every task so far. reused: titles of those that an earlier run had finished.
+    """
+
+    def __init__(self, tasks: Sequence[Task], cache: Cache) -> None:
+        self.tasks, self.cache = tuple(tasks), cache
+        self.titles = {task.id: task.title for task in self.tasks}
+        self.found: dict[TaskId, Found] = {}
+        self.outcomes: dict[TaskId, Outcome] = {}
+        self.reused: list[str] = []
+
+    def refuse(self, kinds: Sequence[str], reason: str) -> None:
+        """Let all tasks of these kinds fail, for the same reason; nothing of it is kept."""
+        ids = [task.id for task in self.tasks if task.id[0] in kinds]
+        self.outcomes |= dict.fromkeys(ids, Outcome("failed", reason, failed=True))
+
+    # --- running -------------------------------------------------------------------------------------------
+
+    def run(self, executor: Executor, log: Log) -> None:
+        """All tasks, stage by stage."""
+        for stage, group in groupby(self.tasks, key=lambda task: task.stage):
+            tasks = list(group)
+            with log.stage(stage):
+                self._alone(tasks, executor) if tasks[0].process else self._together(tasks, executor)
+
+    def _together(self, tasks: Sequence[Task], executor: Executor) -> None:
+        wanted = [task for task in tasks if self.decide(task)]
+        if not wanted:
+            return
+        batches: dict[str, list[Task]] = {}
+        for task in wanted:
+            batches.setdefault(task.batch or task.name, []).append(task)
+        # The longest first: the workers then end at about the same time.
+        ordered = sorted(batches.values(), key=lambda batch: -sum(task.units for task in batch))
+        handed = [(batch, self._needed(*batch)) for batch in ordered]
+        for task in wanted:
+            task.clear(self.cache.folder)
+        with _bar(tasks[0], sum(task.units for task in wanted)) as bar:
+            for task, outcome in executor.together(handed, bar):
+                self._keep(task, outcome)
+            bar.update(bar.total - bar.n)
+
+    def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
+        try:
+            with _bar(tasks[0], len(tasks)) as bar:
+                for place, task in enumerate(tasks):
+                    if self.decide(task):
+                        task.clear(self.cache.folder)
+                        self._keep(task, executor.alone(task, self._needed(task)))
+                    if not any(self._comes(other, task.process) for other in tasks[place + 1 :]):
+                        executor.release(task.process)
+                    bar.update()
+        finally:
+            executor.close()
+
+    def _comes(self, task: Task, process: str) -> bool:
+        """Whether the task will want that process."""
+        if task.process != process:
+            return False
+        blocked = any(id in self.outcomes and id not in self._needed(task) for id in task.needs)
+        return not blocked and not task.skip(self._needed(task))
+
+    def decide(self, task: Task) -> bool:
+        """Whether the task is to be run now; where not, its outcome is known."""
+        if task.id in self.outcomes:
+            return False
+        needed = self._needed(task)
+        lacking = next((id for id in task.needs if id not in needed), None)
+        if lacking is None and (reason := task.skip(needed)):
+            self.outcomes[task.id] = Outcome("skipped", reason)
+            return False
+        found = self.cache.find(task, self.found)
+        freed = lacking is None and found.outcome is not None and BLOCKED in found.outcome.result
+        if (found.wanted or freed) and lacking is None:
+            return True
+        if found.wanted and lacking is not None:
+            outcome = self._blocked(lacking)
+            if outcome.failed:
+                self._keep(task, outcome)
+            self.outcomes[task.id] = outcome
+        elif found.outcome is None:
+            self.outcomes[task.id] = Outcome("skipped", LEFT_OUT)
+        else:
+            self.found[task.id], self.outcomes[task.id] = found, found.outcome
+            self.reused.append(task.title)
+        return False
+
+    def _blocked(self, lacking: TaskId) -> Outcome:
+        """Of a task that cannot be run. It is done as soon as nothing blocks it, whatever --only says."""
+        title, other = self.titles.get(lacking, " ".join(lacking)), self.outcomes.get(lacking, Outcome())
+        if other.remark:
+            return Outcome("skipped", f"not built upon {title}, {other.remark}")
+        if other.status == "skipped":
+            return Outcome("skipped", f"{title}: {other.reason}")
+        reason = f"cannot be run: {title}: {other.status}: {other.reason}"
+        return Outcome("failed", reason, failed=True, result={BLOCKED: title})
+
+    def _needed(self, *tasks: Task) -> dict[TaskId, Outcome]:
+        """What the tasks may build upon: it is there, and up to date."""
+        ids = dict.fromkeys(id for task in tasks for id in (*task.needs, *task.reads))
+        known = {id: self.outcomes[id] for id in ids if id in self.outcomes}
+        return {id: o for id, o in known.items() if not (o.failed or o.remark or o.status == "skipped")}
+
+    def _keep(self, task: Task, outcome: Outcome) -> None:
+        self.found[task.id] = self.cache.keep(task, outcome, self.found)
+        self.outcomes[task.id] = outcome
+
+    # --- without running -----------------------------------------------------------------------------------
+
+    def foresee(self) -> Iterator[tuple[Task, Found, str]]:
+        """Of each task what the folder holds of it, and why it would be skipped, or empty. Writes nothing."""
+        for task in self.tasks:
+            found = self.found[task.id] = self.cache.find(task, self.found)
+            if found.outcome is not None and found.state != "stale":
+                self.outcomes[task.id] = found.outcome
+            needed = self._needed(task)
+            ready = all(id in needed for id in task.needs)
+            yield task, found, task.skip(needed) if ready else ""
+
+    def known(self) -> dict[TaskId, Outcome]:
+        """The outcomes so far, and of tasks that were not reached those that the folder holds up to date."""
+        for task in self.tasks:
+            if task.id not in self.outcomes:
+                found = self.cache.find(task, self.found)
+                if found.state in ("finished", "failed") and found.outcome is not None:
+                    self.found[task.id], self.outcomes[task.id] = found, found.outcome
+        return self.outcomes
+
+    def outdated(self) -> dict[str, str]:
+        """Title -> what has changed, of tasks whose outcome is kept though it is out of date."""
+        kept = (
+            (task.label, self.outcomes[task.id].remark) for task in self.tasks if task.id in self.outcomes
+        )
+        return {label: remark for label, remark in kept if remark}
+
+    def broken(self) -> Mapping[str, str]:
+        """Title -> how it failed, of tasks of which no row speaks."""
+        return {
+            task.title: f"{outcome.status}: {outcome.reason}"
+            for task in self.tasks
+            if (outcome := self.outcomes.get(task.id)) and outcome.failed and task.silent
+        }
+
+
+def _bar(task: Task, total: int) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(total=total, desc=task.stage, unit=task.unit, smoothing=0.05)

@@ -1,0 +1,233 @@
+"""The tasks that a plan asks for, in the order in which they are done: what others need comes first.
+
+Loads nothing heavy: a dry run asks for the same tasks as a run.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from itertools import groupby
+from typing import Any
+
+from snug.recipe import DEFAULT, TRAININGS
+
+from . import provenance
+from .metrics import MODULES
+from .plan import Network, Plan, network_of, runs
+from .scene import Scene
+from .scenes import of_garment
+from .source import code_of, digest
+from .tasks.case import RunCase
+from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, flat
+from .tasks.ground_truth import SettleStart, SimulateMotion, SimulateQuasiStatic
+from .tasks.metrics import MeasureCell
+from .tasks.task import Task, TaskId
+from .tasks.training import TrainNetwork
+
+AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
+TASKS, ASSETS = "benchmarks.tasks", "benchmarks.assets"
+
+
+def tasks_of(plan: Plan) -> list[Task]:
+    """Every task of the plan."""
+    return list(Schedule(plan).tasks())
+
+
+class Schedule:
+    """Makes the tasks of one plan."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan, self.preset = plan, plan.preset
+
+    def tasks(self) -> Iterator[Task]:
+        plan = self.plan
+        dressed = [scene for scene in plan.scenes if scene.dressed]
+        yield from (self.start(scene) for scene in dressed)
+        yield from (self.data(m, garment) for garment in plan.simulated for m in self._train(garment))
+        yield from map(self.network, plan.networks)
+        for _, cells in groupby(plan.cells, key=lambda cell: cell.scene.name):
+            own = list(cells)
+            for first in range(0, len(own), AT_ONCE):
+                yield from self.cells(own[first : first + AT_ONCE])
+        yield from (self.quasi_static(scene) for scene in dressed if self._has_reference(scene))
+        yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
+        yield from map(self.case, plan.cases)
+
+    # --- ground truth and training -------------------------------------------------------------------------
+
+    def start(self, scene: Scene) -> SettleStart:
+        return SettleStart(
+            name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.settle_frames,
+            **self._of_scene(scene, f"{TASKS}.ground_truth"),
+        )  # fmt: skip
+
+    def data(self, motion: str, garment: str) -> SimulateMotion:
+        scene = of_garment(garment).scene(motion).at(self.preset)
+        return SimulateMotion(
+            name=flat(scene.name), label=scene.name, scene=scene,
+            units=self.preset.settle_frames + self.preset.frames,
+            **self._of_scene(scene, f"{TASKS}.ground_truth"),
+        )  # fmt: skip
+
+    def network(self, network: Network) -> TrainNetwork:
+        training, motions = TRAININGS.get(network.name), self._train(network.garment)
+        kind = training.kind if training else network.name
+        steps = self.preset.steps_of(network.name, kind)
+        modules = (f"{TASKS}.training", ASSETS)
+        inputs = self._inputs() | self._of_body(network.garment) | {
+            "training": [network.name, kind],
+            "seed": network.seed,
+            "steps": steps,
+            "device": self.plan.device,
+            "recipe": dataclasses.asdict(training.recipe if training else DEFAULT),
+            "motions": {name: self._motion(name) for name in motions},
+        }  # fmt: skip
+        simulated: dict[str, TaskId] = {}
+        if training and training.simulated:
+            simulated = {motion: self.data(motion, network.garment).id for motion in motions}
+        return TrainNetwork(
+            name=f"{network.garment}/{network.name}-seed{network.seed}", label=network.label,
+            inputs=inputs, modules=modules, reads=tuple(simulated.values()), units=max(steps, 1),
+            training=network.name, seed=network.seed, garment=network.garment, steps=steps, motions=motions,
+            simulated=simulated, device=self.plan.device, key=digest([inputs, code_of(*modules)]),
+        )  # fmt: skip
+
+    # --- cells ---------------------------------------------------------------------------------------------
+
+    def cells(self, cells: list[Cell]) -> Iterator[Task]:
+        """Runs, then repeats in rounds, the order of the methods turned on from round to round.
+
+        So a machine that grows slower does not favour whoever came first.
+        """
+        for cell in cells:
+            yield self.cell(cell)
+            if cell.entry.batched and runs(cell):
+                yield self._after(BatchCell, cell, cell.name)
+        repeated = [cell for cell in cells if "speed" in cell.suites and runs(cell)]
+        for number in range(1, self.preset.repeats):
+            turn = number * len(repeated) // self.preset.repeats
+            for cell in (*repeated[turn:], *repeated[:turn]):
+                yield self._after(
+                    RepeatCell, cell, f"{cell.name}-{number}", longest=self.preset.repeat_seconds
+                )
+
+    def cell(self, cell: Cell) -> RunCell:
+        of_scene = self._of_scene(cell.scene, f"{TASKS}.cell", cell.entry.module)
+        inputs = of_scene["inputs"] | {"method": _declared(cell.entry)}
+        if cell.entry.seeded:
+            inputs["seed"] = cell.seed
+        if cell.entry.package:
+            inputs["package"] = provenance.package_version(cell.entry.package)
+        if cell.entry.needs_body:
+            inputs["recipe"] = dataclasses.asdict(DEFAULT)
+        needs = (self.start(cell.scene).id,) if cell.scene.dressed else ()
+        if network := network_of(cell):
+            needs = (*needs, self.network(network).id)
+        return RunCell(
+            name=cell.name, label=cell.label, cell=cell, needs=needs, process=cell.name,
+            deadline=self.preset.cell_seconds, **of_scene | {"inputs": inputs},
+        )  # fmt: skip
+
+    def _after(self, kind: Any, cell: Cell, name: str, **fields: Any) -> Task:
+        first = self.cell(cell)
+        return kind(
+            name=name, label=cell.label, cell=cell, inputs={}, modules=(f"{TASKS}.cell",), needs=(first.id,),
+            process=first.process, deadline=first.deadline, **fields,
+        )  # fmt: skip
+
+    # --- what is measured ----------------------------------------------------------------------------------
+
+    def quasi_static(self, scene: Scene) -> SimulateQuasiStatic:
+        return SimulateQuasiStatic(
+            name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.frames,
+            needs=(self.start(scene).id,), **self._of_scene(scene, f"{TASKS}.ground_truth"),
+        )  # fmt: skip
+
+    def metrics(self, cell: Cell) -> MeasureCell:
+        scene, plan = cell.scene, self.plan
+        compared = tuple(
+            (place, other)
+            for place, other in enumerate(plan.cells)
+            if other.scene == scene and other.entry.role in ("reference", "reference-variant") and runs(other)
+        )
+        reads = tuple(("cell", other.name) for _, other in compared if other != cell)
+        quasi_static, counterpart = None, None
+        if scene.dressed:
+            quasi_static = self.quasi_static(scene).id
+            reads = (*reads, quasi_static)
+        if scene.counterpart:
+            same = (c for c in plan.cells if (c.scene.name, c.entry, c.seed) ==
+                    (scene.counterpart, cell.entry, cell.seed))  # fmt: skip
+            if (counterpart := next(same, None)) is not None:
+                reads = (*reads, ("cell", counterpart.name))
+        names = (name for name in MODULES if scene.metrics is None or name in scene.metrics)
+        of_scene = self._of_scene(
+            scene, f"{TASKS}.metrics", *(f"benchmarks.metrics.{name}" for name in names)
+        )
+        inputs = {
+            "suites": sorted(cell.suites),
+            "samples": self.preset.gap_samples,
+            "method": [cell.entry.role, cell.entry.family, cell.entry.level, cell.entry.conserving],
+        }
+        if scene.dressed:
+            inputs["recipe"] = dataclasses.asdict(DEFAULT)  # of the skinning that gaps are a share of
+        return MeasureCell(
+            name=cell.name, label=cell.label, cell=cell, place=plan.cells.index(cell),
+            compared=compared, gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
+            counterpart=counterpart, needs=(("cell", cell.name),), reads=reads, batch=scene.name,
+            **of_scene | {"inputs": of_scene["inputs"] | inputs},
+        )  # fmt: skip
+
+    def case(self, case: Any) -> RunCase:
+        return RunCase(
+            name=case.name, label=case.name, case=case, deadline=case.seconds,
+            inputs=self._inputs() | {"declared": _declared(case)},
+            modules=(case.module, "benchmarks.validation.case", f"{TASKS}.case"),
+        )  # fmt: skip
+
+    # --- inputs --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _machine(self) -> dict[str, Any]:
+        """Times of another machine are not reused."""
+        facts = provenance.hardware(self.plan.device)
+        names = ("processor", "cores", "python", "device", "accelerator")
+        return {name: facts[name] for name in names if name in facts} | {"threads": 1}
+
+    def _inputs(self) -> dict[str, Any]:
+        return {"machine": self._machine}
+
+    def _of_scene(self, scene: Scene, *modules: str) -> dict[str, Any]:
+        """inputs and modules of a task that builds the scene."""
+        inputs = self._inputs() | {"scene": _declared(scene)}
+        if not scene.dressed:
+            return {"inputs": inputs, "modules": (*modules, scene.module)}
+        inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
+        if scene.part == "clip":
+            inputs["clip_frames"] = self.preset.clip_frames
+        return {"inputs": inputs, "modules": (*modules, scene.module, ASSETS)}
+
+    def _of_body(self, garment: str) -> dict[str, Any]:
+        """What the assets are made from."""
+        sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
+        return {"assets": sizes} | ({"body": self.plan.body.digest} if self.plan.body else {})
+
+    def _motion(self, name: str) -> str:
+        """Of a file its content; an embedded one is made by code, looked at by itself."""
+        files = self.plan.motions.files
+        return f"{name} {digest(files[name])}" if name in files else name
+
+    def _train(self, garment: str) -> tuple[str, ...]:
+        return self.plan.motions.train_of(garment)
+
+    def _has_reference(self, scene: Scene) -> bool:
+        return any(cell.scene == scene and cell.entry.role == "reference" for cell in self.plan.cells)
+
+
+def _declared(entry: Any) -> dict[str, Any]:
+    """What a scene, a method or a case declares, but for the words about it."""
+    fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
+    kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
+    return {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}

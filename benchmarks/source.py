@@ -1,0 +1,225 @@
+"""What the outcome of a task depends on beside its inputs: source, packages and data files that it can reach.
+
+All three are found from the syntax tree of the modules that a task names, imports inside functions included,
+so that a change in one method leaves the results of the others as they are. Comments, formatting and
+docstrings do not count.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import hashlib
+import importlib.util
+import json
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+LAYERS = ("reference_sim", "snug", "benchmarks")
+NO_DATA = (".py", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
+
+
+def digest(value: Any) -> str:
+    """16 hexadecimal digits of a value: JSON, bytes, dataclasses, or anything with a plain repr inside."""
+    if not isinstance(value, bytes):
+        value = json.dumps(value, sort_keys=True, default=_plain).encode()
+    return hashlib.sha256(value).hexdigest()[:16]
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+    if hasattr(value, "tobytes"):  # an array
+        return [str(value.dtype), list(value.shape), digest(value.tobytes())]
+    if isinstance(value, set | frozenset):
+        return sorted(value)
+    if hasattr(value, "items"):
+        return dict(value)
+    raise TypeError(f"cannot tell apart by content: {type(value).__name__}")
+
+
+def digest_of_file(path: Path) -> str:
+    """16 hexadecimal digits of a file's bytes; of a trajectory those of its positions.
+
+    Curves are added to a trajectory when it is measured; its positions stay as they were computed. Raises
+    OSError or KeyError for a trajectory that cannot be read.
+    """
+    if path.suffix != ".vtkhdf":
+        return digest(path.read_bytes())
+    import h5py
+
+    with h5py.File(path) as file:
+        return digest(file["VTKHDF/Points"][:].tobytes())
+
+
+def code_of(*modules: str) -> dict[str, str]:
+    """File -> digest of its code, of these modules and all of ours that they import, directly or not."""
+    found: set[str] = set()
+    for module in modules:
+        found |= _closure(_file_of(module) or _elsewhere(module))
+    return {path: _source(path).digest for path in sorted(found)}
+
+
+def packages_of(code: Iterable[str]) -> dict[str, str]:
+    """Package -> installed version, of all that these files import, or "absent"."""
+    names = set().union(*(_source(path).packages for path in code))
+    return {name: _version(name) for name in sorted(names)}
+
+
+def data_of(code: Iterable[str]) -> dict[str, str]:
+    """File -> digest, of what comes with the packages of ours that these files belong to and is no source."""
+    packages = {path.split("/")[0] for path in code} & set(LAYERS)
+    return {name: file for package in sorted(packages) for name, file in _data_files(package).items()}
+
+
+@cache
+def _data_files(package: str) -> dict[str, str]:
+    found = sorted(path for path in (ROOT / package).rglob("*") if path.is_file())
+    kept = (path for path in found if path.suffix not in NO_DATA and not _hidden(path))
+    return {path.relative_to(ROOT).as_posix(): digest_of_file(path) for path in kept}
+
+
+def _hidden(path: Path) -> bool:
+    return any(part.startswith((".", "__")) for part in path.relative_to(ROOT).parts)
+
+
+@cache
+def _distributions() -> dict[str, list[str]]:
+    return dict(metadata.packages_distributions())
+
+
+@cache
+def _version(package: str) -> str:
+    """Of the distributions that an import of this name loads."""
+    names = sorted(set(_distributions().get(package, ())))
+    return ", ".join(f"{name} {metadata.version(name)}" for name in names) or "absent"
+
+
+def _elsewhere(module: str) -> str:
+    """The file of a module that is not ours: a method or a scene of a user. Raises ValueError."""
+    found = None
+    with suppress(ModuleNotFoundError):  # of its package
+        found = importlib.util.find_spec(module)
+    if found is None or found.origin is None:
+        raise ValueError(f"no module {module}")
+    return found.origin
+
+
+@cache
+def _closure(root: str) -> frozenset[str]:
+    seen: set[str] = set()
+    todo = [root]
+    while todo:
+        path = todo.pop()
+        if path not in seen:
+            seen.add(path)
+            todo += _source(path).files
+    return frozenset(seen)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Source:
+    digest: str
+    files: tuple[str, ...]  # of ours that it imports
+    packages: frozenset[str]  # of others
+
+
+@cache
+def _source(path: str) -> _Source:
+    tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    imports = [pair for node in _running(tree) for pair in _imported(node, path)]
+    roots = {base.split(".")[0] for base, _ in imports}
+    files = (f for base, name in imports if base.split(".")[0] in LAYERS for f in _files_behind(base, name))
+    found = tuple(dict.fromkeys(files))
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list) and body and _is_text(body[0]):
+            body[0].value.value = ""  # a docstring
+    others = frozenset(roots - set(LAYERS) - sys.stdlib_module_names)
+    return _Source(digest(ast.dump(tree).encode()), found, others)
+
+
+def _is_text(node: ast.AST) -> bool:
+    constant = node.value if isinstance(node, ast.Expr) else None
+    return isinstance(constant, ast.Constant) and isinstance(constant.value, str)
+
+
+def _imported(node: ast.AST, path: str) -> list[tuple[str, str]]:
+    """(module, name in it or empty) of everything that an import statement of that file names."""
+    if isinstance(node, ast.Import):
+        return [(alias.name, "") for alias in node.names]
+    if not isinstance(node, ast.ImportFrom):
+        return []
+    package = path.split("/")[:-1]
+    above = package[: len(package) - node.level + 1] if node.level else []
+    base = ".".join([*above, *(node.module or "").split(".")]).strip(".")
+    return [(base, alias.name) for alias in node.names]
+
+
+def _running(node: ast.AST) -> Iterator[ast.AST]:
+    """All nodes but those for the type checker alone."""
+    for child in ast.iter_child_nodes(node):
+        if not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
+            yield child
+            yield from _running(child)
+
+
+def _files_behind(base: str, name: str) -> Iterator[str]:
+    """The files that `from base import name` needs.
+
+    A package that has the name neither as a module nor in its own text gives it when it is first used: then
+    that of its modules counts which defines the name, and where none does, all of them.
+    """
+    path, inner = _file_of(base), _file_of(f"{base}.{name}") if name else None
+    if path is None or not path.endswith("/__init__.py") or not name:
+        yield from (
+            found for found in (inner, path) if found is not None and (found == inner or inner is None)
+        )
+        return
+    if name in _bound(path):
+        yield path
+    elif inner is not None:
+        yield inner
+    else:
+        yield path
+        folder = sorted((ROOT / path).parent.glob("*.py"))
+        modules = [p.relative_to(ROOT).as_posix() for p in folder if p.name != "__init__.py"]
+        yield from [module for module in modules if name in _bound(module)] or modules
+
+
+@cache
+def _bound(path: str) -> frozenset[str]:
+    """Names that the text of a file binds at its top level."""
+    names: set[str] = set()
+    for node in _running_here(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom | ast.Import):
+            names |= {alias.asname or alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names |= {
+                part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)
+            }
+    return frozenset(names)
+
+
+def _running_here(tree: ast.Module) -> Iterator[ast.stmt]:
+    for node in tree.body:
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        yield node
+        if isinstance(node, ast.If | ast.Try):
+            yield from node.body
+
+
+@cache
+def _file_of(module: str) -> str | None:
+    stem = module.replace(".", "/")
+    return next((p for p in (f"{stem}.py", f"{stem}/__init__.py") if (ROOT / p).is_file()), None)

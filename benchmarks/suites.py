@@ -1,0 +1,134 @@
+"""The visible tuple of suites: which scenes meet which methods, and what is only in a full run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .methods import METHODS
+from .methods.learned import LEARNED
+from .plan import Motions
+from .presets import Preset
+from .scenes import GARMENT_SCENES
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much of a suite is asked for. full: more than its quick subset; further: what doubles the work."""
+
+    preset: Preset
+    motions: Motions
+    full: bool = False
+    further: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suite:
+    """A question put to many cells, or to cases of benchmarks.validation.
+
+    scenes, methods: names of those that meet. more_methods: those that take part only where methods are
+    named, or at a preset that holds all.
+    """
+
+    name: str
+    description: str
+    scenes: Callable[[Extent], list[str]] = lambda extent: []
+    methods: Callable[[Extent], list[str]] = lambda extent: []
+    more_methods: tuple[str, ...] = ()
+
+
+# --- garments ----------------------------------------------------------------------------------------------
+
+
+def _whole_motions(extent: Extent) -> list[str]:
+    """A T-shirt in each test motion; other garments where scenes are named, or at preset paper."""
+    shirt, *others = GARMENT_SCENES
+    names = [shirt.scene(name).name for name in extent.motions.test]
+    if extent.further:
+        names += [o.scene(name).name for o in others for name in extent.motions.dynamic_test]
+    return names
+
+
+# --- speed -------------------------------------------------------------------------------------------------
+
+SMALL = ("hanging_sheet", "sheet_on_sphere", "flag", "twisted_strip")
+EXACT = ("free_fall",)  # every method has no error there but round-off: only for whoever names it
+LIVELY = ("sudden_stop", "spin_jump")  # of the library's test motions: a run and its stop, a jump with a turn
+# Of the motions for garments with dynamics: a walk that turns, its clip before the stop. No training saw its
+# turning; its strides are those of the T-shirt's training walks, so it is the easiest scene for networks.
+TURNING = ("turning_stop",)
+
+# The reference from coarse to fine in tolerance and in time, and from a start moved by 1e-9 m.
+REFERENCES = (
+    "simulation", "simulation-1e-2", "simulation-1e-8", "simulation-dt/2", "simulation-dt/4",
+    "simulation-dt/8", "simulation-perturbed",
+)  # fmt: skip
+FEW_REFERENCES = ("simulation", "simulation-1e-2", "simulation-dt/2", "simulation-perturbed")
+FAMILIES = (("newton", 1), ("lbfgs", 5), ("snug+lbfgs", 1))  # iterations per unit of a preset's budgets
+OTHER_SOLVERS = ("gradient-descent-10", "vbd-20", "xpbd-40", "skinning+lbfgs-4", "snug+newton-2")
+EXTERNAL = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
+FAST = ("skinning", "snug", "supervised", "pbns")
+
+
+def _clips(extent: Extent) -> list[str]:
+    """Small scenes and clips of dressed bodies; the quick subset is one of each.
+
+    Dressed bodies are clips, the liveliest part of a motion: here every solver goes through every frame.
+    """
+    motions = extent.motions
+    lively = [name for name in motions.test if name in LIVELY] or list(motions.test[:2])
+    if not extent.full:
+        return [SMALL[0], *(f"tshirt/{name}@clip" for name in lively[:1])]
+    turning = [name for name in motions.dynamic_test if name in TURNING]
+    shirts = [f"tshirt/{name}@clip" for name in (*lively, *turning)]
+    skirts = [f"skirt/{name}@clip" for name in turning]
+    return [*SMALL, *(EXACT if extent.further else ()), *shirts, *skirts]
+
+
+def _solvers(extent: Extent) -> list[str]:
+    """The reference, truncated solvers and everything learned; few budgets mean few references too."""
+    budgets = extent.preset.iteration_budgets
+    references = REFERENCES if len(budgets) > 2 else FEW_REFERENCES
+    families = [
+        entry.name
+        for family, scale in FAMILIES
+        for entry in METHODS
+        if entry.family == family and entry.level in [scale * budget for budget in budgets]
+    ]
+    return [*references, *families, *OTHER_SOLVERS, *EXTERNAL, *FAST]
+
+
+SUITES = (
+    Suite(
+        name="garments",
+        description="all methods on unseen motions: energies, curvature, cost",
+        scenes=_whole_motions,
+        methods=lambda extent: ["simulation", "skinning", "untrained", "snug", "supervised", "pbns"],
+        more_methods=(
+            *(entry.name for entry in LEARNED), "simulation-perturbed", "lbfgs-5", "lbfgs-10",
+        ),
+    ),
+    Suite(
+        name="speed",
+        description="error against run time: truncated solvers beside networks",
+        scenes=_clips,
+        methods=_solvers,
+        # Learned ones as in suite garments.
+        more_methods=(
+            "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4", "gradient-descent-40", "vbd-5",
+            "vbd-80", "xpbd-10", "xpbd-160", "skinning+lbfgs-1", "skinning+lbfgs-2", "skinning+lbfgs-8",
+            "skinning+newton-1", "skinning+newton-2", "skinning+newton-4", "skinning+newton-8",
+            "snug+newton-1", "snug+newton-4", "snug+newton-8",
+        ),
+    ),
+    Suite(
+        name="validation",
+        description="physics with an exact answer: measured, expected, tolerance",
+    ),
+    Suite(
+        name="extremes",
+        description="stiff, huge and degenerate input: converged, or an honest failure",
+    ),
+)  # fmt: skip
+
+SUITE_NAMES = tuple(suite.name for suite in SUITES)

@@ -1,0 +1,31 @@
+"""A known answer, or a stress test, of benchmarks.validation."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from .task import Context, Outcome, Task, TaskId
+
+if TYPE_CHECKING:
+    from ..validation.case import Case
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunCase(Task):
+    """The row of one case."""
+
+    kind = "case"
+    stage = "validation"
+    unit = "case"
+    case: Case
+
+    def warm_up(self) -> None:
+        self.case.warm_up()
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        row = self.case.run()
+        context.tell(self.units)
+        return Outcome(row.status, row.reason, failed=row.status != "ok", result=dataclasses.asdict(row))

@@ -1,0 +1,116 @@
+"""What is simulated beside the cells: settled garments, motions to learn from, and quasi-static answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..results import RunFolder, replacing
+from ..scene import BuiltScene, Scene
+from .cell import built
+from .task import Context, Outcome, Task, TaskId
+
+# With this time step [s] and no velocities inertia weighs a thousandth of what it weighs in a frame: a hem
+# that swings once in a second comes within 3 % of its static place, and there is still one minimum to go to.
+SLOW = 1.0
+TOLERANCE = 1e-4  # mean vertex weights: the hem is measured in millimetres
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SettleStart(Task):
+    """The garment settled in the first pose of a dressed scene, and the posed body."""
+
+    kind = "start"
+    silent = True
+    stage = "ground truth"
+    unit = "frame"
+    scene: Scene
+
+    def clear(self, folder: RunFolder) -> None:
+        for path in (folder.start_path(self.scene.name), folder.body_path(self.scene.name)):
+            path.unlink(missing_ok=True)
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        import numpy as np
+
+        scene, run = self.scene.build(context.assets), context.folder
+        assert scene.obstacle is not None
+        with replacing(run.body_path(scene.name)) as temporary:
+            np.save(temporary, scene.obstacle.positions)
+        write_body(run, scene)
+        with replacing(run.start_path(scene.name)) as temporary:
+            np.save(temporary, scene.start)
+        context.tell(self.units)
+        paths = (run.start_path(scene.name), run.body_path(scene.name))
+        return Outcome(files=tuple(map(run.relative, paths)))
+
+
+def write_body(run: RunFolder, scene: BuiltScene) -> None:
+    """trajectories/<scene>/body.vtkhdf, to look at the garments upon."""
+    import numpy as np
+
+    from reference_sim import Trajectory
+
+    assert scene.obstacle is not None
+    Trajectory(
+        positions=scene.obstacle.positions.astype(np.float32),  # for the eye: half the size
+        faces=scene.obstacle.faces,
+        times=np.arange(scene.frames) * scene.dt,
+        frame_seconds=np.full(scene.frames, np.nan),
+        provenance={"what": "the body of this scene"},
+    ).save(run.trajectory_path(scene.name, "body"))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulateMotion(Task):
+    """The simulation of a training motion, settling included; networks learn from a whole one."""
+
+    kind = "data"
+    silent = True
+    stage = "ground truth"
+    unit = "frame"
+    scene: Scene
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        from reference_sim import simulate
+
+        scene = self.scene.build(context.assets)
+        trajectory = simulate(
+            scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
+            start=scene.start, pin_positions=scene.pin_positions,
+        )  # fmt: skip
+        path = context.folder.trajectory_path(scene.name, "simulation")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        trajectory.save(path)
+        context.tell(self.units)
+        result = {
+            "frames": trajectory.frames,
+            "whole": trajectory.frames == scene.frames,
+            "ending": f"{trajectory.status}: {trajectory.reason}",
+            "converged": trajectory.status == "converged",
+        }
+        return Outcome(result=result, files=(context.folder.relative(path),))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulateQuasiStatic(Task):
+    """The simulator's answer to each frame of a scene held still: what dynamics are measured against."""
+
+    kind = "quasi-static"
+    silent = True
+    stage = "quasi-static answers"
+    unit = "frame"
+    scene: Scene
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        from reference_sim import simulate
+
+        scene = built(self.scene, context)
+        path = context.folder.quasi_static_path(scene.name, "simulation")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        simulate(
+            scene.cloth, scene.energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,
+            start=scene.start, quasi_static=True, tolerance=TOLERANCE, pin_positions=scene.pin_positions,
+        ).save(path)  # fmt: skip
+        context.tell(self.units)
+        return Outcome(files=(context.folder.relative(path),))

@@ -1,0 +1,124 @@
+"""A task: what is done once and kept. Its inputs, what it needs, how it runs, and what comes of it.
+
+Ground truth, trainings, cells and their repeats, metrics, validation and stress cases are all tasks. The
+runner alone asks the cache, runs tasks in their processes, keeps outcomes and goes on after a failure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+if TYPE_CHECKING:
+    from ..assets import Assets
+    from ..results import RunFolder
+
+TaskId = tuple[str, str]  # kind and name
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a task.
+
+    status and reason: in the words of a result row. failed: whether there is nothing to build upon. result:
+    plain values. files: what it has left, by their names in the run's folder. seconds: wall time. commit: of
+    the code, where an earlier run did it. remark: what has changed since, where it is kept all the same.
+    """
+
+    status: str = "ok"
+    reason: str = ""
+    failed: bool = False
+    result: Mapping[str, Any] = field(default_factory=dict)
+    files: tuple[str, ...] = ()
+    seconds: float = 0.0
+    commit: str = ""
+    remark: str = ""
+
+
+def tell_nobody(units: int) -> None:
+    """Where no one follows the progress."""
+
+
+@dataclass
+class Context:
+    """What a process knows. memo: kept between tasks of this process. tell: reports units of progress."""
+
+    folder: RunFolder
+    assets: Assets | None = None
+    tell: Callable[[int], None] = tell_nobody
+    memo: dict[Any, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Task:
+    """One piece of work.
+
+    inputs: plain values that the outcome depends on. modules: those whose source, with all that they import,
+    it depends on. needs: tasks without whose success it cannot be run; reads: those that it uses where they
+    succeeded. Their outcomes count as inputs. units: of progress. batch: tasks of one batch are handed out
+    together. process: a timed task runs alone on the machine, in the process of this name; others run side by
+    side in any. deadline: [s] after which its process is ended.
+    """
+
+    kind: ClassVar[str]
+    stage: ClassVar[str]  # title of what is done at a time
+    unit: ClassVar[str] = "task"
+    silent: ClassVar[bool] = False  # whether no row of the results speaks of it: a failure is then said apart
+
+    name: str
+    label: str
+    inputs: Mapping[str, Any]
+    modules: tuple[str, ...]
+    needs: tuple[TaskId, ...] = ()
+    reads: tuple[TaskId, ...] = ()
+    units: int = 1
+    batch: str = ""
+    process: str = ""
+    deadline: float | None = None
+
+    @property
+    def id(self) -> TaskId:
+        return self.kind, self.name
+
+    @property
+    def title(self) -> str:
+        return f"{self.kind} {self.label}"
+
+    def skip(self, needed: Mapping[TaskId, Outcome]) -> str:
+        """Why there is nothing to do, or empty. Such a task leaves no trace."""
+        return ""
+
+    def clear(self, folder: RunFolder) -> None:
+        """Remove what an earlier run of it has left, so that nobody takes it for this one's."""
+
+    def assets(self, assets: Assets | None) -> Assets | None:
+        """What of the assets its own process needs."""
+        return None
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Do it. needed: the outcomes of `needs` and `reads` that are there. What is raised is a failure."""
+        raise NotImplementedError
+
+    def warm_up(self) -> None:
+        """What a process does before its first task of this kind and module, without the deadline."""
+
+    @classmethod
+    def run_together(
+        cls, tasks: Sequence[Task], context: Context, needed: Mapping[TaskId, Outcome]
+    ) -> Iterator[Outcome]:
+        """The outcomes of the tasks of one batch."""
+        for task in tasks:
+            yield task.run(context, needed)
+
+
+def one_line(error: BaseException) -> str:
+    """What was raised, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def failure(error: BaseException) -> Outcome:
+    """The outcome of a task that raised. torch's allocator on a CPU raises a plain RuntimeError."""
+    memory = isinstance(error, MemoryError) or type(error).__name__ == "OutOfMemoryError"
+    memory = memory or "DefaultCPUAllocator" in str(error)
+    return Outcome("out-of-memory" if memory else "failed", one_line(error), failed=True)

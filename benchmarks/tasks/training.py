@@ -1,0 +1,104 @@
+"""Training of one network."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..methods.network import model_path
+from ..results import RunFolder
+from .task import Context, Outcome, Task, TaskId
+
+LOG_EVERY = 20  # training steps between two reports of progress
+CHECKPOINT_MINUTES = 5.0  # between two checkpoints: a training of preset quick is over before the first
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrainNetwork(Task):
+    """A network of snug.recipe.TRAININGS (or an untrained one), in the folder of its garment's networks.
+
+    training: its name there. motions: what it learns from; simulated: motion -> the task that simulates it,
+    where it learns from simulations. device: cpu or cuda, for every part of a step. key: a training of the
+    same key that was killed goes on from its last checkpoint, and ends as it would have.
+    """
+
+    kind = "network"
+    silent = True
+    stage = "training"
+    unit = "step"
+    training: str
+    seed: int
+    garment: str
+    steps: int
+    motions: tuple[str, ...]
+    simulated: Mapping[str, TaskId]
+    device: str
+    key: str
+
+    def path(self, folder: RunFolder) -> Path:
+        return model_path(folder.models_of(self.garment), self.training, self.seed)
+
+    def clear(self, folder: RunFolder) -> None:
+        """Its model, and checkpoints of trainings that nobody asks for any more."""
+        path = self.path(folder)
+        path.unlink(missing_ok=True)
+        for other in set(path.parent.glob(f".{path.stem}.*.checkpoint.safetensors")) - {
+            self._checkpoint(path)
+        }:
+            other.unlink()
+
+    def _checkpoint(self, path: Path) -> Path:
+        return path.with_name(f".{path.stem}.{self.key}.checkpoint.safetensors")
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        import torch
+
+        from reference_sim.trajectory import Trajectory
+        from snug.dresser import DressedBody
+        from snug.recipe import TRAININGS
+        from snug.train import train, untrained_model
+        from snug.training_run import Saving
+
+        torch.set_num_threads(1)
+        assets, run = context.assets, context.folder
+        assert assets is not None
+        path = self.path(run)
+        saving = Saving(path=self._checkpoint(path), minutes=CHECKPOINT_MINUTES, resume=True)
+        dressed = DressedBody(assets.body, assets.garments[self.garment])
+        if self.training == "untrained":
+            model = untrained_model("snug", dressed, assets.named(self.motions), seed=self.seed)
+        else:
+            training, motions, targets = TRAININGS[self.training], self.motions, None
+            if training.simulated:
+                whole = {m: needed[id] for m, id in self.simulated.items() if self._is_whole(needed.get(id))}
+                motions = tuple(whole)
+                targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
+            told = 0
+
+            def log(row: dict[str, float]) -> None:
+                nonlocal told
+                context.tell(int(row["step"]) - told)
+                told = int(row["step"])
+
+            model = train(
+                training.kind, dressed, assets.named(motions), steps=self.steps, seed=self.seed,
+                trajectories=targets, recipe=training.recipe, log=log, progress=False, every=LOG_EVERY,
+                device=self.device, saving=saving,
+            )  # fmt: skip
+        path.parent.mkdir(parents=True, exist_ok=True)
+        model.save(path)
+        saving.done()
+        result = {
+            "recipe": model.recipe.name,
+            "seconds": model.seconds,
+            "setup_seconds": model.setup_seconds,
+            "megabytes": model.megabytes,
+            "steps": model.steps,
+            "last": dict(model.history[-1]) if model.history else {},
+        }
+        return Outcome(result=result, files=(run.relative(path),))
+
+    @staticmethod
+    def _is_whole(outcome: Outcome | None) -> bool:
+        return outcome is not None and bool(outcome.result["whole"])

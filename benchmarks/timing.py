@@ -1,0 +1,100 @@
+"""The one clock: monotonic, stopped only when every position is there and nothing works on.
+
+What it counts is `run()` and the touching of every frame. Loading, compiling, warming up, metrics and writing
+are outside. A method that comes back before its work is done is found out: its positions still change, its
+process still computes, or it has used more processor than one thread can.
+"""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import os
+import sys
+import threading
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    import numpy as np
+
+AFTER = 0.05  # [s] for which the process is watched once the clock has stopped
+BUSY = 0.3  # share of that time which the processor may be at work
+CROWDED = 1.3  # processor seconds per second on the clock, beyond which more than one thread has worked
+GRAIN = 0.05  # [s] below which processor time is too coarse to be compared
+
+
+@dataclass(frozen=True)
+class Reading:
+    """seconds: on the clock. complaint: why they cannot be believed, or empty."""
+
+    seconds: float
+    complaint: str = ""
+
+
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+Made = TypeVar("Made")
+
+
+def one_thread() -> None:
+    """One thread for everything, whatever the shell says; to be called before any library reads it.
+
+    So times are comparable, every row can state it, and two workers do not fight over two cores.
+    """
+    for name in THREADS:
+        os.environ[name] = "1"
+
+
+def clocked(run: Callable[[], Made], *, of: Callable[[Made], np.ndarray]) -> tuple[Made, Reading]:
+    """What run() gives, and the time until all positions `of` it are there."""
+    gc.collect()  # what preparing has left is not charged to the run
+    before = set(threading.enumerate())
+    children = set(multiprocessing.active_children())
+    _synchronise()
+    used, clock = time.process_time(), time.perf_counter()
+    made = run()
+    touch(of(made))
+    _synchronise()
+    seconds, used = time.perf_counter() - clock, time.process_time() - used
+    if used > CROWDED * seconds + GRAIN:
+        crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked"
+        return made, Reading(seconds, crowd)
+    return made, Reading(seconds, _still_at_work(of(made), before, children))
+
+
+def touch(positions: np.ndarray) -> float:
+    """Read every number: what is made only when looked at is made now."""
+    import numpy as np
+
+    return float(np.add.reduce(np.asarray(positions), axis=None))
+
+
+def _still_at_work(
+    positions: np.ndarray, threads: set[threading.Thread], children: set[multiprocessing.process.BaseProcess]
+) -> str:
+    """Watch the process for a moment: what does it do after it said that it was done?"""
+    import numpy as np
+
+    seen = zlib.crc32(np.asarray(positions).tobytes())
+    used, clock = time.process_time(), time.perf_counter()
+    time.sleep(AFTER)
+    busy = (time.process_time() - used) / (time.perf_counter() - clock)
+    if zlib.crc32(np.asarray(positions).tobytes()) != seen:
+        return "positions still changed after run() had come back"
+    if busy > BUSY:
+        return f"the process was still at work ({100 * busy:.0f} %) after run() had come back"
+    # The progress bar keeps a thread that sleeps; it moves no vertex.
+    left = [t.name for t in set(threading.enumerate()) - threads if type(t).__name__ != "TMonitor"]
+    left += [child.name for child in set(multiprocessing.active_children()) - children]
+    return f"{left[0]} was still running after run() had come back" if left else ""
+
+
+def _synchronise() -> None:
+    """Wait for the accelerator, where this process has begun to use one."""
+    torch = sys.modules.get("torch")
+    if torch is not None and torch.cuda.is_initialized():
+        torch.cuda.synchronize()

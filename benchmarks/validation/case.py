@@ -1,0 +1,125 @@
+"""A case: one row whose answer is known before anything is computed, or that has to end honestly."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..results import Row
+
+METHOD = "simulation"
+WARM_UP_SECONDS = 900.0  # for a process that may have to compile every kernel first
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """What a case has measured where it says by itself how it ended: value, status and reason of the row."""
+
+    value: float | None
+    status: str
+    reason: str
+    terms: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One row: what is measured, what it must be and how far it may be off. `reason` defends the tolerance.
+
+    `function` of `module`, called with `options`, returns a number, (measured, expected) where the reference
+    has to be solved first, or a Measurement. A number without a tolerance is reported, not judged.
+
+    Attributes:
+        name: unique over all cases, and the row's scene unless `scene` is given.
+        module: dotted; with all that it imports it is what the row depends on.
+        smoke: whether the smallest preset runs it.
+        seconds: after which the case's process is ended; None: never.
+    """
+
+    name: str
+    suite: str = "validation"
+    description: str
+    module: str
+    function: str
+    options: dict[str, Any] = field(default_factory=dict)
+    scene: str = ""
+    metric: str = "check"
+    unit: str = "1"
+    expected: float | None = None
+    tolerance: float | None = None
+    reason: str = ""
+    smoke: bool = False
+    seconds: float | None = None
+
+    def run(self) -> Row:
+        """The row, measured here and now. What is raised becomes a failed row with its reason."""
+        try:
+            found = self._imported(self.function)(**self.options)
+            if isinstance(found, Measurement):
+                return self.row(found.value, found.status, found.reason, terms=found.terms)
+            value, expected = found if isinstance(found, tuple) else (found, self.expected)
+            return self.judged(float(value), None if expected is None else float(expected))
+        except Exception as error:
+            return self.row(reason=f"{type(error).__name__}: {error}")
+
+    def warm_up(self) -> None:
+        """Compile what the first case of a process would otherwise compile within its deadline."""
+        self._imported("warm_up", lambda: None)()
+
+    def judged(self, value: float, expected: float | None) -> Row:
+        """The row of a number: ok where it is finite and within the tolerance of the expected one."""
+        if not math.isfinite(value):
+            return self.row(reason=f"the measured number is {value}", expected=expected)
+        if self.tolerance is None:
+            return self.row(value, "ok", expected=expected)
+        if expected is None:
+            return self.row(value, reason="a tolerance, but nothing to compare with")
+        if abs(value - expected) <= self.tolerance:
+            return self.row(value, "ok", expected=expected)
+        far = f"{value:.6g} is further than {self.tolerance:g} from {expected:g} ({self.reason})"
+        return self.row(value, reason=far, expected=expected)
+
+    def row(
+        self,
+        value: float | None = None,
+        status: str = "failed",
+        reason: str = "",
+        *,
+        expected: float | None = None,
+        terms: str = "",
+    ) -> Row:
+        """The row with these values; expects what the case declares unless another number is given."""
+        return Row(
+            suite=self.suite,
+            scene=self.scene or self.name,
+            method=METHOD,
+            seed=0,
+            metric=self.metric,
+            unit=self.unit,
+            value=value,
+            status=status,
+            reason=reason,
+            expected=self.expected if expected is None else expected,
+            tolerance=self.tolerance,
+            terms=terms,
+        )
+
+    def _imported(self, *name_and_default: Any) -> Any:
+        return getattr(importlib.import_module(self.module), *name_and_default)
+
+
+def timed_out(case: Case, reason: str, status: str = "failed") -> Row:
+    """The row of a case whose process died or was ended at its deadline.
+
+    A hang and a crash are failures of the solver. Only a solver that ends by itself may call it a timeout.
+    """
+    return case.row(status=status, reason=reason)
+
+
+def known_answer(
+    name: str, description: str, module: str, function: str, *, smoke: bool = True, **declared: Any
+) -> Case:
+    """A case of suite validation, measured by `function` of benchmarks.validation.<module>."""
+    module = f"benchmarks.validation.{module}"
+    return Case(name=name, description=description, module=module, function=function, smoke=smoke, **declared)

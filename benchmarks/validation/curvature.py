@@ -1,0 +1,81 @@
+"""The curvature metric on surfaces whose curvature is known: it has to be right before it judges."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..metrics.curvature import boundary_mask, mean_curvature
+from .fitted_order import fitted_order
+from .meshes import cylinder_patch, icosphere, rectangle, torus
+
+
+def sphere_curvature() -> float:
+    """Largest relative error of H over the vertices of a sphere, the twelve 5-valent ones included."""
+    radius = 0.25
+    x, faces = icosphere(3, radius)
+    return float(np.abs(mean_curvature(x, faces)[0] * radius - 1.0).max())
+
+
+def torus_order() -> float:
+    """Order of the largest error of H on a torus."""
+    errors = []
+    for cells in (24, 48, 96):
+        x, faces, exact = torus(cells, 0.3, 0.1)
+        errors.append(float(np.abs(mean_curvature(x, faces)[0] - exact).max()))
+    return fitted_order(errors, [1 / cells for cells in (24, 48, 96)])
+
+
+def sphere_order() -> float:
+    """Order of the largest error of H on a sphere, on a band of right triangles along parallels.
+
+    On triangles that are all nearly alike, as an icosahedron's, the error falls faster still.
+    """
+    errors, sizes = [], (12, 24, 48)
+    for cells in sizes:
+        flat, faces = rectangle("right", cells, cells, 2.0, 1.6)
+        u, v = flat[:, 0], flat[:, 1] - 0.8
+        x = np.stack([np.cos(v) * np.sin(u), np.sin(v), np.cos(v) * np.cos(u)], axis=1)
+        inside = ~boundary_mask(faces, len(x))
+        errors.append(float(np.abs(mean_curvature(x, faces)[0][inside] - 1).max()))
+    return fitted_order(errors, [1 / cells for cells in sizes])
+
+
+def cylinder_order() -> float:
+    """Order of the largest error of H on a cylinder of right triangles with no edge along the circle."""
+    errors, sizes = [], (12, 24, 48)
+    for cells in sizes:
+        flat, faces = rectangle("right", cells, cells, 1.0, 1.0)
+        x = _wrapped(flat @ np.array([[0.8, 0.6], [-0.6, 0.8]]))
+        inside = ~boundary_mask(faces, len(x))
+        errors.append(float(np.abs(mean_curvature(x, faces)[0][inside] * 2 - 1).max()))
+    return fitted_order(errors, [1 / cells for cells in sizes])
+
+
+def cylinder_curvature() -> float:
+    """Mean of H over interior vertices [1/m] of a cylinder of radius 0.1 m: 1/(2 R) = 5."""
+    x, faces = cylinder_patch(40, 0.1)
+    curvature, area = mean_curvature(x, faces)
+    inside = ~boundary_mask(faces, len(x))
+    return float(np.average(curvature[inside], weights=area[inside]))
+
+
+def cylinder_floor() -> float:
+    """Relative rms error of H on a cylinder of jittered triangles: finer ones do not lower it."""
+    flat, faces = rectangle("delaunay", 48, 48, 1.0, 1.0)
+    x = _wrapped(flat)
+    inside = ~boundary_mask(faces, len(x))
+    return float(np.sqrt(np.mean((mean_curvature(x, faces)[0][inside] * 2 - 1) ** 2)))
+
+
+def sphere_floor() -> float:
+    """The same on a cap of the unit sphere, seen from above as a jittered square of side 1."""
+    flat, faces = rectangle("delaunay", 48, 48, 1.0, 1.0)
+    flat = flat - 0.5
+    x = np.column_stack([flat, np.sqrt(1 - (flat**2).sum(axis=1))])
+    inside = ~boundary_mask(faces, len(x))
+    return float(np.sqrt(np.mean((mean_curvature(x, faces)[0][inside] - 1) ** 2)))
+
+
+def _wrapped(flat: np.ndarray) -> np.ndarray:
+    """Points (V,2) of the plane rolled onto a cylinder of radius 1: (V,3)."""
+    return np.stack([np.sin(flat[:, 1]), np.cos(flat[:, 1]), flat[:, 0]], axis=1)

@@ -1,0 +1,156 @@
+"""Meshes of the plane in five families of triangles, and of surfaces whose curvature is known."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+FAMILIES = ("right", "cross", "union_jack", "equilateral", "delaunay")
+ROW = 2 / 3**0.5  # of the equilateral family: distance of neighbours in a column, over that of columns
+
+
+def jittered_patch(cells: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A Delaunay mesh of the unit square in the plane: points (V,2) [m], faces (F,3), counter-clockwise."""
+    random = np.random.default_rng(seed)
+    i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
+    points = np.stack([i, j], -1).astype(float)
+    points[1:-1, 1:-1] += random.uniform(-0.3, 0.3, (cells - 1, cells - 1, 2))
+    points = points.reshape(-1, 2) / cells
+    return points, delaunay_faces(points)
+
+
+def delaunay_faces(points: np.ndarray) -> np.ndarray:
+    """Delaunay triangles (F,3) of points (V,2), counter-clockwise, without flat ones on straight borders."""
+    faces = Delaunay(points).simplices.astype(np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    solid = np.abs(signed) > 1e-9
+    faces, signed = faces[solid], signed[solid]
+    faces[signed < 0] = faces[signed < 0][:, ::-1]
+    return faces
+
+
+def right_grid(rows: int, columns: int, height: float, width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Right triangles, all diagonals alike: points (V,2) [m], row by row, faces (F,3), counter-clockwise."""
+    y, x = np.meshgrid(np.linspace(0, height, rows + 1), np.linspace(0, width, columns + 1), indexing="ij")
+    a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    b, c, d = a + 1, a + columns + 2, a + columns + 1
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return np.stack([x.ravel(), y.ravel()], 1), faces
+
+
+def in_space(points: np.ndarray) -> np.ndarray:
+    """(V,2) -> (V,3) in the plane z = 0."""
+    return np.concatenate([points, np.zeros((len(points), 1))], axis=1)
+
+
+def random_rotation(seed: int) -> np.ndarray:
+    """(3,3), a proper rotation."""
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    q *= np.sign(np.diag(r))
+    return q if np.linalg.det(q) > 0 else -q
+
+
+def icosphere(subdivisions: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """An icosahedron refined and pushed out to `radius` [m]: points (V,3), outward faces (F,3)."""
+    golden = (1 + 5**0.5) / 2
+    corners = [(0.0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
+    points = np.array([np.roll(corner, k) for k in range(3) for corner in corners])
+    near = np.isclose(np.linalg.norm(points[:, None] - points[None], axis=2), 2.0)
+    i, j, k = np.meshgrid(*[np.arange(12)] * 3, indexing="ij")
+    faces = np.argwhere((i < j) & (i < k) & near[i, j] & near[j, k] & near[k, i])
+    faces = faces[np.linalg.det(points[faces]) > 0]
+    for _ in range(subdivisions):
+        edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+        unique, inverse = np.unique(edges, axis=0, return_inverse=True)
+        a, b, c = inverse.reshape(3, -1) + len(points)
+        points = np.concatenate([points, points[unique].mean(1)])
+        i, j, k = faces.T
+        faces = np.stack([(i, a, c), (a, j, b), (c, b, k), (a, b, c)]).transpose(0, 2, 1).reshape(-1, 3)
+    return radius * points / np.linalg.norm(points, axis=1, keepdims=True), faces
+
+
+def cylinder_patch(cells: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Two radians of a cylinder about the y axis, as high as its radius [m]: points (V,3), faces (F,3)."""
+    flat, faces = right_grid(cells, cells, radius, 2.0)
+    angle = flat[:, 0]
+    return np.stack([radius * np.cos(angle), flat[:, 1], radius * np.sin(angle)], axis=1), faces
+
+
+def torus(cells: int, major: float, minor: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A closed torus [m] of 2 x `cells` by `cells`: points (V,3), faces (F,3), exact mean curvature (V,).
+
+    H = (R + 2 r cos v) / (2 r (R + r cos v)) with v the angle around the tube.
+    """
+    u, v = np.meshgrid(
+        np.linspace(0, 2 * np.pi, 2 * cells, endpoint=False),
+        np.linspace(0, 2 * np.pi, cells, endpoint=False),
+        indexing="ij",
+    )
+    ring = major + minor * np.cos(v)
+    points = np.stack([ring * np.cos(u), minor * np.sin(v), ring * np.sin(u)], -1).reshape(-1, 3)
+    i, j = np.meshgrid(np.arange(2 * cells), np.arange(cells), indexing="ij")
+    after, beside = (i + 1) % (2 * cells), (j + 1) % cells
+    a, b, c, d = (p * cells + q for p, q in ((i, j), (after, j), (after, beside), (i, beside)))
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    return points, faces, ((major + minor * np.cos(v) + minor * np.cos(v)) / (2 * minor * ring)).ravel()
+
+
+def rectangle(
+    family: str, columns: int, rows: int, length: float, width: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """[0, length] x [0, width] in `columns` x `rows` cells: points (V,2) [m], faces (F,3) counter-clockwise.
+
+    right: all diagonals alike; cross: both diagonals; union_jack: diagonals alternate; equilateral: columns
+    shifted by half a cell in turn (truly equilateral if cells are 1 by ROW); delaunay: inner vertices moved
+    by up to 0.3 cells. The first two columns are regular in all, so that a clamp means the same.
+    """
+    points, faces = right_grid(rows, columns, width, length)
+    cell = np.array([length / columns, width / rows])
+    if family == "right":
+        return points, faces
+    if family == "union_jack":
+        return points, _alternate(rows, columns)
+    if family == "cross":
+        return _crossed(points, rows, columns)
+    if family == "equilateral":
+        points = np.concatenate([_column(i, rows) for i in range(columns + 1)]) * cell
+    elif family == "delaunay":
+        at = points.reshape(rows + 1, columns + 1, 2).copy()
+        inner = at[1:-1, 2:-1]
+        inner += cell * np.random.default_rng(0).uniform(-0.3, 0.3, inner.shape)
+        points = at.reshape(-1, 2)
+    else:
+        raise ValueError(f"unknown family {family!r}: choose one of {', '.join(FAMILIES)}")
+    return points, delaunay_faces(points / cell)
+
+
+def _column(i: int, rows: int) -> np.ndarray:
+    """Vertices of one column of the equilateral family, in cells; a shifted one keeps its two ends."""
+    y = np.arange(rows + 1.0)
+    if i % 2:
+        y = np.concatenate([[0.0], np.arange(rows) + 0.5, [float(rows)]])
+    return np.stack([np.full(len(y), float(i)), y], axis=1)
+
+
+def _corners(rows: int, columns: int) -> tuple[np.ndarray, ...]:
+    a = np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)
+    return a, a + 1, a + columns + 2, a + columns + 1
+
+
+def _alternate(rows: int, columns: int) -> np.ndarray:
+    a, b, c, d = _corners(rows, columns)
+    even = ((np.arange(rows)[:, None] + np.arange(columns)) % 2 == 0)[..., None]
+    first = np.where(even, np.stack([a, b, c], -1), np.stack([a, b, d], -1))
+    second = np.where(even, np.stack([a, c, d], -1), np.stack([b, c, d], -1))
+    return np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
+
+
+def _crossed(points: np.ndarray, rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    corners = [corner.ravel() for corner in _corners(rows, columns)]
+    middle = len(points) + np.arange(rows * columns)
+    centres = sum(points[corner] for corner in corners) / 4
+    sides = zip(corners, corners[1:] + corners[:1])
+    return np.concatenate([points, centres]), np.concatenate(
+        [np.stack([one, other, middle], 1) for one, other in sides]
+    )

@@ -1,0 +1,158 @@
+"""Stress tests: their cases, their map in the report, and that the solver copes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from meshes import grid
+
+from benchmarks.results import Row
+from benchmarks.validation import convergence_check, stress_tests
+from benchmarks.validation.case import timed_out
+from benchmarks.validation.convergence_check import lbfgs_then_newton, solve_and_check
+from benchmarks.validation.initial_conditions import INITIAL_POSITIONS, VELOCITIES
+from benchmarks.validation.registry import STRESS_TESTS
+from benchmarks.validation.stress_steps import sheet
+from benchmarks.validation.stress_tests import MAPS, STEPS
+from reference_sim import Cloth, minimise
+from reference_sim.energies import Energy, StretchStVK
+from reports import stability
+
+SMOKE = [case for case in STRESS_TESTS if case.smoke]
+
+
+# --- cases ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", SMOKE, ids=lambda case: case.name)
+def test_a_case_of_the_smallest_preset_is_honest(case):
+    row = case.run()
+    assert row.status == "ok", row.reason
+    assert row.suite == "extremes" and row.scene == case.name and row.metric == case.metric == "outcome"
+
+
+def test_there_are_enough_cases_and_each_can_be_built():
+    assert len(STEPS) >= 60 and len(SMOKE) == 6 and len(MAPS) == 2
+    metrics = [(case.scene, case.metric) for cases in MAPS.values() for case in cases]
+    assert len(set(metrics)) == len(metrics)
+    assert {case.options.get("start", "noisy") for case in STEPS} == set(INITIAL_POSITIONS)
+    assert set(VELOCITIES) <= {case.options.get("speed") for case in STEPS}
+    for case in STEPS:
+        if case.function == "solve_sheet":
+            step = sheet(**case.options)
+            assert step.guess.shape == (81, 3) and step.weight > 0, case.name
+    assert stress_tests.TOLERANCE == convergence_check.TOLERANCE
+    assert all(case.seconds and case.seconds > convergence_check.TIMEOUT for case in STRESS_TESTS)
+
+
+def test_a_point_of_a_map_counts_iterations_and_names_its_place():
+    case = next(case for case in MAPS["map_sheet"] if case.options == {"stiffness": 1.0, "dt": 1 / 30})
+    row = case.run()
+    assert row.status == "ok" and row.value == solve_and_check(sheet(), lbfgs_then_newton).iterations
+    assert (row.scene, row.metric, row.unit) == ("map_sheet", "map/1/0.0333", "iterations")
+    ended = timed_out(case, "no answer within 60 s")
+    assert (ended.status, ended.value, ended.unit, ended.scene) == ("failed", None, "iterations", "map_sheet")
+
+
+# --- the report's part ----------------------------------------------------------------------------------
+
+
+def point(factor, dt, status="ok", value=12.0):
+    row = Row(
+        "extremes", "map_sheet", "simulation", 0, f"map/{factor:g}/{dt:.3g}", "iterations", value, status
+    )
+    return dataclasses.replace(row, reason="why" if status != "ok" else "")
+
+
+def test_a_map_of_every_outcome_is_drawn(tmp_path):
+    statuses = ("ok", "stalled", "failed", "timeout", "diverged")
+    rows = [point(10.0**k, dt, status) for k, status in enumerate(statuses) for dt in (1e-4, 1 / 30)]
+    rows.append(dataclasses.replace(rows[0], metric="outcome", scene="another"))
+    found = stability.points(rows)
+    assert list(found) == ["map_sheet"] and len(found["map_sheet"]) == 10
+    assert {(p.stiffness, p.dt) for p in found["map_sheet"]} >= {(1.0, 1e-4), (1e4, 0.0333)}
+    (picture,) = stability.stability_maps(tmp_path, rows)
+    assert picture.path.is_file() and picture.path.with_suffix(".png").is_file()
+    assert stability.stability_maps(tmp_path, rows[-1:]) == []
+    blues = [stability.shade(n)[0] for n in (1.0, 2.0, 20.0, 300.0, 1e6)]
+    assert blues == sorted(blues, reverse=True) and blues[0] == blues[1] and blues[3] == blues[4]
+
+
+def test_refused_inputs_have_a_table():
+    rows = [
+        Row("extremes", f"refused/{name}", "simulation", 0, "refusal", "1", 1.0, "ok", "face 3")
+        for name in ("zero_area", "zero_area_uv")
+    ]
+    table = stability.refusals(rows)
+    assert [line[:2] for line in table.rows] == [("zero_area", "ok"), ("zero_area_uv", "ok")]
+    assert stability.refusals([point(1.0, 1.0)]) is None
+
+
+# --- the solver's part ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("factor", "most"), [(1e3, 60), (1e4, 60), (1e6, 80)])
+def test_stiff_cloth_converges_in_tens_of_iterations(factor, most):
+    """Without predicted stresses and excursions: 99 iterations at x1e3, more than 300 beyond."""
+    checked = solve_and_check(sheet(stiffness=factor))
+    assert checked.status == "ok" and checked.iterations <= most, checked
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", STEPS, ids=lambda case: case.name)
+def test_a_stress_test_never_lies(case):
+    row = case.run()
+    assert row.status in ("ok", "stalled", "timeout", "diverged") and row.reason, row.reason
+
+
+def test_foreseen_stress_is_linear_in_the_step_and_forgotten():
+    x, faces = grid(3, 3, width=0.3, depth=0.3)
+    cloth = Cloth(x, faces)
+    random = np.random.default_rng(4)
+    x = x + random.normal(0, 0.01, x.shape)
+    step = random.normal(0, 0.05, x.shape)
+    energy = StretchStVK(cloth)
+    true = energy.hessian_blocks(x)
+    energy.foresee(x, step)
+    foreseen = energy.hessian_blocks(x + step)
+    energy.forget()
+    assert np.array_equal(energy.hessian_blocks(x), true)
+    # From the definition: the part of the Hessian without stress, at x + step, plus the stress's own part
+    # of the difference between S(x) + dS/dx step and S(x + step).
+    there = Energy.hessian_blocks(energy, x + step)
+
+    def strain(positions):
+        corner = positions[cloth.faces]
+        F = np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=-1) @ cloth.Dm_inverse
+        return 0.5 * (F.transpose(0, 2, 1) @ F - np.eye(2))
+
+    # Strain is quadratic, so that a central difference is its derivative.
+    missing = strain(x) + 0.5 * (strain(x + step) - strain(x - step)) - strain(x + step)
+    m = cloth.material
+    trace = np.einsum("fii->f", missing)[:, None, None]
+    stress = m.lame_lambda * trace * np.eye(2) + 2 * m.lame_mu * missing
+    b = np.concatenate([-cloth.Dm_inverse.sum(axis=1, keepdims=True), cloth.Dm_inverse], axis=1)
+    part = cloth.areas[:, None, None] * np.einsum("fai,fij,fcj->fac", b, stress, b)
+    expected = there + np.einsum("fac,ij->faicj", part, np.eye(3)).reshape(there.shape)
+    assert foreseen == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    assert np.abs(foreseen - there).max() > 0.01 * np.abs(there).max()
+
+
+def test_every_kept_point_is_observed_and_lower_than_the_one_before():
+    step = sheet(start="very noisy")
+    kept = []
+    result = minimise(step.potential, step.guess, observe=kept.append)
+    assert np.array_equal(kept[0], step.guess) and np.array_equal(kept[-1], result.positions)
+    assert 2 < len(kept) <= result.iterations + 1  # an excursion's way is not kept, only its end
+    values = np.array([step.potential.value(x) for x in kept])
+    assert (np.diff(values) < 1e-13 * values[0]).all()
+
+
+def test_the_hessian_is_the_true_one_again_after_a_run_that_was_cut():
+    step = sheet(stiffness=1e4)
+    before = step.potential.hessian(step.guess).toarray()
+    for cut in (1, 3, 7):
+        minimise(step.potential, step.guess, max_iterations=cut)
+        assert np.array_equal(step.potential.hessian(step.guess).toarray(), before)
