@@ -1,4 +1,4 @@
-"""Methods less one ingredient at a time, beside the full recipe: what leaving it out makes worse, and better."""
+"""Methods less one ingredient each, beside the full recipe: what leaving it out makes worse, and better."""
 
 from __future__ import annotations
 

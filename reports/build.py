@@ -134,7 +134,7 @@ def most_shared(run: Run, x: str, y: str) -> list[str]:
     rows = run.frame[run.frame["usable"] & run.frame["metric"].isin((x, y))]
     count = rows.groupby(["scene", "method"])["metric"].nunique()
     both = count[count == len({x, y})].reset_index().groupby("scene")["method"].agg(frozenset)
-    most = max(both, key=len, default=frozenset())
+    most: frozenset[str] = max(both, key=len, default=frozenset())
     return sorted(str(scene) for scene, methods in both.items() if methods == most)
 
 
@@ -182,7 +182,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         if options.axes:
-            print(draw_axes(RunFolder(options.run_dir), *options.axes, options.scenes))
+            x, y = options.axes
+            print(draw_axes(RunFolder(options.run_dir), x, y, options.scenes))
             return 0
         path, problems = build_report(options.run_dir)
     except ResultsError as error:

@@ -22,7 +22,7 @@ CELL = ["scene", "method", "seed", "metric"]
 
 @dataclass(frozen=True)
 class Metric:
-    """A metric as it is declared: head of its column, one sentence on it, and the table that has the column."""
+    """A metric as it is declared: head of its column, a sentence on it, and the table that has the column."""
 
     name: str
     unit: str = ""
@@ -84,7 +84,7 @@ class Run:
     def ordered(self, methods: Iterable[str]) -> list[str]:
         """Without repeats: by role, then as declared, members of a family by their level."""
         places = list(self.methods)
-        first = {}
+        first: dict[str, int] = {}
         for method in self.methods.values():
             first.setdefault(method.family, places.index(method.name))
 
@@ -106,7 +106,7 @@ class Run:
         return self.methods[method].label if method in self.methods else method
 
     def standing_apart(self, frame: pd.DataFrame) -> set[str]:
-        """The ablations among these rows whose base has a usable number too: they have a table of their own."""
+        """The ablations among these rows whose base has a usable number too: they have their own table."""
         usable = set(frame[frame["usable"]]["method"])
         return {name for name in self.with_role("ablation") if self.methods[name].base in usable}
 
@@ -155,7 +155,7 @@ def _methods(frame: pd.DataFrame, declared: Mapping[str, Any]) -> dict[str, Meth
 
 
 def _cases(frame: pd.DataFrame, declared: Mapping[str, Any]) -> list[str]:
-    """The name of each row's case. A case may say the scene and metric of its row; else the scene is its name."""
+    """The case of each row. A case may say the scene and metric of its row; else the scene is its name."""
     places = {(case.get("scene") or name, case.get("metric") or ""): name for name, case in declared.items()}
     pairs = zip(frame["scene"], frame["metric"])
     return [places.get(pair) or places.get((pair[0], "")) or "" for pair in pairs]

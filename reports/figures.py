@@ -24,7 +24,7 @@ from reports.plotting import (
     wrapped,
 )
 from reports.styles import STATUS_COLOURS, leading, style
-from reports.tables import check_name
+from reports.tables import check_name, checks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -121,13 +121,11 @@ def throughput(folder: Path, run: Run) -> list[Picture]:
 
 def validation_dots(folder: Path, run: Run) -> list[Picture]:
     """How far each check is from its expected value, in units of its tolerance: left of 1 passes."""
-    rows = run.suite("validation")
-    checks = list(
-        rows[(rows["case"] != "") & rows[["value", "expected", "tolerance"]].notna().all(axis=1)].itertuples()
-    )
+    rows = checks(run)
+    judged = list(rows[rows[["value", "expected", "tolerance"]].notna().all(axis=1)].itertuples())
     pictures = []
-    for part, first in enumerate(range(0, len(checks), CHECKS_PER_FIGURE)):
-        shown = checks[first : first + CHECKS_PER_FIGURE]
+    for part, first in enumerate(range(0, len(judged), CHECKS_PER_FIGURE)):
+        shown = judged[first : first + CHECKS_PER_FIGURE]
         labels = [wrapped(check_name(run, row)) for row in shown]
         pitch = 0.28 if any("\n" in label for label in labels) else 0.19
         figure = new_figure(PAGE_WIDTH, 0.75 + pitch * len(shown))

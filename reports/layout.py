@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from reports.data import Run
@@ -14,7 +15,7 @@ from reports.table import Cell, Column, Table
 Block = dict[str, Any]
 LONG = 24  # rows from which a table may run over pages
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
-MOST = 7  # columns of numbers that fit on a page; a wider table goes on below
+MOST = 8  # columns of numbers that fit on a page; a wider table goes on below
 REMARKS = {
     "*": "* A mean over fewer scenes or seeds than in the other rows, for want of the rest.",
     "†": "† The solver left some frames unconverged.",
@@ -27,17 +28,17 @@ def table_blocks(run: Run, table: Table) -> Iterator[Block]:
     """A table for the page, in parts where it has more columns than fit."""
     texts = [column for column in table.columns if column.text]
     numbers = [column for column in table.columns if not column.text]
-    for first in range(0, max(len(numbers), 1), MOST):
-        shown = {column.name for column in (*texts, *numbers[first : first + MOST])}
+    parts = max(1, -(-len(numbers) // MOST))
+    each = max(1, -(-len(numbers) // parts))
+    for first in range(0, max(len(numbers), 1), each):
+        shown = {column.name for column in (*texts, *numbers[first : first + each])}
         places = [place for place, column in enumerate(table.columns) if column.name in shown]
         rows = [tuple(row[place] for place in places) for row in table.rows]
         columns = tuple(table.columns[place] for place in places)
         heads = len(texts)
         rows = [row for row in rows if first == 0 or any(cell is not None for cell in row[heads:])]
-        more = " (continued)" if first else ""
-        part = Table(table.name, columns, tuple(rows), table.caption + more, table.grouped_by, table.references,
-            table.note)  # fmt: skip
-        yield _block(run, part)
+        caption = table.caption + (" (continued)" if first else "")
+        yield _block(run, replace(table, columns=columns, rows=tuple(rows), caption=caption))
 
 
 def _block(run: Run, table: Table) -> Block:
@@ -80,7 +81,7 @@ def _note(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
 
 
 def _widths(columns: Sequence[Column]) -> list[str]:
-    """Columns of numbers share the width evenly; beside columns of words they are as wide as their content."""
+    """Columns of numbers share the width evenly; beside columns of words they take what they need."""
     if all(not column.text for column in columns[1:]):
         return ["1.4fr" if len(columns) <= FEW else "2.4fr", *["1fr"] * (len(columns) - 1)]
     return [column.width for column in columns]

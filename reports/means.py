@@ -18,10 +18,10 @@ import pandas as pd
 class Mean:
     """The mean of a metric, its spread over seeds, and what went into it.
 
-    `complete` says that every seed has every scene in which anybody has the metric; otherwise the mean is over
-    fewer cells than its neighbours in a table, and the table must say so. `stalled` says that a solver left
-    some frames of some cell unconverged, `seeded` that another seed would give another value. `by_seed`: the
-    mean over scenes of each seed. `lost`: seeds of which nothing usable is left, as of a network that
+    `complete` says that every seed has every scene in which anybody has the metric; otherwise the mean is
+    over fewer cells than its neighbours in a table, and the table must say so. `stalled` says that a solver
+    left some frames of some cell unconverged, `seeded` that another seed would give another value. `by_seed`:
+    the mean over scenes of each seed. `lost`: seeds of which nothing usable is left, as of a network that
     diverged. `pairing_group`: means of one group begin with the same draws at equal seeds; empty for none.
     """
 

@@ -6,12 +6,12 @@ import re
 
 import pandas as pd
 
+from reports import tables
 from reports.break_even import NETWORK, compared_scenes, cost_of, crossing, frames_text, rivals
 from reports.data import Run
-from reports.means import mean_of, pair, shared_scenes, value_of
+from reports.means import mean_of, pair, shared_scenes
 from reports.numbers import duration, number, with_spread
 from reports.pareto import TIME, beaten_by, fastest, points_of, truncated
-from reports.tables import stress_tests
 
 TOTAL, CURVATURE = "energy/total", "curvature/error"
 
@@ -26,8 +26,7 @@ def summary(run: Run) -> list[tuple[str, str]]:
         ("Run time", run_time(run, worn if NETWORK in set(worn["method"]) else run.cells("speed"))),
         ("Error against time", fronts(run)),
         ("When training pays", training_pays(run)),
-        ("Known answers", checks(run)),
-        ("Stress tests", stress(run)),
+        ("Known answers", f"{checks(run)} {stress(run)}".strip()),
         ("Not finished", trouble(run)),
     ]
     # A number keeps its unit on its line.
@@ -108,20 +107,18 @@ def training_pays(run: Run) -> str:
 
 def checks(run: Run) -> str:
     """How many validation checks passed, and which did not."""
-    rows = run.suite("validation")
-    rows = rows[(rows["case"] != "") & (rows["status"] != "skipped")]
+    rows = tables.checks(run)
     rows = rows[rows["tolerance"].notna() | (rows["status"] != "ok")]
-    bad = list(dict.fromkeys(rows[rows["status"] != "ok"]["scene"]))
-    failed = int((rows["status"] != "ok").sum())
-    text = f"{len(rows) - failed} of {len(rows)} checks pass" if len(rows) else ""
+    bad = [tables.check_name(run, row) for row in rows[rows["status"] != "ok"].itertuples()]
+    text = f"{len(rows) - len(bad)} of {len(rows)} checks pass" if len(rows) else ""
     return f"{text}; failed: {', '.join(bad)}." if bad else text and f"{text}."
 
 
 def stress(run: Run) -> str:
     """How many stress tests converged; the rest by status."""
-    counts = stress_tests(run)["status"].value_counts()
+    counts = tables.stress_tests(run)["status"].value_counts()
     rest = "".join(f"; {count} {status}" for status, count in counts.items() if status != "ok")
-    return f"{counts.get('ok', 0)} of {counts.sum()} converged{rest}." if len(counts) else ""
+    return f"{counts.get('ok', 0)} of {counts.sum()} stress tests converged{rest}." if len(counts) else ""
 
 
 def trouble(run: Run) -> str:

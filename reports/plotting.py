@@ -156,8 +156,8 @@ def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> No
 
 
 def _columns(letters: Sequence[int], width: float = 1.0) -> int:
-    """As many columns of a legend as fit into that share of the page's width: it is filled column by column, each as wide as its
-    longest entry.
+    """As many columns of a legend as fit into that share of the page's width: it is filled column by column,
+    each as wide as its longest entry.
     """
     count = len(letters)
     for columns in range(count, 1, -1):

@@ -58,7 +58,7 @@ def camera_for(positions: np.ndarray) -> Camera:
 
 
 def paint(axes: Axes, meshes: list[tuple[np.ndarray, np.ndarray, str, float]], camera: Camera) -> None:
-    """Draw meshes (positions (V,3) [m], faces (F,3), colour, lift [m]), triangles sorted by their centroids."""
+    """Draw meshes (positions (V,3) [m], faces (F,3), colour, lift [m]), triangles in order of their depth."""
     from matplotlib.collections import PolyCollection
 
     parts = [_shaded(camera.seen(x)[faces], colour, lift) for x, faces, colour, lift in meshes]

@@ -1,4 +1,4 @@
-"""Whether two means differ by more than seeds scatter: the one rule by which the report calls numbers different."""
+"""Whether two means differ by more than seeds scatter: the one rule for calling numbers different."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far stiffness and time step go, as a map for each scene repeated over both; and how stress tests ended."""
+"""How far stiffness and time step go, as a map for each scene; and how stress tests ended."""
 
 from __future__ import annotations
 

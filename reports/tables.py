@@ -1,7 +1,7 @@
 """The tables of a run: which numbers stand in which row and column.
 
-A metric declares the table in which it is a column, so most tables make themselves: <table> has a row for each
-garment and method, <table>_by_scene one for each scene and method. What was not measured is None, and
+A metric declares the table in which it is a column, so most tables make themselves: <table> has a row for
+each garment and method, <table>_by_scene one for each scene and method. What was not measured is None, and
 printed as a dash.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
 import pandas as pd
 
 from reports import paper
@@ -34,7 +35,8 @@ def make_tables(run: Run) -> dict[str, Table]:
     names = list(dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table))
     found = [made for name in names for made in (*by_garment(run, name), *by_scene(run, name))]
     for make in (
-        paper.findings, ablations, ablations_judged, crossings, speed, validation, extremes, unfinished, metrics
+        paper.findings, ablations, ablations_judged, crossings, speed, validation, extremes, unfinished,
+        metrics,
     ):  # fmt: skip
         found += make(run)
     return {made.name: made for made in found}
@@ -78,7 +80,7 @@ def _with_failed(frame: pd.DataFrame, rows: pd.DataFrame) -> pd.DataFrame:
 def _pivot(
     run: Run, frame: pd.DataFrame, rows: pd.DataFrame, keys: tuple[str, ...], first: tuple[str, ...] = ()
 ) -> tuple[list[Column], list[tuple]]:
-    """Columns of the metrics of these rows, `first` before the rest, and lines of keys and means over the frame."""
+    """Columns of these rows' metrics, `first` before the rest; lines of keys and of means over the frame."""
     usable = set(rows[rows["usable"]]["metric"])
     chosen = [run.metrics[name] for name in dict.fromkeys((*first, *run.metrics)) if name in usable]
     if not chosen:
@@ -112,11 +114,9 @@ def speed(run: Run) -> list[Table]:
 
 def validation(run: Run) -> list[Table]:
     """Measured against expected, each with its tolerance; without one it is reported, not judged."""
-    rows = run.suite("validation")
-    rows = rows[(rows["case"] != "") & (rows["status"] != "skipped")]
     lines = [
         (check_name(run, row), row.unit, row.value, row.expected, row.tolerance, _result(row))
-        for row in rows.itertuples()
+        for row in checks(run).itertuples()
     ]
     columns = (
         Column("check", "Check", text=True, width="1fr"),
@@ -129,10 +129,16 @@ def validation(run: Run) -> list[Table]:
     return table("validation", columns, lines, "Checks with a known answer.")
 
 
+def checks(run: Run) -> pd.DataFrame:
+    """The cases of suite validation, and what any other suite judges by a tolerance."""
+    is_case, rows = run.frame["case"] != "", run.frame
+    asked = np.where(is_case, rows["suite"] == "validation", rows["tolerance"].notna())
+    return rows[asked & (rows["status"] != "skipped")]
+
+
 def check_name(run: Run, row) -> str:
-    """The scene, and what is measured on it where a scene has several checks."""
-    several = run.frame[(run.frame["scene"] == row.scene) & (run.frame["case"] != "")]["metric"].nunique() > 1
-    return f"{row.scene}: {run.metrics[row.metric].title}" if several else row.scene
+    """The case, or the scene and what is judged there."""
+    return row.case or f"{row.scene}: {run.metrics[row.metric].title}"
 
 
 def _result(row) -> str:

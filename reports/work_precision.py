@@ -1,4 +1,4 @@
-"""Error against run time: solvers, networks, warm starts and baselines on one plot; or any metric against any."""
+"""Error against run time, solvers, networks and baselines on one plot; or any metric against any other."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _draw_errors(
     scene = rows["scene"].iloc[0]
     reference = value_of(rows, run.reference, TIME)
     lines, columns = -(-len(panels) // 2), min(2, len(panels))
-    figure = new_figure(PAGE_WIDTH * (1.0 if columns > 1 else 0.6), 0.9 + 2.3 * lines)
+    figure = new_figure(PAGE_WIDTH * (1.0 if columns > 1 else 0.6), 0.9 + (1.7 if lead else 2.3) * lines)
     every = np.atleast_1d(figure.subplots(lines, columns)).ravel()
     for axes in every[len(panels) :]:
         axes.set_axis_off()
