@@ -54,46 +54,34 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     tried = frame[frame["status"] != "skipped"]
     asked = tried.groupby(places)["scene"].nunique()
     failed = tried[~tried["usable"]].groupby(cells)["seed"].agg(set)
-    usable = frame[frame["usable"]]
-    seeds = usable.groupby([*own, "seed"], sort=False)["value"].agg(["mean", "count"])
+    usable = frame[frame["usable"]].assign(stalled=frame["status"] == "stalled")
+    of_seed, of_all = (usable.groupby(names, sort=False) for names in ([*own, "seed"], own))
+    seeds = of_seed["value"].mean()
     by_seed: dict[tuple, dict[int, float]] = {}
-    for key, value in seeds["mean"].items():
-        assert isinstance(key, tuple)
-        by_seed.setdefault(key[:-1], {})[int(key[-1])] = float(value)
-    across = seeds.groupby(own, sort=False).agg(
-        value=("mean", "mean"), spread=("mean", "std"), fewest=("count", "min")
-    )
-    about = usable.assign(stalled=usable["status"] == "stalled").groupby(own, sort=False)
-    across = across.join(
-        about.agg(
-            scenes=("scene", "nunique"),
-            stalled=("stalled", "any"),
-            seeded=("seeded", "any"),
-            pairing_group=("pairing_group", "first"),
-        )
-    )
+    for (*key, seed), value in seeds.items():  # type: ignore[misc]
+        by_seed.setdefault(tuple(key), {})[int(seed)] = float(value)
+    across = seeds.groupby(own, sort=False)
+    columns = (
+        across.mean(), across.std(), of_seed.size().groupby(own, sort=False).min(), of_all["scene"].nunique(),
+        of_all["stalled"].any(), of_all["seeded"].any(), of_all["pairing_group"].first(),
+    )  # fmt: skip
     found = {}
-    for line in across.itertuples():
-        group = dict(zip(own, line.Index))
-        values = by_seed[line.Index]
-        lost = failed.get(_key(group, cells), set()) - values.keys()
-        found[line.Index] = Mean(
-            value=float(line.value),
-            spread=None if pd.isna(line.spread) else float(line.spread),
-            scenes=int(line.scenes),
-            seeds=len(values),
-            complete=not lost and int(line.fewest) == int(asked[_key(group, places)]),
-            stalled=bool(line.stalled),
-            seeded=bool(line.seeded),
-            by_seed=values,
+    for key, value, spread, fewest, scenes, stalled, seeded, pairing_group in zip(by_seed, *columns):
+        group = dict(zip(own, key))
+        lost = failed.get(_key(group, cells), set()) - by_seed[key].keys()
+        found[key] = Mean(
+            value=float(value),
+            spread=None if pd.isna(spread) else float(spread),
+            scenes=int(scenes),
+            seeds=len(by_seed[key]),
+            complete=not lost and fewest == asked[_key(group, places)],
+            stalled=bool(stalled),
+            seeded=bool(seeded),
+            by_seed=by_seed[key],
             lost=len(lost),
-            pairing_group=str(line.pairing_group),
+            pairing_group=pairing_group,
         )
-    index = (
-        pd.MultiIndex.from_tuples(found, names=own)
-        if found
-        else pd.MultiIndex.from_arrays([[]] * len(own), names=own)
-    )
+    index = pd.MultiIndex.from_arrays([list(column) for column in zip(*found)] or [[]] * len(own), names=own)
     return pd.Series(list(found.values()), index=index, dtype=object)
 
 
@@ -135,8 +123,10 @@ def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean |
 
     Where one of them was not measured at all, the other's mean is over its own scenes.
     """
-    both = shared_scenes(frame, (one, other), metric)
-    first, second = (mean_of(frame, method, metric, both or None) for method in (one, other))
+    rows = frame[frame["method"].isin((one, other)) & ((frame["metric"] == metric) | ~frame["usable"])]
+    both = shared_scenes(rows, (one, other), metric)
+    found = means(rows[rows["scene"].isin(both)] if both else rows, "method", "metric")
+    first, second = (found.get((method, metric)) for method in (one, other))
     if first is None or second is None:
         return first, second
     if not both:
