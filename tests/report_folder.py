@@ -26,13 +26,15 @@ DECLARED: dict[str, dict[str, Any]] = {
     "simulation-perturbed": {"label": "Simulation, start moved", "role": "reference-variant"},
     "direct-optimisation": {"label": "Vertices optimised directly", "role": "bound"},
     "skinning": {"label": "Skinning alone", "role": "baseline"},
-    "untrained": {"label": "SNUG, untrained", "role": "baseline", "seeded": True, "pairing_group": "untrained"},
+    "untrained": {"label": "SNUG, untrained", "role": "baseline", "seeded": True},
     "snug": {"label": "SNUG"},
     "pbns": {"label": "PBNS"},
     "supervised": {"label": "Supervised"},
     "snug+cleanup": {"label": "SNUG, cleaned up", "base": "snug", "pairing_group": "snug"},
     **{
-        f"snug-{name}": {"role": "ablation", "base": "snug", "pairing_group": "snug", "label": f"SNUG, {name}"}
+        f"snug-{name}": {
+            "role": "ablation", "base": "snug", "pairing_group": "snug", "label": f"SNUG, {name}",
+        }
         for name in ("no-bending", "no-noise", "noise-alone", "no-inertia", "no-strain", "springs", "window6")
     },
     **{
@@ -54,7 +56,12 @@ TABLES = {
     "penetration": "penetration", "gap": "speed", "gradient": "speed", "roll_out": "extrapolation",
     "conservation": "conservation", "dynamics": "dynamics", "train": "training",
 }  # fmt: skip
-TITLES = {"curvature/error": "Curvature error", "energy/total": "Total", "roll_out/drift": "Drift"}
+TITLES = {
+    "gap/relative": "Energy gap",
+    "curvature/error": "Curvature error",
+    "energy/total": "Total",
+    "roll_out/drift": "Drift",
+}
 BETTER_LOWER = ("energy/strain", "energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
 
 
@@ -98,7 +105,7 @@ def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
             for name, r in metrics.items()
         },
         "methods": {name: {"label": own["label"]} for name, own in DECLARED.items()},
-        "scenes": {s: {} for s in sorted(dict.fromkeys(r.scene for r in rows if r.garment), key=lambda s: s[:2] != "ts")},
+        "scenes": {r.scene: {} for r in sorted(rows, key=lambda r: r.garment != "tshirt") if r.garment},
         "cases": cases,
         **more,
     }  # fmt: skip

@@ -156,7 +156,7 @@ def test_ablations_are_judged_over_the_scenes_that_both_have():
 
 
 def test_pairs_share_their_scenes_or_have_their_own():
-    rows = on_two_scenes("snug", 1.0, 9.0) + [row(SCENES[1], "pbns", "energy/total", 4.0)]
+    rows = [*on_two_scenes("snug", 1.0, 9.0), row(SCENES[1], "pbns", "energy/total", 4.0)]
     own, other = pair(run_of(rows).frame, "snug", "pbns", "energy/total")
     assert (own.value, other.value, own.complete) == (9.0, 4.0, False)
     apart = [row(SCENES[0], metric="energy/total"), row(SCENES[1], "pbns", "energy/total")]

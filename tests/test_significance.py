@@ -1,4 +1,4 @@
-"""When two means are called different: the tests of scipy.stats, and a share where no seeds tell the scatter."""
+"""When two means are called different: by a test of scipy.stats, or by a share where nothing was repeated."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ONE = (1.0, 1.3, 1.1)
 
 @pytest.mark.parametrize("shift", [0.1, 0.4, 0.5, 0.9])
 def test_two_networks_are_told_apart_by_welchs_test(shift):
-    """Of the numbers themselves where one is not positive, by t_{.975, nu} sqrt(s1^2/n1 + s2^2/n2) by hand."""
+    """Of the numbers themselves where one is not positive: t_{.975, nu} sqrt(s1^2/n1 + s2^2/n2) by hand."""
     one, other = np.array(ONE) - 1.2, np.array((0.9, 1.5, 1.0, 1.1)) + shift - 1.2
     parts = [values.var(ddof=1) / len(values) for values in (one, other)]
     freedom = sum(parts) ** 2 / sum(part**2 / (len(v) - 1) for part, v in zip(parts, (one, other)))
@@ -37,7 +37,7 @@ def test_two_networks_are_told_apart_by_welchs_test(shift):
 
 @pytest.mark.parametrize(("method", "freed"), [("simulation", 1 / 3), ("pbns", 1 + 1 / 3)])
 def test_one_number_beside_several_seeds(method, freed):
-    """What no seed changes is a known number; what could have had seeds is one draw more of the same scatter."""
+    """What no seed changes is a known number; what could have seeds is one draw more of the same scatter."""
     several = mean_of_seeds(np.array(ONE) - 1.2)
     threshold = stats.t.ppf(0.975, 2) * several.spread * math.sqrt(freed)
     for share, expected in ((0.99, 0), (1.01, 1)):
