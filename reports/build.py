@@ -66,7 +66,7 @@ def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
 
     pictures = draw_trajectories(folder, run, problems)
     for make in (
-        error_against_time, performance_profile, break_even, figures.throughput, figures.validation_dots,
+        error_against_time, performance_profile, break_even, figures.throughput,
         stability.stability_maps, stability.outcomes,
     ):  # fmt: skip
         pictures += make(folder.figures, run)

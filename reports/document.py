@@ -49,9 +49,9 @@ def document(
             *(name for name in garments if name != "speed"), "findings", "ablations", "ablations_judged"
         ),
         "Speed: error against run time": blocks("break_even", "crossings", "profile", "speed"),
-        "Validation: known answers": blocks("dots", "validation") + _of_suite(run, tables, "validation"),
+        "Validation: known answers": blocks("validation") + _of_suite(run, tables, "validation"),
         "Extremes: where it breaks": blocks("maps", "outcomes") + _of_suite(run, tables, "extremes")
-            + blocks("extremes"),
+            + _not_converged(run, tables),
         "What did not run to its end": _trouble(run, tables, problems),
     }  # fmt: skip
     return {
@@ -82,6 +82,17 @@ def _of_suite(run: Run, tables: Mapping[str, Table], suite: str) -> list[Block]:
             own = replace(table, columns=columns, rows=cells, grouped_by=("scene",))
             found += table_blocks(run, own) if rows else ()
     return found
+
+
+def _not_converged(run: Run, tables: Mapping[str, Table]) -> list[Block]:
+    """The stress tests that the figure shows in another colour; the CSV has all."""
+    rows = [row for row in tables["extremes"].rows if row[2] != "converged"] if "extremes" in tables else []
+    caption = "Stress tests that did not converge, and why."
+    return (
+        list(table_blocks(run, replace(tables["extremes"], rows=tuple(rows), caption=caption)))
+        if rows
+        else []
+    )
 
 
 def _side_by_side(config: Mapping[str, Any]) -> str:

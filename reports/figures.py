@@ -1,4 +1,4 @@
-"""Energies frame by frame, frames per second, and how far each check is from its known answer."""
+"""Energies frame by frame, and frames per second."""
 
 from __future__ import annotations
 
@@ -21,10 +21,8 @@ from reports.plotting import (
     log_axis,
     new_figure,
     save,
-    wrapped,
 )
-from reports.styles import STATUS_COLOURS, leading, style
-from reports.tables import check_name, checks
+from reports.styles import leading, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,8 +30,6 @@ if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
 
 SERIES_TERMS = ("strain", "bending", "inertia")
-CHECKS_PER_FIGURE = 40
-LEAST = 1e-6  # tolerances; what is closer is drawn on the edge
 BATCH = "cost/batch"
 
 
@@ -117,49 +113,3 @@ def throughput(folder: Path, run: Run) -> list[Picture]:
     )
     caption += "many bodies at once (full), both on one core."
     return [save(figure, folder, "throughput", caption=caption, kind="throughput")]
-
-
-def validation_dots(folder: Path, run: Run) -> list[Picture]:
-    """How far each check is from its expected value, in units of its tolerance: left of 1 passes."""
-    rows = checks(run)
-    judged = list(rows[rows[["value", "expected", "tolerance"]].notna().all(axis=1)].itertuples())
-    pictures = []
-    for part, first in enumerate(range(0, len(judged), CHECKS_PER_FIGURE)):
-        shown = judged[first : first + CHECKS_PER_FIGURE]
-        labels = [wrapped(check_name(run, row)) for row in shown]
-        pitch = 0.28 if any("\n" in label for label in labels) else 0.19
-        figure = new_figure(PAGE_WIDTH, 0.75 + pitch * len(shown))
-        axes = figure.subplots()
-        ratios = [tolerances_away(row.value, row.expected, row.tolerance) for row in shown]
-        for place, (row, ratio) in enumerate(zip(shown, ratios)):
-            good = row.status == "ok"
-            axes.plot(
-                min(max(ratio, LEAST), 1 / LEAST),
-                place,
-                marker="o" if good else "X",
-                color=STATUS_COLOURS["ok" if good else "diverged"],
-                markerfacecolor="white" if ratio < LEAST else None,
-                markersize=5.5,
-                linestyle="none",
-                clip_on=False,
-            )
-        axes.axvline(1.0, color="#444444", linewidth=1.0)
-        axes.set_xscale("log")
-        axes.set_xlim(LEAST, max(10.0, axes.get_xlim()[1]))
-        axes.set_yticks(range(len(shown)), labels)
-        axes.set_ylim(len(shown) - 0.4, -0.6)
-        axes.set_xlabel("distance from the expected value, in tolerances (a check passes left of 1)")
-        grid(axes)
-        caption = "Checks with a known answer. Circle: passed; cross: failed."
-        if min(ratios) < LEAST:
-            caption += " Hollow, on the left edge: closer than a millionth of the tolerance."
-        pictures.append(save(figure, folder, f"validation_{part + 1}", caption=caption, kind="dots"))
-    return pictures
-
-
-def tolerances_away(value: float, expected: float, tolerance: float) -> float:
-    """|measured - expected| / tolerance; a number that must be exact is 0 or infinitely many away."""
-    distance = abs(value - expected)
-    if not tolerance:
-        return 0.0 if distance == 0.0 else float("inf")
-    return distance / tolerance

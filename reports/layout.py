@@ -21,7 +21,12 @@ REMARKS = {
     "†": "† The solver left some frames unconverged.",
 }
 NOISE = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
-METHODS = ("method", "solver")  # columns that hold names of methods, printed by their labels
+METHODS = (
+    "method",
+    "solver",
+    "lower",
+    "higher",
+)  # columns that hold names of methods, printed by their labels
 
 
 def table_blocks(run: Run, table: Table) -> Iterator[Block]:

@@ -34,22 +34,25 @@ def summary(run: Run) -> list[tuple[str, str]]:
 
 
 def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
-    """The networks by a metric, the lowest first, and then what was not trained."""
+    """The networks by a metric, the lowest first, and then what was not trained, over the scenes of all."""
     rows = worn[worn["metric"] == metric]
     have = set(rows[rows["usable"]]["method"])
     networks = [name for name in run.with_role("network") if name in have and not run.methods[name].base]
     others = [name for name in run.ordered(run.with_role("reference", "bound", "baseline")) if name in have]
     scenes = shared_scenes(rows, [*networks, *others], metric)
-    means = {m: mean for m in (*networks, *others) if (mean := mean_of(rows, m, metric, scenes)) is not None}
-    order = sorted((m for m in networks if m in means), key=lambda m: means[m].value)
+    means = {name: mean_of(rows, name, metric, scenes) for name in (*networks, *others)}
+    found = {name: mean for name, mean in means.items() if mean is not None}
+    order = sorted((name for name in networks if name in found), key=lambda name: found[name].value)
     if not order:
         return ""
-    best = means[order[0]]
+    best = found[order[0]]
     text = f"{run.label(order[0])} has {with_spread(best.value, best.spread)} {unit}"
-    rest = [f"{run.label(m)} {number(means[m].value)}" for m in order[1:]]
-    text += f", {', '.join(rest)}." if rest else "."
-    rest = [f"{run.label(m)} {number(means[m].value)}" for m in others if m in means]
-    text += f" Beside them: {', '.join(rest)}." if rest else ""
+    after, beside = (
+        ", ".join(f"{run.label(name)} {number(found[name].value)}" for name in names if name in found)
+        for names in (order[1:], others)
+    )
+    text += f", {after}." if after else "."
+    text += f" Beside them: {beside}." if beside else ""
     asked = rows["scene"].nunique()
     return text + (f" Over {len(scenes)} of {asked} scenes." if len(scenes) < asked else "")
 

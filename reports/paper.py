@@ -96,7 +96,7 @@ def _judged(run: Run, frame: pd.DataFrame) -> Iterator[tuple[Cell, ...]]:
             share = None if None in means else relative_difference(*means)  # type: ignore[arg-type]
             apart = None if share is None else 100.0 * share
             declared = run.metrics[metric]
-            yield declared.title, run.label(lower), run.label(higher), declared.unit, *means, apart, said
+            yield declared.title, lower, higher, declared.unit, *means, apart, said
 
 
 def verdict(

@@ -7,6 +7,7 @@ printed as a dash.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -115,7 +116,15 @@ def speed(run: Run) -> list[Table]:
 def validation(run: Run) -> list[Table]:
     """Measured against expected, each with its tolerance; without one it is reported, not judged."""
     lines = [
-        (check_name(run, row), row.unit, row.value, row.expected, row.tolerance, _result(row))
+        (
+            check_name(run, row),
+            row.unit,
+            row.value,
+            row.expected,
+            row.tolerance,
+            tolerances_away(row),
+            _result(row),
+        )
         for row in checks(run).itertuples()
     ]
     columns = (
@@ -124,9 +133,20 @@ def validation(run: Run) -> list[Table]:
         Column("measured", "Measured", digits=7, trim=True),
         Column("expected", "Expected", digits=7, trim=True),
         Column("tolerance", "Tolerance", digits=2, trim=True),
+        Column("away", "Tolerances away", digits=2),
         Column("status", "Result", text=True),
     )
     return table("validation", columns, lines, "Checks with a known answer.")
+
+
+def tolerances_away(row) -> float | None:
+    """|measured - expected| / tolerance; a number that must be exact is 0 or infinitely many away."""
+    distance = abs(row.value - row.expected)
+    if pd.isna(distance) or pd.isna(row.tolerance):
+        return None
+    if row.tolerance:
+        return distance / row.tolerance
+    return math.inf if distance else 0.0
 
 
 def checks(run: Run) -> pd.DataFrame:

@@ -33,16 +33,16 @@ def test_every_method_of_a_claim_is_one_that_can_be_run():
 def test_a_term_is_reproduced_beyond_a_tie_and_beyond_the_scatter_of_seeds(snug, pbns, verdict):
     rows = [row("tshirt/kick", "snug", value=value, seed=k) for k, value in enumerate(snug)]
     rows += [row("tshirt/kick", "pbns", value=value, seed=k) for k, value in enumerate(pbns)]
-    unit, one, other, _, said = told(rows)["Strain", "SNUG", "PBNS"]
+    unit, one, other, _, said = told(rows)["Strain", "snug", "pbns"]
     assert one.value == pytest.approx(sum(snug) / len(snug)) and (unit, said) == ("J", verdict)
     assert (one.spread is None) == (len(snug) == 1) and (other.spread is None) == (len(pbns) == 1)
-    assert list(told(rows)) == [("Strain", "SNUG", "PBNS")]  # what was not run is not judged
+    assert list(told(rows)) == [("Strain", "snug", "pbns")]  # what was not run is not judged
 
 
 def test_means_are_compared_over_the_scenes_that_both_have():
     rows = [row(scene, "snug", value=value) for scene, value in zip(SCENES, (1.0, 9.0))]
     rows.append(row(SCENES[0], "pbns", value=2.0))
-    _, one, other, apart, said = told(rows)["Strain", "SNUG", "PBNS"]
+    _, one, other, apart, said = told(rows)["Strain", "snug", "pbns"]
     assert (one.value, other.value) == (1.0, 2.0) and not one.complete
     assert apart == pytest.approx(-50.0) and said == "reproduced (1 scene only)"
     rows[-1] = row("tshirt/other", "pbns", value=2.0)
@@ -55,13 +55,13 @@ def test_without_a_network_there_is_no_table():
 
 def test_what_diverged_is_the_worse_one_and_not_a_dash():
     rows = [row(metric="energy/total")]
-    line = ("Total", "SNUG", "SNUG, no-strain")
+    line = ("Total", "snug", "snug-no-strain")
     assert findings(run_of(rows)) == []
     gone = {"metric": "cost/frame", "value": None, "status": "diverged", "reason": "nan"}
     diverged = told([*rows, row(method="snug-no-strain", **gone)])[line]
     assert diverged[2:] == (None, None, "reproduced: the second diverged")
     broken = [row(method="pbns"), row(method="snug", **gone)]
-    assert told(broken)["Strain", "SNUG", "PBNS"][-1] == "not reproduced: the first diverged"
+    assert told(broken)["Strain", "snug", "pbns"][-1] == "not reproduced: the first diverged"
     # Mean curvature is no error: having none is no verdict.
     smooth = [row(method="supervised", metric="curvature/mean", unit="1/m"), row(method="snug", **gone)]
     assert findings(run_of(smooth)) == []

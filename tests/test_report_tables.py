@@ -106,6 +106,17 @@ def test_what_is_judged_outside_of_the_checks_stands_with_them():
     assert "3 of 4 checks pass; failed: sag." in dict(summary(run_of(rows)))["Known answers"]
 
 
+def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
+    numbers_of = {"suite": "validation", "method": "simulation", "metric": "check", "expected": 6.0}
+    rows = [
+        row("exact", value=6.0, tolerance=0.0, **numbers_of),
+        row("near", value=6.5, tolerance=2.0, **numbers_of),
+    ]
+    rows += [row("off", value=7.0, tolerance=0.0, **numbers_of), row("told", value=7.0, **numbers_of)]
+    table = make_tables(run_of(rows))["validation"]
+    assert [line[column(table, "away")] for line in table.rows] == [0.0, 0.25, float("inf"), None]
+
+
 def test_a_wide_table_goes_on_below_with_its_heads():
     rows = [row(metric=f"energy/{k}", value=float(k)) for k in range(11)]
     run = run_of(rows)
