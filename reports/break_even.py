@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import pandas as pd
 
 from reports.data import Run
 from reports.means import mean_of, value_of
-from reports.numbers import duration, number
+from reports.numbers import number
 from reports.pareto import TIME, fastest, points_of, solvers
 from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
 from reports.styles import leading, style
@@ -21,7 +22,6 @@ from reports.table import Cell, Column, Table, table
 NETWORK = "snug"  # the method whose accuracy a solver has to reach to be its rival
 ACCURACIES = (("gap/relative", "energy gap"), ("curvature/error", "curvature error"))
 MOST_FRAMES = 1e7
-FEW = 3  # networks whose crossings a caption has room for; of more it names SNUG's, and a table all
 
 
 @dataclass(frozen=True)
@@ -96,24 +96,24 @@ def crossings(run: Run) -> list[Table]:
     frame = run.cells("speed")
     lines: list[tuple[Cell, ...]] = []
     for garment, scenes in compared_scenes(run, frame).items():
-        networks, against = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
-        for network in networks:
-            for rival in against:
-                frames = crossing(network, rival)
-                total = None if frames is None else network.total(frames)
-                rounded = None if frames is None else float(f"{frames:.1e}")
-                lines.append((garment, network.method, rival.method, rounded, total))
+        why = rivals(run, frame, scenes)
+        for network, rival in itertools.product(*compared_costs(run, frame, scenes, why)):
+            frames = crossing(network, rival)
+            total = None if frames is None else network.total(frames)
+            rounded = None if frames is None else float(f"{frames:.1e}")
+            lines.append((garment, network.method, rival.method, why[rival.method], rounded, total))
     columns = (
         Column("garment", "Garment", text=True),
         Column("method", "Network", text=True, width="1fr"),
         Column("solver", "Overtakes", text=True, width="1.3fr"),
+        Column("as_good", "As good by", text=True),
         Column("crossing", "From frames on", digits=2, trim=True),
         Column("total_time", "Total time by then", "s"),
     )
     caption = (
         "From how many frames on training pays, against the converged simulation and the fastest solvers "
     )
-    caption += "with at most SNUG's error; a dash: never."
+    caption += "as good as SNUG; a dash: never."
     return table("crossings", columns, lines, caption, grouped_by=("garment",))
 
 
@@ -121,8 +121,7 @@ def break_even(folder: Path, run: Run) -> list[Picture]:
     """One figure: total time of N frames for each trained network and for the solvers it competes with."""
     frame = run.cells("speed")
     scenes = next(iter(compared_scenes(run, frame).values()), [])
-    against = rivals(run, frame, scenes)
-    trained, others = compared_costs(run, frame, scenes, against)
+    trained, others = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
     costs = [*others, *trained]
     if not trained or len(costs) < 2:
         return []
@@ -132,34 +131,17 @@ def break_even(folder: Path, run: Run) -> list[Picture]:
     for cost in costs:
         look = style(run, cost.method)
         axes.plot(frames, [cost.total(n) for n in frames], color=look.colour, linestyle=look.line)
-    told = _mark_crossings(axes, run, trained, others)
+    for network, rival in itertools.product(trained, others):
+        met = crossing(network, rival)
+        if met is not None and 1.0 <= met <= MOST_FRAMES:
+            colour = style(run, network.method).colour
+            axes.plot(met, network.total(met), "o", color=colour, markersize=4.5)
     axes.set(xlabel="frames", ylabel="data, training and frames [s]")
     axes.set_xscale("log")
     log_axis(axes, "y")
     grid(axes)
     legend_above(figure, [style(run, method) for method in run.ordered(c.method for c in costs)], lines=True)
-    caption = f"Total time against the number of frames ({', '.join(scenes)}). {told} "
-    caption += " ".join(
-        f"{run.label(method)} is the fastest solver with at most SNUG's {why}."
-        for method, why in against.items()
-        if method != run.reference
+    caption = (
+        f"Total time against the number of frames ({', '.join(scenes)}). Dots: where a training has paid."
     )
     return [save(figure, folder, "break_even", caption=caption, kind="break_even")]
-
-
-def _mark_crossings(axes, run: Run, trained: Sequence[Cost], against: Sequence[Cost]) -> str:
-    """A dot at each crossing, and the sentence that names them."""
-    parts, crossed = [], False
-    for network in trained:
-        for rival in against:
-            frames = crossing(network, rival)
-            if frames is not None and 1.0 <= frames <= MOST_FRAMES:
-                total, crossed = network.total(frames), True
-                axes.plot(frames, total, "o", color=style(run, network.method).colour, markersize=4.5)
-                if len(trained) > FEW and network.method != NETWORK:
-                    continue
-                names = f"{run.label(network.method)} overtakes {run.label(rival.method)}"
-                parts.append(f"{names} at {frames_text(frames)} frames ({duration(total)})")
-    if parts:
-        return "; ".join(parts) + "."
-    return "SNUG's training does not pay." if crossed else "No training pays within ten million frames."
