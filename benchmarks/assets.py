@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from snug.motion import Motion
 
     from .presets import Preset
-    from .scene import Scene
 
 
 @dataclass(frozen=True)
@@ -35,13 +34,13 @@ class Assets:
         """The motions of those names, in that order."""
         return [self.motions[name] for name in names]
 
-    def motion_of(self, scene: Scene) -> Motion:
-        """The motion of a dressed scene, or the part of it."""
-        return (self.clips if scene.part == "clip" else self.motions)[scene.motion]
+    def motion(self, name: str, part: str) -> Motion:
+        """The whole motion of that name, or its clip."""
+        return (self.clips if part == "clip" else self.motions)[name]
 
-    def only(self, scene: Scene) -> Assets:
-        """The same for this scene alone: little to hand to another process."""
-        names = {scene.motion} & self.motions.keys()
+    def only(self, motion: str) -> Assets:
+        """The same with this motion alone: little to hand to another process."""
+        names = {motion} & self.motions.keys()
         own = {name: self.motions[name] for name in names}
         return replace(self, motions=own, clips={name: self.clips[name] for name in names}, bodies={})
 

@@ -15,7 +15,7 @@ def describe(plan: Plan) -> str:
     runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=only))
     lines, wanted, cached = _head(plan), list[Found](), 0
     stage = ""
-    for task, found, skip in runner.foresee():
+    for task, found, skip in runner.preview():
         if task.stage != stage:
             stage = task.stage
             lines.append(stage)

@@ -35,16 +35,17 @@ def listing() -> str:
         ("training motions", ((name, "") for name in TRAIN)),
         ("training motions of garments with dynamics", ((name, "") for name in SWING_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
-        *(
-            (
-                f"cases of suite {suite.name}",
-                [(c.name, c.description) for c in CASES if c.suite == suite.name],
-            )
-            for suite in SUITES
-            if any(case.suite == suite.name for case in CASES)
-        ),
+        *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
+
+
+def _cases(suite: str) -> list[tuple[str, str]]:
+    """Of a suite; points of one map, which share a scene, in one line."""
+    found: dict[str, list[str]] = {}
+    for case in (case for case in CASES if case.suite == suite):
+        found.setdefault(f"{case.scene}/*" if case.scene else case.name, []).append(case.description)
+    return [(name, f"{len(d)} points, {d[0]} the first" if d[1:] else d[0]) for name, d in found.items()]
 
 
 def _where(method: MethodEntry) -> str:

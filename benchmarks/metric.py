@@ -14,23 +14,19 @@ tabulated and defined in the report.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from reference_sim import Trajectory
 
     from .method import MethodEntry
-    from .metrics.curvature import CurvatureSeries
-    from .metrics.geometry import Penetration
-    from .scene import BuiltScene, Scene
+    from .scene import BuiltScene
 
+Made = TypeVar("Made")
 WHOLE = ("ok", "stalled")  # statuses of cells that came to their last frame
 
 
@@ -51,37 +47,51 @@ class Metric:
     reference_tolerance: float | None = None
 
 
-@dataclass(eq=False)
-class RollOut:
-    """What one method did in a scene. positions: (T,V,3) [m], the frames before the first that is not finite.
+class Kept:
+    """Remembers what metric modules have made of an object: kept(make) is make(object), computed once."""
 
-    quasi_static: (T,V,3) [m] its own answer to poses held still, or None. counterpart: (T',V,3) [m] what the
-    same method did in the scene's counterpart, or None. suites: those that report it.
+    def __init__(self) -> None:
+        self._made: dict[Callable[..., Any], Any] = {}
+
+    def kept(self, make: Callable[[Any], Made]) -> Made:
+        if make not in self._made:
+            self._made[make] = make(self)
+        return self._made[make]
+
+
+class RollOut(Kept):
+    """What one method did in a scene. Frames from the first that is not finite on are left out of positions.
+
+    Attributes:
+        group: the roll-outs of the scene.
+        entry, seed: the method.
+        status: of its cell; suites: those that report it.
+        trajectory: as the method gave it; positions: (T,V,3) [m] of it that are finite.
+        quasi_static: (T,V,3) [m] its own answer to poses held still, or None.
+        counterpart: (T',V,3) [m] what the same method did in the scene's counterpart, or None.
     """
 
-    group: SceneRollOuts
-    entry: MethodEntry
-    seed: int
-    status: str
-    suites: tuple[str, ...]
-    trajectory: Trajectory
-    quasi_static: np.ndarray | None = None
-    counterpart: np.ndarray | None = None
-    positions: np.ndarray = field(init=False)
-
-    def __post_init__(self) -> None:
-        from .metrics.geometry import whole_frames
-
-        self.positions = whole_frames(self.trajectory.positions)
+    def __init__(
+        self,
+        group: SceneRollOuts,
+        entry: MethodEntry,
+        trajectory: Trajectory,
+        *,
+        seed: int = 0,
+        status: str = "ok",
+        suites: tuple[str, ...] = (),
+        quasi_static: np.ndarray | None = None,
+        counterpart: np.ndarray | None = None,
+    ) -> None:
+        super().__init__()
+        self.group, self.entry, self.seed = group, entry, seed
+        self.status, self.suites, self.trajectory = status, suites, trajectory
+        self.quasi_static, self.counterpart = quasi_static, counterpart
+        self.positions = finite_frames(trajectory.positions)
 
     @property
     def scene(self) -> BuiltScene:
         return self.group.scene
-
-    @property
-    def whole(self) -> bool:
-        """Whether it came to its last frame, and every position is finite."""
-        return self.status in WHOLE and len(self.positions) == self.scene.frames
 
     @property
     def reference(self) -> RollOut | None:
@@ -89,41 +99,28 @@ class RollOut:
         reference = self.group.reference
         return None if reference is self else reference
 
-    @cached_property
-    def curvature(self) -> CurvatureSeries:
-        from .metrics.curvature import curvature_series
-
-        return curvature_series(self.positions, self.scene.cloth.faces)
-
-    @property
-    def energies(self) -> dict[str, np.ndarray]:
-        """Term -> (T,) [J], and "total"."""
-        return self.group.energies[self.place]
-
-    @property
-    def inside(self) -> Penetration:
-        """How deep its vertices lie in the obstacle of the scene."""
-        return self.group.inside[self.place]
-
     @property
     def place(self) -> int:
+        """Among the roll-outs of the group."""
         return self.group.roll_outs.index(self)
 
 
-@dataclass(eq=False)
-class SceneRollOuts:
+class SceneRollOuts(Kept):
     """The roll-outs of one scene that are measured together: they share its search trees.
 
-    simulated_quasi_static: (T,V,3) [m] the simulator's answer to poses held still, or None. gap_samples:
-    frames at which a step is solved again. memo: what modules keep of all roll-outs together.
+    Attributes:
+        scene: as it was built.
+        gap_samples: frames at which a step is solved again.
+        quasi_static: (T,V,3) [m] the simulator's answer to poses held still, or None.
+        roll_outs: to be filled before anything is measured.
     """
 
-    declaration: Scene
-    scene: BuiltScene
-    gap_samples: int
-    simulated_quasi_static: np.ndarray | None = None
-    roll_outs: list[RollOut] = field(default_factory=list)
-    memo: dict[str, Any] = field(default_factory=dict)
+    def __init__(
+        self, scene: BuiltScene, *, gap_samples: int = 0, quasi_static: np.ndarray | None = None
+    ) -> None:
+        super().__init__()
+        self.scene, self.gap_samples, self.quasi_static = scene, gap_samples, quasi_static
+        self.roll_outs: list[RollOut] = []
 
     def find(self, *, role: str, family: str | None = None, level: float | None = None) -> RollOut | None:
         """The first that came to its end, of that role, and of that family and level where they are given."""
@@ -134,49 +131,30 @@ class SceneRollOuts:
                 return roll_out
         return None
 
-    @cached_property
+    @property
     def reference(self) -> RollOut | None:
         return self.find(role="reference")
 
-    @cached_property
-    def energies(self) -> list[dict[str, np.ndarray]]:
-        from .metrics.energy import energy_series
+    @property
+    def positions(self) -> list[np.ndarray]:
+        """Of each roll-out."""
+        return [roll_out.positions for roll_out in self.roll_outs]
 
-        return energy_series(self.scene, [roll_out.positions for roll_out in self.roll_outs])
 
-    @cached_property
-    def inside(self) -> list[Penetration]:
-        from .metrics.geometry import penetration
+def finite_frames(positions: np.ndarray) -> np.ndarray:
+    """The frames (T',V,3) of positions (T,V,3) before the first that is not finite."""
+    bad = np.flatnonzero(~np.isfinite(positions).all(axis=(1, 2)))
+    return positions[: bad[0]] if len(bad) else positions
 
-        assert self.scene.obstacle is not None
-        return penetration([roll_out.positions for roll_out in self.roll_outs], self.scene.obstacle)
 
-    @cached_property
-    def skinned(self) -> np.ndarray | None:
-        """(T,V,3) [m] the garment skinned to the poses, as the default recipe does; None without a body."""
-        if self.scene.dressed is None:
-            return None
-        from snug.dresser import DressedBody
-        from snug.recipe import DEFAULT
+def skinned(group: SceneRollOuts) -> np.ndarray | None:
+    """(T,V,3) [m] the garment skinned to the poses, as the default recipe does; None without a body."""
+    if group.scene.dressed is None:
+        return None
+    from snug.dresser import DressedBody
+    from snug.recipe import DEFAULT
 
-        dressed = self.scene.dressed
-        return DressedBody(dressed.body, dressed.garment).skinned(
-            dressed.motion, dressed.betas, smoothing=DEFAULT.smoothing
-        )
-
-    def measure(self, wanted: Sequence[RollOut]) -> Iterator[tuple[dict[str, float], dict[str, np.ndarray]]]:
-        """Metrics and curves of each wanted roll-out, in that order, by all modules that apply."""
-        from .metrics import modules
-
-        chosen = self.declaration.metrics
-        for roll_out in wanted:
-            found: dict[str, float] = {}
-            curves: dict[str, np.ndarray] = {}
-            for name, module in modules().items() if len(roll_out.positions) else ():
-                if chosen is not None and name not in chosen:
-                    continue
-                suites: tuple[str, ...] = getattr(module, "SUITES", roll_out.suites)
-                if any(suite in suites for suite in roll_out.suites):
-                    found |= module.measure(roll_out)
-                    curves |= module.series(roll_out) if hasattr(module, "series") else {}
-            yield found, curves
+    dressed = group.scene.dressed
+    return DressedBody(dressed.body, dressed.garment).skinned(
+        dressed.motion, dressed.betas, smoothing=DEFAULT.smoothing
+    )

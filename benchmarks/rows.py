@@ -140,7 +140,7 @@ def _rows_of_case(task: RunCase, outcomes: Outcomes) -> Iterator[Row]:
     if outcome is None or outcome.status == "skipped":
         return
     died = not outcome.result
-    row = timed_out(task.case, outcome.reason, outcome.status) if died else Row(**outcome.result)
+    row = timed_out(task.case, outcome.reason) if died else Row(**outcome.result)
     reason = "; ".join(filter(None, (row.reason, outcome.remark)))
     yield dataclasses.replace(row, commit=outcome.commit, reason=reason)
 

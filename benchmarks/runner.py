@@ -50,7 +50,13 @@ class Runner:
         for stage, group in groupby(self.tasks, key=lambda task: task.stage):
             tasks = list(group)
             with log.stage(stage):
-                self._alone(tasks, executor) if tasks[0].process else self._together(tasks, executor)
+                if tasks[0].process:
+                    self._alone(tasks, executor)
+                while tasks and not tasks[0].process:  # those that need one another, one after another
+                    left = {task.id for task in tasks}
+                    later = [task for task in tasks if left & {*task.needs, *task.reads}]
+                    self._together([task for task in tasks if task not in later], executor)
+                    tasks = later
 
     def _together(self, tasks: Sequence[Task], executor: Executor) -> None:
         wanted = [task for task in tasks if self.decide(task)]
@@ -136,7 +142,7 @@ class Runner:
 
     # --- without running -----------------------------------------------------------------------------------
 
-    def foresee(self) -> Iterator[tuple[Task, Found, str]]:
+    def preview(self) -> Iterator[tuple[Task, Found, str]]:
         """Of each task what the folder holds of it, and why it would be skipped, or empty. Writes nothing."""
         for task in self.tasks:
             found = self.found[task.id] = self.cache.find(task, self.found)
@@ -158,7 +164,7 @@ class Runner:
     def outdated(self) -> dict[str, str]:
         """Title -> what has changed, of tasks whose outcome is kept though it is out of date."""
         kept = (
-            (task.label, self.outcomes[task.id].remark) for task in self.tasks if task.id in self.outcomes
+            (task.title, self.outcomes[task.id].remark) for task in self.tasks if task.id in self.outcomes
         )
         return {label: remark for label, remark in kept if remark}
 

@@ -135,7 +135,9 @@ def _source(path: str) -> _Source:
     tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
     imports = [pair for node in _running(tree) for pair in _imported(node, path)]
     roots = {base.split(".")[0] for base, _ in imports}
-    files = (f for base, name in imports if base.split(".")[0] in LAYERS for f in _files_behind(base, name))
+    files = (
+        f for base, name in imports if base.split(".")[0] in LAYERS for f in _files_behind(base, name, path)
+    )
     found = tuple(dict.fromkeys(files))
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
@@ -170,48 +172,51 @@ def _running(node: ast.AST) -> Iterator[ast.AST]:
             yield from _running(child)
 
 
-def _files_behind(base: str, name: str) -> Iterator[str]:
+def _files_behind(base: str, name: str, importer: str) -> Iterator[str]:
     """The files that `from base import name` needs.
 
     A package that has the name neither as a module nor in its own text gives it when it is first used: then
     that of its modules counts which defines the name, and where none does, all of them.
     """
     path, inner = _file_of(base), _file_of(f"{base}.{name}") if name else None
-    if path is None or not path.endswith("/__init__.py") or not name:
-        yield from (
-            found for found in (inner, path) if found is not None and (found == inner or inner is None)
-        )
+    package = path is not None and path.endswith("/__init__.py") and bool(name)
+    if path is None or not package:
+        yield from filter(None, [inner or path])
         return
-    if name in _bound(path):
-        yield path
-    elif inner is not None:
+    if inner and (path == importer or name not in _bound(path)):
         yield inner
-    else:
-        yield path
+        return
+    yield path
+    if name not in _bound(path):
         folder = sorted((ROOT / path).parent.glob("*.py"))
         modules = [p.relative_to(ROOT).as_posix() for p in folder if p.name != "__init__.py"]
-        yield from [module for module in modules if name in _bound(module)] or modules
+        yield from [module for module in modules if name in _defined(module)] or modules
 
 
 @cache
 def _bound(path: str) -> frozenset[str]:
-    """Names that the text of a file binds at its top level."""
+    """Names that the text of a file binds at its top level, by an import or by itself."""
+    imports = (node for node in _top_level(path) if isinstance(node, ast.ImportFrom | ast.Import))
+    names = (alias.asname or alias.name.split(".")[0] for node in imports for alias in node.names)
+    return _defined(path) | frozenset(names)
+
+
+@cache
+def _defined(path: str) -> frozenset[str]:
+    """Names that the text of a file defines at its top level."""
     names: set[str] = set()
-    for node in _running_here(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom | ast.Import):
-            names |= {alias.asname or alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+    for node in _top_level(path):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
             names.add(node.name)
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            names |= {
-                part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)
-            }
+            parts = (part for target in targets for part in ast.walk(target))
+            names |= {part.id for part in parts if isinstance(part, ast.Name)}
     return frozenset(names)
 
 
-def _running_here(tree: ast.Module) -> Iterator[ast.stmt]:
-    for node in tree.body:
+def _top_level(path: str) -> Iterator[ast.stmt]:
+    for node in ast.parse((ROOT / path).read_text(encoding="utf-8")).body:
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             continue
         yield node

@@ -1,4 +1,4 @@
-"""The referee: cloth physics and its trusted minimiser. It imports nothing else of this project.
+"""The reference: cloth physics and its minimisers. It imports nothing else of this project.
 
 `Obstacle` and the energies are imported when first used, so that a scene pays only for what it has.
 """

@@ -1,4 +1,4 @@
-"""What makes a triangle mesh the surface of a body, and words for what does not."""
+"""What makes a triangle mesh the surface of a body, and messages for what does not."""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@ leaves lie equally deep, so node i has the children 2 i + 1 and 2 i + 2. A new f
 search begins with the face that its caller remembers from before: any face is an upper bound, and a good one
 leaves little to visit.
 
-A sample may be held to the faces near its own place at rest. Nodes carry boxes of the faces' rest centroids
-too, so that what is out of reach is left out by whole subtrees.
+A sample may be restricted to the faces near its own place at rest. Nodes hold boxes of the faces' rest
+centroids too, so that what is out of reach is left out by whole subtrees.
 
 An answer depends on mesh and point alone, never on what was remembered: of faces at the same distance the one
 of lowest index answers, and a box is left out only if it is farther by more than round-off. Arithmetic is in
@@ -18,9 +18,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from .group_search import search
+from .kernel_cache import njit
 
 LEAF = 4  # faces in a leaf, at most
 HALVINGS = 6  # of the longest side, for samples that nothing is remembered of
@@ -41,7 +41,7 @@ class FaceTree:
     Args:
         faces: (F, 3), at least one.
         centroids: (F, 3) [m], their centroids at rest, in a pose that spreads the mesh: by them the tree is
-            built and the rule of regions judges. Positions are kept in their type, float64 or float32.
+            built and the rule of regions decides. Positions are kept in their type, float64 or float32.
     """
 
     def __init__(self, faces: np.ndarray, centroids: np.ndarray) -> None:

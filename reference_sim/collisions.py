@@ -16,7 +16,7 @@ import numpy as np
 
 from .cloth import Cloth
 
-ROOM = 0.05  # [m] between the cloth and the sides of the box
+BOX_MARGIN = 0.05  # [m] between the cloth and the sides of the box
 NO_OBSTACLE = (np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
 
 
@@ -67,7 +67,7 @@ class Collisions:
         """Begin a step in which an obstacle (faces (Fb, 3)) moves from before to after (B, 3) [m].
 
         It is put at the end. Nothing is kept from the step before, so that sums have one order, whatever
-        was asked earlier, and a run taken up again gives the same bits.
+        was asked earlier, and a resumed run gives the same bits.
         """
         self._obstacle_faces, self._before, self._after = faces, before, after
         self._near: NearMesh | None = None
@@ -92,7 +92,7 @@ class Collisions:
         """The mesh whose box holds all these positions (V, 3) [m]; the last one if it does."""
         if self._near is None or not all(map(self._near.holds, positions)):
             stacked = np.concatenate(positions)
-            self._near = self._build(stacked.min(axis=0) - ROOM, stacked.max(axis=0) + ROOM)
+            self._near = self._build(stacked.min(axis=0) - BOX_MARGIN, stacked.max(axis=0) + BOX_MARGIN)
             self._forget()
         return self._near
 
@@ -147,7 +147,7 @@ class Collisions:
             self._pairs, self._at = (found, near, positions), x.copy()
         return self._pairs
 
-    def free_share(self, x: np.ndarray, direction: np.ndarray) -> float:
+    def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
         """Share of `direction` (V, 3) [m] that the cloth may go from x (V, 3) while the obstacle stands."""
         goal = x + direction
         found, near, positions = self.pairs(x)
@@ -160,7 +160,7 @@ class Collisions:
             near.mesh, near.stack(x, obstacle), near.stack(goal, obstacle), 0.0, self._ccd
         )
 
-    def free_way(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
         """Share of the way from x to goal (V, 3) that is free while the obstacle goes on from `progress`."""
         near = self.mesh_around(x, goal)
         start, end = near.stack(x, self.obstacle_at(progress)), near.stack(goal, self._after)
@@ -168,7 +168,7 @@ class Collisions:
         candidates.build(near.mesh, start, end, 0.0)
         return candidates.compute_collision_free_stepsize(near.mesh, start, end, 0.0, self._ccd)
 
-    def crossing(self, x: np.ndarray) -> str:
+    def first_intersection(self, x: np.ndarray) -> str:
         """An edge and a face that cut each other at x (V, 3), in words; "" if there are none."""
         near = self.mesh_around(x)
         positions = near.stack(x, self.obstacle_at(self.progress))

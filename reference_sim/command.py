@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .command_options import DEFAULT_FRAMES, make_parser
-from .command_terms import objection, terms
+from .command_terms import contradiction, terms
 from .material import Material
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: Namespace) -> int:
     _check_paths(options)
-    if contradiction := objection(options):
-        raise InputError(contradiction)
+    if text := contradiction(options):
+        raise InputError(text)
     cloth = _read_cloth(options)
     obstacle = _read_obstacle(cloth, options)
     frames = options.frames
@@ -111,7 +111,7 @@ def _check_paths(options: Namespace) -> None:
 
 def _read_cloth(options: Namespace) -> Cloth:
     from .cloth import Cloth, MeshError
-    from .exchange import read_mesh, to_metres_y_up
+    from .mesh_io import read_mesh, to_metres_y_up
 
     values = {parameter.name: getattr(options, parameter.name) for parameter in fields(Material)}
     material = Material(**values)
@@ -179,7 +179,7 @@ def _read_obstacle(cloth: Cloth, options: Namespace) -> Obstacle | None:
     if options.obstacle is None:
         return None
     from .cloth import MeshError
-    from .exchange import TRAJECTORY_SUFFIXES, read_mesh, read_sequence, to_metres_y_up
+    from .mesh_io import TRAJECTORY_SUFFIXES, read_mesh, read_sequence, to_metres_y_up
     from .obstacle import Obstacle
 
     axes = {"units": options.units, "up": options.up}

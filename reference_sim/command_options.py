@@ -81,13 +81,13 @@ def make_parser() -> argparse.ArgumentParser:
 
     material = parser.add_argument_group("material (default: the cotton of the SNUG paper)")
     for parameter in fields(Material):
-        unit, words = UNITS_OF_MATERIAL[parameter.name]
+        unit, meaning = UNITS_OF_MATERIAL[parameter.name]
         material.add_argument(
             "--" + parameter.name.replace("_", "-"),
             type=_number,
             default=parameter.default,
             metavar=unit,
-            help=f"{words} (default {parameter.default:g})",
+            help=f"{meaning} (default {parameter.default:g})",
         )
     material.add_argument(
         "--bending-scaling",
@@ -157,7 +157,7 @@ def _add_contact_and_time(parser: argparse.ArgumentParser) -> None:
         type=_positive,
         default=1e-6,
         metavar="W",
-        help="largest gradient component, in mean vertex weights (default 1e-6)",
+        help="relative residual: largest force left, in mean vertex weights (default 1e-6)",
     )
     steps.add_argument(
         "--method",

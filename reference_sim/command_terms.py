@@ -14,7 +14,7 @@ PENALTY_FLAGS = ("contact_stiffness", "contact_margin", "contact_samples")
 BARRIER_FLAGS = ("barrier_distance", "barrier_stiffness")
 
 
-def objection(options: Namespace) -> str:
+def contradiction(options: Namespace) -> str:
     """What flags ask for and cannot have, with the remedy; "" if nothing."""
     barrier = options.barrier or options.self_contact
     given = [name for name in PENALTY_FLAGS + BARRIER_FLAGS if getattr(options, name) is not None]

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from .energies.energy import Energy
+from .kernel_cache import njit
 from .linear_solver import nested_dissection
 
 SPARE = 3  # a wider pattern keeps up to this many times the blocks that dynamic terms need at the moment

@@ -11,11 +11,11 @@ from functools import cached_property
 
 import igl
 import numpy as np
-from numba import njit
 
 from .closed_mesh import check_closed
 from .closest_point import Closest, FaceTree
 from .cloth import MeshError
+from .kernel_cache import njit
 from .resume import fingerprint
 
 DEFAULT_REGION = 0.20  # [m]
@@ -42,8 +42,8 @@ class Obstacle:
         faces: (F, 3) outward wound.
         rest_positions: (B, 3) [m], the obstacle in the pose in which the cloth was made. With it, a cloth
             sample only ever meets faces whose rest centroid lies within `region` of the sample's own rest
-            position (the whole mesh, where there is none): without that rule arms grab the shirt and legs
-            catch the hem.
+            position (the whole mesh, where there is none): without that rule arms hold the shirt fast and
+            legs the hem.
         region: radius of that rule [m].
 
     Raises:
@@ -77,7 +77,7 @@ class Obstacle:
     def _forget(self) -> None:
         self._tree: FaceTree | None = None
         self._fitted = -1  # the frame that the tree is fitted to
-        self._last: dict[tuple[int, bool], np.ndarray] = {}  # faces found for so many points, held or free
+        self._last: dict[tuple[int, bool], np.ndarray] = {}  # found for so many points, in regions or not
 
     @property
     def frames(self) -> int:
@@ -143,8 +143,11 @@ class Obstacle:
         )  # fmt: skip
         return Planes(found.points, normals, found.faces, found.barycentric)
 
-    def carried(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> np.ndarray:
-        """Where points (N, 3) at frame - 1 would go if each kept its place beside its nearest face.
+    def transported(
+        self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Where points (N, 3) at frame - 1 would go if the body transported them: each keeps its place
+        beside its nearest face.
 
         The best known initial guess for a garment: the body's own motion, face by face.
         """

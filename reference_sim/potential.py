@@ -1,4 +1,4 @@
-"""The sum of energies that a simulator minimises, a network is trained on, and every method is judged by."""
+"""The sum of energies that a simulator minimises, a network is trained on and every method is measured by."""
 
 from __future__ import annotations
 
@@ -70,28 +70,28 @@ class Potential:
         """Largest share of `direction` (V, 3) [m] that every term allows from x (V, 3)."""
         return min(energy.largest_step(x, direction) for energy in self.energies)
 
-    def clear_way(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
-        """Share of the way from x to goal (V, 3) that every term leaves open; see `Energy.clear_way`."""
-        return min(energy.clear_way(x, goal, progress) for energy in self.energies)
+    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+        """Share of the way from x to goal (V, 3) free of collisions for every term; see `Energy`."""
+        return min(energy.ccd_fraction(x, goal, progress) for energy in self.energies)
 
     def set_progress(self, progress: float) -> None:
         """Put the obstacle of every term at `progress` (0 to 1) of its motion in this step."""
         for energy in self.energies:
             energy.set_progress(progress)
 
-    def foresee(self, x: np.ndarray, step: np.ndarray) -> None:
+    def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
         """Let every term's Hessian use what `step` from x (V, 3) predicts of its stresses; see `Energy`."""
         for energy in self.energies:
-            energy.foresee(x, step)
+            energy.predict_stress(x, step)
 
     def forget(self) -> None:
         """Back to the true second derivatives."""
         for energy in self.energies:
             energy.forget()
 
-    def objection(self, x: np.ndarray) -> str:
-        """The first objection of a term to x (V, 3); "" if there is none."""
-        return next(filter(None, (energy.objection(x) for energy in self.energies)), "")
+    def infeasibility(self, x: np.ndarray) -> str:
+        """What makes x (V, 3) impossible for the first term that finds something; "" if none does."""
+        return next(filter(None, (energy.infeasibility(x) for energy in self.energies)), "")
 
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
         """Second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""

@@ -1,4 +1,4 @@
-"""Frames as they come: in memory and, where a path is given, in a file; with the verdict on the whole."""
+"""Frames as they come: in memory and, where a path is given, in a file; with the status of the whole."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from .cloth import Cloth
 from .minimise import Result
-from .resume import Past
+from .resume import PartialRun
 from .trajectory import Trajectory, TrajectoryWriter
 
 
@@ -49,24 +49,24 @@ class Recorder:
         return len(self._positions)
 
     def start(self, x: np.ndarray, fields: dict[str, float]) -> None:
-        """Frame 0: x (V, 3) [m], which nobody minimised; the file appears."""
+        """Frame 0: x (V, 3) [m], which is given; the file appears."""
         self.add(x, 0.0, 0.0, fields)
         if self._file:
             self._file.go_live()
 
-    def replay(self, past: Past) -> None:
+    def replay(self, earlier: PartialRun) -> None:
         """The frames of an earlier run; the file that it left is replaced by a clean one."""
-        old = past.trajectory
+        old = earlier.trajectory
         for k in range(old.frames):
             fields = {name: float(values[k]) for name, values in old.frame_fields.items()}
-            before = past.before if k == old.frames - 1 else None
+            before = earlier.before if k == old.frames - 1 else None
             self.add(old.positions[k], float(old.times[k]), float(old.frame_seconds[k]), fields, before)
         if old.status != "converged":
             self._fail(old.status, old.reason)
         if self._file:
             self._file.go_live()
 
-    def judge(self, frame: int, results: Sequence[Result]) -> None:
+    def note(self, frame: int, results: Sequence[Result]) -> None:
         """Take note of the first minimisation that did not converge, on the way to `frame`."""
         for result in results:
             if result.status != "converged" and self.status == "converged":

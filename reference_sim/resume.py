@@ -28,7 +28,7 @@ END_OF_FILE = slice(40, 48)  # of the superblock (version 0): where HDF5 believe
 
 
 @dataclass(frozen=True, eq=False)
-class Past:
+class PartialRun:
     """The whole frames of an earlier run.
 
     Attributes:
@@ -42,7 +42,7 @@ class Past:
     before: np.ndarray | None
     ended: bool
 
-    def over(self, frames: int) -> bool:
+    def complete(self, frames: int) -> bool:
         """Whether nothing is left to do for a run of `frames` frames."""
         return self.ended and (self.trajectory.frames == frames or self.trajectory.status == "diverged")
 
@@ -57,7 +57,7 @@ def fingerprint(*arrays: np.ndarray | None) -> str:
     return digest.hexdigest()
 
 
-def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Past | None:
+def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> PartialRun | None:
     """The whole frames of the run in `path`, or None if there is no such file.
 
     Raises:
@@ -68,18 +68,18 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Pas
         return None
     try:
         with _opened(path) as file:
-            past = _salvage(file)
+            earlier = _whole_frames(file)
     except (OSError, KeyError, RuntimeError, ValueError) as error:
         raise TrajectoryError(
             f"{path}: nothing to resume: not a readable trajectory ({_one_line(error)}); "
             "remove it, or write elsewhere"
         ) from None
-    _check_same_run(path, past.trajectory.provenance, provenance)
-    if past.trajectory.frames > frames:
+    _check_same_run(path, earlier.trajectory.provenance, provenance)
+    if earlier.trajectory.frames > frames:
         raise TrajectoryError(
-            f"{path}: holds {past.trajectory.frames} frames already, more than the {frames} asked for"
+            f"{path}: holds {earlier.trajectory.frames} frames already, more than the {frames} asked for"
         )
-    return past
+    return earlier
 
 
 @contextmanager
@@ -94,7 +94,7 @@ def _opened(path: Path) -> Iterator[h5py.File]:
         with h5py.File(path, "r") as file:
             yield file
         return
-    copy = path.with_name(path.name + ".salvage")
+    copy = path.with_name(path.name + ".recovered")
     try:
         shutil.copyfile(path, copy)
         os.truncate(copy, path.stat().st_size + missing)
@@ -104,7 +104,7 @@ def _opened(path: Path) -> Iterator[h5py.File]:
         copy.unlink(missing_ok=True)
 
 
-def _salvage(file: h5py.File) -> Past:
+def _whole_frames(file: h5py.File) -> PartialRun:
     own, points = file["benchmark"], file["VTKHDF/Points"]
     vertex_count = int(file["VTKHDF/NumberOfPoints"][0])
     written = int(own.attrs["frames"])
@@ -125,7 +125,7 @@ def _salvage(file: h5py.File) -> Past:
     if not ended:
         status, reason = json.loads(own.attrs.get(FAILURE, '["converged", ""]'))
         trajectory = trajectory.with_status(status, reason)
-    return Past(trajectory, before, ended)
+    return PartialRun(trajectory, before, ended)
 
 
 def _check_same_run(path: Path, then: dict[str, Any], now: dict[str, Any]) -> None:

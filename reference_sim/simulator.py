@@ -56,8 +56,8 @@ def simulate(
         start: (V, 3) [m] at frame 0; default the rest positions.
         velocity: (V, 3) [m/s] at frame 0; default zero.
         pin_positions: frame -> (P, 3) [m], for handles that move.
-        guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "carried" by the obstacle's
-            nearest faces (default where there is an obstacle; else "extrapolated").
+        guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
+            along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated").
         quasi_static: forget the velocity at every frame; for settling.
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
@@ -72,8 +72,8 @@ def simulate(
 
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the first other status; a
-        frame that is not finite ends it. frame_fields: iterations, factorisations, gradient_norm (mean vertex
-        weights), converged (0/1), energy/<term> [J].
+        frame that is not finite ends it. frame_fields: iterations, factorisations, gradient_norm (relative
+        residual, see `Result`), converged (0/1), energy/<term> [J].
 
     Raises:
         ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step.
@@ -86,20 +86,20 @@ def simulate(
     v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
     loop = Stepper(cloth, energies, dt, substeps, obstacle, guess, quasi_static, options)
     provenance = loop.provenance() | {"start": fingerprint(x, v)}
-    past = recover(path, provenance, frames=frames) if resume and path else None
-    if past and past.over(frames):
-        return past.trajectory
-    state = State(x, v) if past is None else loop.taken_up(past, v, pin_positions)
+    earlier = recover(path, provenance, frames=frames) if resume and path else None
+    if earlier and earlier.complete(frames):
+        return earlier.trajectory
+    state = State(x, v) if earlier is None else loop.resumed(earlier, v, pin_positions)
     with Recorder(cloth, provenance, path) as record:
-        if past is None:
+        if earlier is None:
             record.start(x, loop.first_fields(x))
         else:
-            record.replay(past)
+            record.replay(earlier)
         for frame in _bar(range(record.frames, frames), progress):
             clock = time.perf_counter()
             after, results = loop.advance(frame, state, pin_positions and pin_positions(frame))
             seconds = time.perf_counter() - clock
-            record.judge(frame, results)
+            record.note(frame, results)
             if after is None:
                 break
             state = after

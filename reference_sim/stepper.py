@@ -13,13 +13,13 @@ from .cloth import Cloth
 from .energies.energy import Energy, Step
 from .minimise import Minimiser, Result, make_minimiser
 from .potential import Potential
-from .resume import Past, fingerprint
+from .resume import PartialRun, fingerprint
 from .trajectory import TrajectoryError
 
 if TYPE_CHECKING:
     from .obstacle import Obstacle
 
-GUESSES = ("previous", "extrapolated", "carried")
+GUESSES = ("previous", "extrapolated", "body_transported")
 MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
 LEAST_GAIN = 2e-3  # of that way, by three of them together; less is no way
 PART = 0.8  # of the way to the next touch: closer, a barrier grows stiff
@@ -54,10 +54,11 @@ class Stepper:
         from .energies.inertia import Inertia
 
         if guess is None:
-            guess = "extrapolated" if obstacle is None else "carried"
-        if guess not in GUESSES or (guess == "carried" and obstacle is None):
+            guess = "extrapolated" if obstacle is None else "body_transported"
+        if guess not in GUESSES or (guess == "body_transported" and obstacle is None):
             raise ValueError(
-                f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)}; carried needs a body"
+                f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)};"
+                " body_transported needs an obstacle"
             )
         self.cloth, self.guess, self.substeps = cloth, guess, substeps
         self.frame_dt, self.dt = dt, dt / substeps  # between frames, and of one step
@@ -70,7 +71,7 @@ class Stepper:
         self._started = False
 
     def advance(self, frame: int, state: State, pins: np.ndarray | None) -> tuple[State | None, list[Result]]:
-        """The sub-steps to `frame`, pins (P, 3) [m] at its end; the state is None where one was lost."""
+        """The sub-steps to `frame`, pins (P, 3) [m] at its end; the state is None if one of them diverged."""
         x, v, results = state.x, state.v, []
         for j in range(1, self.substeps + 1):
             share = j / self.substeps
@@ -93,20 +94,20 @@ class Stepper:
 
     def prepare(self, step: int, x: np.ndarray, v: np.ndarray, handles: np.ndarray) -> np.ndarray:
         """Freeze every term for the step from x with velocity v (V, 3); returns its first guess (V, 3)."""
-        if self.guess == "carried":
+        if self.guess == "body_transported":
             assert self.obstacle is not None
-            first = self.obstacle.carried(x, step, self.cloth.rest_positions)
+            first = self.obstacle.transported(x, step, self.cloth.rest_positions)
         else:
             first = x + self.dt * v if self.guess == "extrapolated" else x.copy()
         first[self.cloth.pins] = handles
         self.potential.prepare(Step(x, v, first, self.dt, self.obstacle, step))
         return first
 
-    def taken_up(
-        self, past: Past, v0: np.ndarray, pin_positions: Callable[[int], np.ndarray] | None
+    def resumed(
+        self, earlier: PartialRun, v0: np.ndarray, pin_positions: Callable[[int], np.ndarray] | None
     ) -> State:
         """The state at the last frame of an earlier run that began with velocity v0 (V, 3)."""
-        positions, before = past.trajectory.positions, past.before
+        positions, before = earlier.trajectory.positions, earlier.before
         last = len(positions) - 1
         x = positions[last]
         if last == 0:
@@ -126,9 +127,9 @@ class Stepper:
     def reach(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
 
-        With such a term (a barrier) x, pins and obstacle walk together from the start of the step to the
+        With such a term (a barrier) x, pins and obstacle move together from the start of the step to the
         guess until something would touch. From there pins and obstacle go on alone; if they cannot, a rough
-        minimisation makes room, and all walk on. So the last minimisation starts without an intersection,
+        minimisation gains distance, and all move on. So the last minimisation starts without an intersection,
         pins and obstacle at the end of their way. Without such a term it starts at the guess.
 
         Raises:
@@ -137,8 +138,8 @@ class Stepper:
         potential, pins = self.potential, self.cloth.pins
         if not self._started:
             potential.set_progress(0.0)
-            if objection := potential.objection(x):
-                raise ValueError(f"simulate: the start is not free of intersections: {objection}")
+            if infeasibility := potential.infeasibility(x):
+                raise ValueError(f"simulate: the start is not free of intersections: {infeasibility}")
             self._started = True
         motion, goal, progress = guess - x, guess, 0.0
         reached = [0.0]
@@ -148,7 +149,7 @@ class Stepper:
                 if not free_too:
                     goal = x.copy()
                     goal[pins] = guess[pins]
-                share = potential.clear_way(x, goal, progress)
+                share = potential.ccd_fraction(x, goal, progress)
                 if share == 1:
                     potential.set_progress(1.0)
                     return self.minimiser.minimise(goal)
@@ -171,12 +172,12 @@ class Stepper:
 
     @cached_property
     def rough(self) -> Minimiser:
-        """What makes room half-way: a few iterations."""
+        """What gains distance half-way: a few iterations."""
         options: dict[str, Any] = self.options | {"max_iterations": 8, "tolerance": 1e-2}
         return make_minimiser(self.potential, **options)
 
     def first_fields(self, x: np.ndarray) -> dict[str, float]:
-        """The fields of frame 0, which nobody minimised."""
+        """The fields of frame 0, which is given."""
         names = [energy.name for energy in self.potential.energies]
         fields = dict.fromkeys([f"energy/{name}" for name in names], float("nan"))
         return {

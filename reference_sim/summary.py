@@ -34,9 +34,7 @@ def summary(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int) -
     lines = [f"frames     {trajectory.frames} of {frames}"]
     if trajectory.frames > 1:
         converged, worst = int(fields["converged"][1:].sum()), np.nanmax(fields["gradient_norm"])
-        lines[0] += (
-            f"; {converged} of {frames - 1} steps converged, worst gradient {worst:.1e} vertex weights"
-        )
+        lines[0] += f"; {converged} of {frames - 1} steps converged, worst relative residual {worst:.1e}"
     if trajectory.status != "converged":
         lines.append(f"first not  {trajectory.status}: {trajectory.reason}")
     if trajectory.frames > 1:

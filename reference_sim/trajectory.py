@@ -1,4 +1,4 @@
-"""A trajectory: positions over time with the truth about how they came to be, and its file.
+"""A trajectory: positions over time, whether and how they converged, and its file.
 
 The file is VTKHDF (temporal PolyData), so ParaView opens it as it is; what VTK has no place for lies in the
 top-level group /benchmark. Frames are appended and flushed one by one: a killed run keeps every whole frame.
@@ -90,7 +90,7 @@ class Trajectory:
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({error})") from None
 
     def with_status(self, status: str, reason: str) -> Trajectory:
-        """The same frames under another verdict."""
+        """The same frames with another status."""
         return replace(self, status=status, reason=reason)
 
 
@@ -242,7 +242,7 @@ class TrajectoryWriter:
         self._put_in_place()
 
     def first_failure(self, status: str, reason: str) -> None:
-        """Remember the verdict on the frame that is appended next, for a run that resumes this one."""
+        """Remember how the frame failed that is appended next, for a run that resumes this one."""
         self._file["benchmark"].attrs[FAILURE] = json.dumps([status, reason])
 
     def finish(self, status: str, reason: str) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .kernel_cache import njit
 
 SLIVER = 1e-3  # squared sine of a triangle's first angle, below which all of its sides are tried
 

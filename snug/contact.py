@@ -15,11 +15,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numba
 import numpy as np
 
 from reference_sim.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
+from reference_sim.kernel_cache import njit
 from reference_sim.obstacle import DEFAULT_REGION, vertex_normals
 from snug.sliding import SLACK, beyond_sides, slid
 
@@ -210,7 +210,7 @@ def _samples(contact: ContactPenalty) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return contact.stencils.astype(np.uint32), weights, stiffness, np.float32(contact.margin)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _byte_normals(positions, faces):
     normals = np.empty(positions.shape, np.int8)
     for frame in range(len(positions)):
@@ -218,7 +218,7 @@ def _byte_normals(positions, faces):
     return normals
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, inline="always", error_model="numpy")
 def _carried(faces, face, parts, vectors, c):
     """Component c of what vectors (P, 3) of the body's vertices are at an anchor."""
     v, w = np.float32(parts[0]) / np.float32(PARTS), np.float32(parts[1]) / np.float32(PARTS)
@@ -226,7 +226,7 @@ def _carried(faces, face, parts, vectors, c):
     return u * vectors[faces[face, 0], c] + v * vectors[faces[face, 1], c] + w * vectors[faces[face, 2], c]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _planes(frames, rows, positions, normals, faces, anchor_faces, barycentric, out_points, out_normals):
     for n in range(len(frames)):
         x, m = positions[rows[n]], normals[rows[n]]
@@ -243,7 +243,7 @@ def _planes(frames, rows, positions, normals, faces, anchor_faces, barycentric, 
                 out_normals[n, s, c] /= length
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, inline="always", error_model="numpy")
 def _above(x0, x1, x2, skin, m, faces, face, parts):
     """Height of a sample above its anchor's plane, times the length of the normal; and that normal."""
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
@@ -260,7 +260,7 @@ def _above(x0, x1, x2, skin, m, faces, face, parts):
 
 
 # No assumption on NaN or infinity: the guard of training must see them.
-@numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
 def _energy(
     x, stencils, weights, stiffness, margin, power, frames, rows, positions, normals, faces, beyond,
     centroids, homes, region, slack, slide, anchor_faces, barycentric, values, gradients,

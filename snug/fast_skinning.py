@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numba import njit
 from torch import Tensor
 
+from reference_sim.kernel_cache import njit
 from snug.fast_network import product
 
 

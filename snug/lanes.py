@@ -15,9 +15,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim.kernel_cache import njit
 
 LANES = 16
 # No assumption on NaN or infinity: the guard of training must see them.

@@ -8,9 +8,9 @@ of another limb, a thigh that comes up through the hem: that takes a search (snu
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from reference_sim.kernel_cache import njit
 from reference_sim.triangle import closest_on_triangle
 
 SLACK = 0.001  # m: beyond the margin, and still followed
@@ -29,7 +29,7 @@ def beyond_sides(faces: np.ndarray) -> np.ndarray:
     return beyond.reshape(-1, 3)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def slid(x0, x1, x2, face, skin, faces, beyond, centroids, home, reach, corners):
     """Face, and weights of its second and third corner, where an anchor comes to rest for a sample at x.
 

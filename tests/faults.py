@@ -24,8 +24,9 @@ STVK, SPRING, BARRIER, HINGE = (
 GRAVITY, INERTIA, CONTACT = (
     f"reference_sim/energies/{name}.py" for name in ("gravity", "inertia", "contact_penalty")
 )
-NEWTON, VERDICT, DESCENT, SECANTS = (
-    f"reference_sim/minimise/{name}.py" for name in ("newton", "verdict", "descent", "secants")
+NEWTON, CHECK, FACTORISED, DESCENT, HISTORY = (
+    f"reference_sim/minimise/{name}.py"
+    for name in ("newton", "convergence_check", "factorised", "descent", "lbfgs_history")
 )
 PATTERN, CURVATURE = "reference_sim/hessian_pattern.py", "benchmarks/metrics/curvature.py"
 KERNEL = "P0 * D[0, 0] + P1 * D[0, 1]"
@@ -197,8 +198,8 @@ FAULTS = (
     Fault(
         "Newton uphill",
         NEWTON,
-        "        p = self.solve(-self.g)\n        return p, rung",
-        "        p = self.solve(self.g)\n        return p, rung",
+        "        p = self.solve(-self.g)\n        return p, projection",
+        "        p = self.solve(self.g)\n        return p, projection",
     ),
     Fault("any step will do", DESCENT, "return after <= before + SUFFICIENT_DECREASE * slope", "return True"),
     Fault(
@@ -213,7 +214,7 @@ FAULTS = (
         "if self.gradient_norm() <= tolerance:",
         "if True:",
     ),
-    Fault("convergence ignores the step", VERDICT, "if step <= run.n.step_tolerance or", "if True or"),
+    Fault("convergence ignores the step", CHECK, "if step <= step_tolerance or", "if True or"),
     Fault(
         "tolerance a hundred thousand times too loose",
         NEWTON,
@@ -229,15 +230,15 @@ FAULTS = (
     Fault("pinned vertices move", CLOTH, "free[self.pins] = False", "free[self.pins[:1]] = False"),
     Fault(
         "saddles pass for minima",
-        VERDICT,
-        "if run.factorise(data, tiny):",
-        "if run.factorise(data, tiny) or True:",
+        CHECK,
+        "if run.factorise(data, run.hessian.tiny_shift(data)):",
+        "if run.factorise(data, run.hessian.tiny_shift(data)) or True:",
     ),
     Fault(
         "shift in place of the Hessian",
-        NEWTON,
-        "data[self.n._pattern.diagonal] += shift * self.n.metric",
-        "data[self.n._pattern.diagonal] = shift * self.n.metric",
+        FACTORISED,
+        "data[self._pattern.diagonal] += shift * self.metric",
+        "data[self._pattern.diagonal] = shift * self.metric",
     ),
     Fault(
         "half Newton steps",
@@ -245,12 +246,12 @@ FAULTS = (
         "step[self.free] = p.reshape(-1, 3)",
         "step[self.free] = 0.5 * p.reshape(-1, 3)",
     ),
-    Fault("L-BFGS adds what it should take away", SECANTS, "q = q - alpha * y", "q = q + alpha * y"),
+    Fault("L-BFGS adds what it should take away", HISTORY, "q = q - alpha * y", "q = q + alpha * y"),
     Fault(
         "L-BFGS pairs the gradient alone",
         DESCENT,
-        "secants.add(alpha * p, self.g - g)",
-        "secants.add(alpha * p, self.g)",
+        "history.add(alpha * p, self.g - g)",
+        "history.add(alpha * p, self.g)",
     ),
     Fault(
         "block transposed in the sparse matrix", PATTERN, "key = column * n + row", "key = row * n + column"

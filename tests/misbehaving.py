@@ -13,17 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.guarded import Guarded
+from benchmarks.executor import LocalExecutor
+from benchmarks.method import Method
 from reference_sim.trajectory import Trajectory
 
 
-class Misbehaving:
+class Misbehaving(Method):
     """Skips all physics; `how` says what it does instead of its work."""
 
     def __init__(self, how: str) -> None:
         self.how = how
-        if how == "unheld":
-            self.held = self._no_room
 
     def prepare(self, scene) -> None:
         self.scene = scene
@@ -39,7 +38,7 @@ class Misbehaving:
             frame_seconds=np.full(scene.frames, 1e-6), status="ok",
         )  # fmt: skip
 
-    def ready_batch(self, copies: int):
+    def batch(self, copies: int):
         """Many at once: "greedy" takes a third of a gigabyte, "crowded" leaves the work to a thread.
 
         "crammed" is killed for it, "torn" raises.
@@ -59,8 +58,10 @@ class Misbehaving:
 
         return compute
 
-    def _no_room(self) -> Trajectory:
-        raise OSError("no room left for the held poses")
+    def quasi_static(self) -> Trajectory | None:
+        if self.how == "unheld":
+            raise OSError("no room left for the held poses")
+        return None
 
     def _hang(self, _) -> None:
         subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
@@ -94,11 +95,11 @@ def make(*, models: Path, seed: int, how: str) -> Misbehaving:
 
 def interrupt_at(method: str, monkeypatch) -> None:
     """Whoever runs cells is interrupted from the keyboard when that method's turn has come."""
-    perform = Guarded.call
+    alone = LocalExecutor.alone
 
-    def call(self, function, task, **rest):
+    def interrupted(self, task, needed):
         if task.cell.method == method:
             raise KeyboardInterrupt
-        return perform(self, function, task, **rest)
+        return alone(self, task, needed)
 
-    monkeypatch.setattr(Guarded, "call", call)
+    monkeypatch.setattr(LocalExecutor, "alone", interrupted)

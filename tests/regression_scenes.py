@@ -26,7 +26,7 @@ from reference_sim.energies import (
 
 STORE = Path(__file__).parent / "data" / "energies.csv"
 COLUMNS = ["scene", "frame", "term", "energy [J]"]
-TOLERANCE = 1e-10  # of the solver, in vertex weights
+TOLERANCE = 1e-10  # of the solver's relative residual
 Energies = dict[tuple[str, int, str], float]
 
 
@@ -83,7 +83,7 @@ def squeezed() -> Trajectory:
 def carried() -> Trajectory:
     """A sheet on a ball that moves and turns below it, sub-stepped; samples meet only what is near at rest.
 
-    The guess is not the carried one: beside an edge of the ball round-off decides which face carries.
+    The guess is not the transported one: beside an edge of the ball round-off decides which face carries.
     """
     x, faces = sheet()
     cloth = Cloth(x + np.array([0.0, 0.112, 0.0]), faces)

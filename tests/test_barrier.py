@@ -112,9 +112,9 @@ def test_the_way_of_a_line_search_ends_before_the_first_touch():
         direction = np.tile([0.0, -down, 0.0], (len(x), 1))
         share = barrier.largest_step(x, direction)
         assert 0 < share <= 1 and (share == 1) == (down == 1e-3)
-        assert not barrier.objection(x + share * direction)
+        assert not barrier.infeasibility(x + share * direction)
         assert not cuts(x + share * direction, cloth.edges, obstacle.at(0), obstacle.faces).any()
-    assert "cuts" in barrier.objection(x - np.array([0, 0.004, 0]))
+    assert "cuts" in barrier.infeasibility(x - np.array([0, 0.004, 0]))
 
 
 def test_a_start_that_intersects_is_refused_by_name():
@@ -138,7 +138,7 @@ def test_the_elements_named_are_those_that_cut():
     barrier = ContactBarrier(cloth)
     x = cloth.rest_positions
     barrier.prepare(still(x, Obstacle(needle, faces)))
-    words = barrier.objection(x)
+    words = barrier.infeasibility(x)
     names = re.fullmatch(r"edge \((\d+), (\d+)\) of the body cuts face (\d+) of the cloth", words)
     assert names, words
     a, b, face = map(int, names.groups())

@@ -45,7 +45,7 @@ def test_a_sheet_rests_at_the_height_of_the_formula():
     assert result.status == "converged"
     assert np.abs(result.positions[:, 1] - height).max() < 1e-8
     push = -barrier.value_and_gradient(result.positions)[1]
-    # The weight, up to the gradient's tolerance of 1e-6 vertex weights.
+    # The weight, up to the gradient's tolerance of a relative residual of 1e-6.
     assert push.sum(axis=0) == pytest.approx([0, 9.81 * cloth.masses.sum(), 0], abs=1e-7)
 
 
@@ -104,7 +104,7 @@ def test_a_sheet_dropped_on_a_sphere_never_meets_it():
     assert np.array_equal(again.positions, drop.positions[:4])
 
 
-@pytest.mark.parametrize(("guess", "speed", "frames"), [("carried", 0.06, 4), ("previous", 0.02, 3)])
+@pytest.mark.parametrize(("guess", "speed", "frames"), [("body_transported", 0.06, 4), ("previous", 0.02, 3)])
 def test_a_rising_sphere_takes_a_sheet_along(guess, speed, frames):
     """`speed` [m] a frame. A guess that stands still leaves all the work to the way there."""
     cloth = sheet(6, 0.24, (-0.12, 0.0, -0.12))

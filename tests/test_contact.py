@@ -77,7 +77,7 @@ def test_the_table_carries_the_weight_of_an_uneven_sheet(samples):
     result = minimise(on_the_table(cloth, contact), cloth.rest_positions + up(0.003), tolerance=1e-10)
     assert result.status == "converged", result.reason
     force = total_force(contact, result.positions)
-    # 49 gradients of at most 1e-10 vertex weights each.
+    # 49 gradients of at most 1e-10 mean vertex weights each.
     assert force == pytest.approx(
         [0, cloth.masses.sum() * GRAVITY, 0], abs=1e-9 * cloth.masses.sum() * GRAVITY
     )

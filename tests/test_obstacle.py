@@ -217,7 +217,7 @@ def test_carried_is_exact_for_a_rigid_motion():
     obstacle = Obstacle(np.stack([SPHERE, SPHERE @ turn.T + shift]), FACES)
     points, _ = around(200, 6, -0.1, 0.3)
     # Round-off of barycentric places and frames, at 1 m from the origin.
-    assert obstacle.carried(points, 1) == pytest.approx(points @ turn.T + shift, abs=1e-12)
+    assert obstacle.transported(points, 1) == pytest.approx(points @ turn.T + shift, abs=1e-12)
 
 
 def test_carried_keeps_height_over_the_nearest_face_of_a_bending_bar():
@@ -227,7 +227,7 @@ def test_carried_keeps_height_over_the_nearest_face_of_a_bending_bar():
     corner = rest[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     points = centroid + 0.01 * normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    carried = obstacle.carried(points, 1, points)
+    carried = obstacle.transported(points, 1, points)
     planes = obstacle.planes(carried, 1, points)
     corner = bent(rest)[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])

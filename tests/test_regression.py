@@ -9,10 +9,10 @@ from regenerate_energies import changes, main
 from regression_scenes import SCENES, computed, scales, stored
 
 from reference_sim import Material
-from reference_sim.energies import HOME
+from reference_sim.energies import MODULE_OF
 
 # Round-off of 1e-13 m at the start moves no term by more than 1e-11, another linear solver by 1e-14; the
-# solver's own tolerance of 1e-10 vertex weights is below that. 1e-9 leaves room for other processors.
+# solver's own tolerance of 1e-10 is below that. 1e-9 leaves room for other processors.
 TOLERANCE = 1e-9
 
 
@@ -39,7 +39,7 @@ def test_the_table_holds_every_term_of_the_paper_and_of_contact(kept):
     assert terms == wanted and {key[0] for key in kept} == set(SCENES) and len(SCENES) == 6
     assert all(size > 1e-6 for size in scales(kept).values()), "a term that does nothing tests nothing"
     # What is not here needs ipctk, which is optional, or is no term.
-    assert len(HOME) == len(wanted) + 4
+    assert len(MODULE_OF) == len(wanted) + 4
 
 
 def test_a_change_of_a_millionth_is_seen(kept, monkeypatch):

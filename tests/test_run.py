@@ -73,7 +73,7 @@ def test_the_list_names_everything(capsys):
     words = capsys.readouterr().out
     names = [m.name for m in METHODS] + [c.name for c in KNOWN_ANSWERS]
     names += [c.name for c in STEPS] + [f"{name}/*" for name in MAPS]
-    for name in [*names, "dressed/", "garments", "paper", "walk"]:
+    for name in [*names, "tshirt/", "garments", "paper", "walk"]:
         assert name in words
 
 
@@ -86,7 +86,7 @@ def test_the_list_names_everything(capsys):
         (["--preset", "huge"], "smoke, quick, paper"),
         (["--suite", "garment"], "garments"),
         (["--scenes", "hanging_sheets"], "did you mean hanging_sheet"),
-        (["--scenes", "dressed/walk"], "--test-motions"),
+        (["--scenes", "tshirt/walk"], "--test-motions"),
         (["--methods", "sung"], "did you mean snug"),
         (["--motions", "nowhere"], "nowhere"),
         (["--motions", "empty.amc"], "empty.amc"),
@@ -117,7 +117,7 @@ def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monk
     (tmp_path / "torn" / "run.json").write_text('{"command": ')
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("benchmarks.stages.execute", lambda plan: pytest.fail("the run was begun"))
+    monkeypatch.setattr("benchmarks.execution.execute", lambda plan: pytest.fail("the run was begun"))
     assert run.main(words) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and hint in err

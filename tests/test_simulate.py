@@ -287,8 +287,8 @@ def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"guess": "skinned"}, "choose one of previous, extrapolated, carried"),
-        ({"guess": "carried"}, "carried needs a body"),
+        ({"guess": "skinned"}, "choose one of previous, extrapolated, body_transported"),
+        ({"guess": "body_transported"}, "body_transported needs an obstacle"),
         ({"frames": 0}, "frames = 0: must be at least 1"),
         ({"substeps": 0}, "substeps = 0: must be at least 1"),
         ({"start": SHEET[:-1]}, "start has shape (48, 3): expected finite (49, 3)"),

@@ -60,7 +60,7 @@ def test_a_point_of_a_map_counts_iterations_and_names_its_place():
 
 @pytest.mark.parametrize(("factor", "most"), [(1e3, 60), (1e4, 60), (1e6, 80)])
 def test_stiff_cloth_converges_in_tens_of_iterations(factor, most):
-    """Without predicted stresses and excursions: 99 iterations at x1e3, more than 300 beyond."""
+    """Without predicted stresses and watchdog steps: 99 iterations at x1e3, more than 300 beyond."""
     checked = solve_and_check(sheet(stiffness=factor))
     assert checked.status == "ok" and checked.iterations <= most, checked
 
@@ -72,7 +72,7 @@ def test_a_stress_test_never_lies(case):
     assert row.status in ("ok", "stalled", "timeout", "diverged") and row.reason, row.reason
 
 
-def test_foreseen_stress_is_linear_in_the_step_and_forgotten():
+def test_predicted_stress_is_linear_in_the_step_and_forgotten():
     x, faces = grid(3, 3, width=0.3, depth=0.3)
     cloth = Cloth(x, faces)
     random = np.random.default_rng(4)
@@ -80,8 +80,8 @@ def test_foreseen_stress_is_linear_in_the_step_and_forgotten():
     step = random.normal(0, 0.05, x.shape)
     energy = StretchStVK(cloth)
     true = energy.hessian_blocks(x)
-    energy.foresee(x, step)
-    foreseen = energy.hessian_blocks(x + step)
+    energy.predict_stress(x, step)
+    predicted = energy.hessian_blocks(x + step)
     energy.forget()
     assert np.array_equal(energy.hessian_blocks(x), true)
     # From the definition: the part of the Hessian without stress, at x + step, plus the stress's own part
@@ -101,8 +101,8 @@ def test_foreseen_stress_is_linear_in_the_step_and_forgotten():
     b = np.concatenate([-cloth.Dm_inverse.sum(axis=1, keepdims=True), cloth.Dm_inverse], axis=1)
     part = cloth.areas[:, None, None] * np.einsum("fai,fij,fcj->fac", b, stress, b)
     expected = there + np.einsum("fac,ij->faicj", part, np.eye(3)).reshape(there.shape)
-    assert foreseen == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
-    assert np.abs(foreseen - there).max() > 0.01 * np.abs(there).max()
+    assert predicted == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    assert np.abs(predicted - there).max() > 0.01 * np.abs(there).max()
 
 
 def test_every_kept_point_is_observed_and_lower_than_the_one_before():

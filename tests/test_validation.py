@@ -23,7 +23,7 @@ def test_a_known_answer_is_found(case):
 
 def test_there_are_enough_of_every_kind():
     names = [case.name for case in CASES]
-    assert len(set(names)) == len(names)
+    assert len(set(names)) == len(set(CASES)) == len(names)
     judged = [case for case in KNOWN_ANSWERS if case.tolerance is not None]
     assert len(judged) >= 40
     assert sum(name.endswith("_order") for name in names) >= 9

@@ -81,7 +81,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     """Of the reference, skinning and what was trained: nobody asks a truncated solver for conservation."""
     if roll_out not in _asked(roll_out.group):
         return {}
-    laws = _laws_of(roll_out.group)[roll_out]
+    laws = roll_out.group.kept(_laws_of)[roll_out]
     found = laws.metrics()
     if roll_out is not roll_out.group.reference:
         return found
@@ -102,12 +102,8 @@ def _asked(group: SceneRollOuts) -> list[RollOut]:
 
 def _laws_of(group: SceneRollOuts) -> dict[RollOut, LawSeries]:
     """Of all that are asked at once: they share the search trees."""
-    kept: dict[RollOut, LawSeries] | None = group.memo.get("conservation")
-    if kept is None:
-        asked = _asked(group)
-        kept = dict(zip(asked, law_series(group.scene, [roll_out.positions for roll_out in asked])))
-        group.memo["conservation"] = kept
-    return kept
+    asked = _asked(group)
+    return dict(zip(asked, law_series(group.scene, [roll_out.positions for roll_out in asked])))
 
 
 @dataclass(frozen=True)

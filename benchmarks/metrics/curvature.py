@@ -51,11 +51,12 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    found = {"curvature/mean": float(roll_out.curvature.means().mean())}
+    curvature = roll_out.kept(series_of)
+    found = {"curvature/mean": float(curvature.means().mean())}
     if roll_out.reference is None:
         return found
     frames = min(len(roll_out.positions), len(roll_out.reference.positions))
-    ours, theirs = (series.first(frames) for series in (roll_out.curvature, roll_out.reference.curvature))
+    ours, theirs = curvature.first(frames), roll_out.reference.kept(series_of).first(frames)
     return found | {
         "curvature/error": float(curvature_error(ours, theirs).mean()),
         "curvature/histogram": float(histogram_distance(ours, theirs).mean()),
@@ -64,7 +65,12 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def series(roll_out: RollOut) -> dict[str, Floats]:
-    return {"curvature/mean": roll_out.curvature.means()}
+    return {"curvature/mean": roll_out.kept(series_of).means()}
+
+
+def series_of(roll_out: RollOut) -> CurvatureSeries:
+    """Curvature and areas of all its frames."""
+    return curvature_series(roll_out.positions, roll_out.scene.cloth.faces)
 
 
 def boundary_mask(faces: NDArray[np.int64], vertices: int) -> NDArray[np.bool_]:

@@ -36,17 +36,19 @@ METRICS = (
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     own, x = roll_out.quasi_static, roll_out.positions
+    if roll_out is roll_out.group.reference:
+        own = roll_out.group.quasi_static
     found = {}
     if own is not None:
         found["dynamics/quasi_static_difference"] = rms(x, own[: len(x)])
-    hem = hem_motion(roll_out.group)
+    hem = roll_out.group.kept(hem_motion)
     if hem is not None and (own is None or np.isfinite(own).all()):
         found |= hem.measure(x, own)
     return found
 
 
 def series(roll_out: RollOut) -> dict[str, np.ndarray]:
-    hem = hem_motion(roll_out.group)
+    hem = roll_out.group.kept(hem_motion)
     return {} if hem is None else hem.curves(roll_out.positions)
 
 
@@ -55,7 +57,7 @@ def hem_motion(group: SceneRollOuts) -> HemMotion | None:
     dressed, reference = group.scene.dressed, group.reference
     if dressed is None or "hem" not in dressed.garment.loops:
         return None
-    if reference is None or group.simulated_quasi_static is None:
+    if reference is None or group.quasi_static is None:
         return None
     from snug.skeleton import rotation_matrices
 
@@ -66,6 +68,6 @@ def hem_motion(group: SceneRollOuts) -> HemMotion | None:
         stop=stop_frame(motion.poses, motion.translations),
         hem=dressed.garment.hem,
         simulated=reference.positions,
-        quasi_static=group.simulated_quasi_static,
+        quasi_static=group.quasi_static,
         dt=group.scene.dt,
     )

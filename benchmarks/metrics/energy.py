@@ -21,7 +21,7 @@ from ..metric import Metric
 if TYPE_CHECKING:
     from reference_sim.energies import Energy
 
-    from ..metric import RollOut
+    from ..metric import RollOut, SceneRollOuts
     from ..scene import BuiltScene
 
 FIRST_FULL_FRAME = 2
@@ -103,8 +103,17 @@ def mean_energy(series: NDArray[np.float64]) -> float:
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    return {f"energy/{term}": mean_energy(series) for term, series in roll_out.energies.items()}
+    return {f"energy/{term}": mean_energy(series) for term, series in energies(roll_out).items()}
 
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
-    return {f"energy/{term}": series for term, series in roll_out.energies.items()}
+    return {f"energy/{term}": series for term, series in energies(roll_out).items()}
+
+
+def energies(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
+    """Term -> (T,) [J], and "total"; of all roll-outs of the scene at once."""
+    return roll_out.group.kept(_of_all)[roll_out.place]
+
+
+def _of_all(group: SceneRollOuts) -> list[dict[str, NDArray[np.float64]]]:
+    return energy_series(group.scene, group.positions)

@@ -14,7 +14,7 @@ from ..metric import Metric
 if TYPE_CHECKING:
     from reference_sim import Obstacle
 
-    from ..metric import RollOut
+    from ..metric import RollOut, SceneRollOuts
 
 Floats = NDArray[np.float64]
 
@@ -85,10 +85,11 @@ def _depths(roll_out: RollOut) -> dict[str, float]:
     if scene.obstacle is None:
         return {}
     own = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)
+    inside = inside_of(roll_out)
     found = {
-        "penetration/vertices": 100.0 * float(roll_out.inside.share.mean()),
-        "penetration/deep": 100.0 * float((roll_out.inside.depth > DEEP).mean()),
-        "penetration/depth_p99": MM * float(np.percentile(roll_out.inside.depth, 99)),
+        "penetration/vertices": 100.0 * float(inside.share.mean()),
+        "penetration/deep": 100.0 * float((inside.depth > DEEP).mean()),
+        "penetration/depth_p99": MM * float(np.percentile(inside.depth, 99)),
         "penetration/own_part_p999": MM * float(np.percentile(own, 99.9)),
     }
     if scene.dressed is not None and scene.origin_heights is not None:
@@ -96,15 +97,19 @@ def _depths(roll_out: RollOut) -> dict[str, float]:
     return found
 
 
+def inside_of(roll_out: RollOut) -> Penetration:
+    """How deep its vertices lie in the obstacle; of all roll-outs of the scene at once."""
+    return roll_out.group.kept(_of_all)[roll_out.place]
+
+
+def _of_all(group: SceneRollOuts) -> list[Penetration]:
+    assert group.scene.obstacle is not None
+    return penetration(group.positions, group.scene.obstacle)
+
+
 def rms(x: Floats, y: Floats) -> float:
     """Root mean square distance [mm] between the vertices of x and y (T,V,3) [m], over all frames."""
     return MM * float(np.sqrt((distance_rms(x, y) ** 2).mean()))
-
-
-def whole_frames(positions: Floats) -> Floats:
-    """The frames (T',V,3) of positions (T,V,3) before the first that is not finite."""
-    bad = np.flatnonzero(~np.isfinite(positions).all(axis=(1, 2)))
-    return positions[: bad[0]] if len(bad) else positions
 
 
 def distance_rms(positions: Floats, reference: Floats) -> Floats:

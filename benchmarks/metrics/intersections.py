@@ -7,8 +7,9 @@ come from a sweep along x over bounding boxes. Triangles that touch in one plane
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from reference_sim.kernel_cache import njit
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric import Metric
+from ..metric import Metric, skinned
 from .energy import FIRST_FULL_FRAME
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ METRICS = (
 def measure(roll_out: RollOut) -> dict[str, float]:
     group = roll_out.group
     return optimality(
-        roll_out.scene, roll_out.positions, samples=group.gap_samples, skinned=group.skinned
+        roll_out.scene, roll_out.positions, samples=group.gap_samples, skinned=group.kept(skinned)
     ).metrics()
 
 
@@ -154,7 +154,7 @@ def first_guess(
     if scene.obstacle is None:
         guess = previous + scene.dt * velocity
     else:
-        guess = scene.obstacle.carried(previous, frame, scene.cloth.rest_positions)
+        guess = scene.obstacle.transported(previous, frame, scene.cloth.rest_positions)
     pins = scene.cloth.pins
     guess[pins] = previous[pins] if scene.pin_positions is None else scene.pin_positions(frame)
     return np.ascontiguousarray(guess)

@@ -1,14 +1,14 @@
 """Sweeps over vertices and over constraints, and the strain, fold angle and depth of one element they share.
 
 Written for one element at a time, where the energies' own kernels run over all: a Gauss-Seidel sweep moves
-vertices between one element and the next. Tests hold them to the energies' gradients and Hessians. All are in
-one file because a compiled kernel in numba's cache does not notice a change in another file.
+vertices between one element and the next. Tests hold them to the energies' gradients and Hessians.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from reference_sim.kernel_cache import njit
 
 
 @njit(cache=True, inline="always")

@@ -22,7 +22,7 @@ HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of th
 def build(scene: Scene, assets: Assets, *, settle_frames: int) -> BuiltScene:
     """The built scene of a garment and a motion, or of the clip of it."""
     body, garment = assets.body, assets.garments[scene.garment]
-    motion = assets.motion_of(scene)
+    motion = assets.motion(scene.motion, scene.part)
     cloth = Cloth(garment.rest_positions, garment.faces, Material(), pins=garment.pins)
     handles = garment.carried(body, motion.poses, motion.translations)
     energies = declared_energies(cloth)

@@ -37,7 +37,7 @@ def measure(case: str, repeats: int) -> list[Row]:
     tree = FaceTree(obstacle.faces, centroids)
     rows: list[Row] = [("build, once", 1e3 * (time.process_time() - begun), "ms")]
     seconds: dict[str, list[float]] = {}
-    x = contact.sample_matrix @ obstacle.carried(scene.start, 1, scene.cloth.rest_positions)
+    x = contact.sample_matrix @ obstacle.transported(scene.start, 1, scene.cloth.rest_positions)
     faces, apart = None, 0.0
     for frame in range(1, FRAMES + 1):
         vertices = np.asfortranarray(obstacle.at(frame))
@@ -58,7 +58,7 @@ def measure(case: str, repeats: int) -> list[Row]:
         ours = np.linalg.norm(x[::50] - tree.nearest(x[::50]).points, axis=1)
         apart = max(apart, float(np.abs(ours - np.sqrt(whole)).max()))
         faces = found.faces
-        x = obstacle.carried(x, frame + 1, home)
+        x = obstacle.transported(x, frame + 1, home)
     middle = {name: 1e3 * float(np.median(spent[1:])) for name, spent in seconds.items()}
     rows += [(name, ms, "ms") for name, ms in middle.items()]
     ratio = (middle["libigl: build"] + middle["libigl: search"]) / (middle["refit"] + middle["search"])

@@ -28,7 +28,7 @@ def measure(case: str, repeats: int) -> list[Row]:
         guesses = {
             "previous": previous,
             "extrapolated": previous + scene.dt * velocity,
-            "carried": scene.obstacle.carried(previous, frame, scene.cloth.rest_positions),
+            "carried": scene.obstacle.transported(previous, frame, scene.cloth.rest_positions),
         }
         # Planes are taken at the guess that the simulator uses, so that all three minimise one potential.
         potential.prepare(Step(previous, velocity, guesses["carried"], scene.dt, scene.obstacle, frame))

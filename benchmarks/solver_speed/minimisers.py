@@ -79,7 +79,7 @@ def step_by_step(scene: BuiltScene, run: Trajectory) -> list[Row]:
     x, apart, higher = run.positions, [], []
     for frame in range(2, len(x)):
         previous, velocity = x[frame - 1], (x[frame - 1] - x[frame - 2]) / scene.dt
-        guess = scene.obstacle.carried(previous, frame, scene.cloth.rest_positions)
+        guess = scene.obstacle.transported(previous, frame, scene.cloth.rest_positions)
         potential.prepare(Step(previous, velocity, guess, scene.dt, scene.obstacle, frame))
         ours, theirs = newton.minimise(guess), lbfgs.minimise(guess)
         apart.append(float(np.linalg.norm(ours.positions - theirs.positions, axis=1).max()))

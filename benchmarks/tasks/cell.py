@@ -75,7 +75,7 @@ class CellTask(Task):
     cell: Cell
 
     def assets(self, assets: Assets | None) -> Assets | None:
-        return assets.only(self.cell.scene) if assets is not None and self.cell.scene.dressed else None
+        return assets.only(self.cell.scene.motion) if assets is not None and self.cell.scene.dressed else None
 
     def scene(self, context: Context) -> BuiltScene:
         """The built scene of this process."""
@@ -180,7 +180,7 @@ def built(scene: Scene, context: Context) -> BuiltScene:
         return scene.build(assets)
     import numpy as np
 
-    bodies = {assets.motion_of(scene).name: np.load(run.body_path(scene.name))}
+    bodies = {assets.motion(scene.motion, scene.part).name: np.load(run.body_path(scene.name))}
     start = np.load(run.start_path(scene.name))
     dressed = scene.build(dataclasses.replace(assets, bodies=bodies))
     return dataclasses.replace(dressed, settle=lambda: start)

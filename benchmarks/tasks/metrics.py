@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ..metric import RollOut, SceneRollOuts
+from ..metrics import modules
 from .cell import Cell, built
 from .task import Context, Outcome, Task, TaskId
 
@@ -38,14 +40,12 @@ class MeasureCell(Task):
 
         The energies of each frame, and other curves, are added to the trajectory files.
         """
-        from reference_sim.trajectory import replace_frame_fields
-
         own = {task.cell: task for task in tasks if isinstance(task, MeasureCell)}
-        first = next(iter(own.values()))
-        group = SceneRollOuts(first.cell.scene, built(first.cell.scene, context), first.gap_samples)
+        first, folder = next(iter(own.values())), context.folder
+        scene = built(first.cell.scene, context)
+        group = SceneRollOuts(scene, gap_samples=first.gap_samples)
         if first.quasi_static in needed:
-            path = context.folder.quasi_static_path(first.cell.scene.name, "simulation")
-            group.simulated_quasi_static = _positions(path)
+            group.quasi_static = _positions(folder.quasi_static_path(scene.name, "simulation"))
         places = {cell: place for task in own.values() for place, cell in task.compared}
         places |= {cell: task.place for cell, task in own.items()}
         found = {}
@@ -54,15 +54,35 @@ class MeasureCell(Task):
             if outcome is not None and outcome.files:
                 found[cell] = _roll_out(group, cell, outcome, own.get(cell), context)
                 group.roll_outs.append(found[cell])
-        for (cell, task), (metrics, curves) in zip(own.items(), group.measure([found[c] for c in own])):
-            frames = found[cell].trajectory.frames
-            padded = {
-                name: np.pad(curve, (0, frames - len(curve)), constant_values=np.nan)
-                for name, curve in curves.items()
-            }
-            replace_frame_fields(cell.trajectory(context.folder), padded, family="energy/")
+        for cell, task in own.items():
+            metrics, curves = measured(found[cell], cell.scene.metrics)
+            _add_curves(cell.trajectory(folder), curves, found[cell].trajectory.frames)
             context.tell(task.units)
             yield Outcome(result=metrics)
+
+
+def measured(
+    roll_out: RollOut, chosen: Sequence[str] | None = None
+) -> tuple[dict[str, float], dict[str, np.ndarray]]:
+    """Metrics and curves of a roll-out by all modules that apply, or by those chosen."""
+    metrics: dict[str, float] = {}
+    curves: dict[str, np.ndarray] = {}
+    for name, module in modules().items() if len(roll_out.positions) else ():
+        suites = getattr(module, "SUITES", roll_out.suites)
+        if (chosen is None or name in chosen) and any(suite in suites for suite in roll_out.suites):
+            metrics |= module.measure(roll_out)
+            curves |= module.series(roll_out) if hasattr(module, "series") else {}
+    return metrics, curves
+
+
+def _add_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
+    from reference_sim.trajectory import replace_frame_fields
+
+    padded = {
+        name: np.pad(curve, (0, frames - len(curve)), constant_values=np.nan)
+        for name, curve in curves.items()
+    }
+    replace_frame_fields(path, padded, family="energy/")
 
 
 def _roll_out(
@@ -70,20 +90,19 @@ def _roll_out(
 ) -> RollOut:
     from reference_sim import Trajectory
 
-    folder = context.folder
-    quasi_static, counterpart = cell.quasi_static(folder), None
+    folder, counterpart = context.folder, None
     if task is not None and task.counterpart is not None:
         path = task.counterpart.trajectory(folder)
         counterpart = _positions(path) if path.is_file() else None
     return RollOut(
-        group=group, entry=cell.entry, seed=cell.seed, status=outcome.status, suites=cell.suites,
-        trajectory=Trajectory.load(cell.trajectory(folder)),
-        quasi_static=_positions(quasi_static) if task and len(outcome.files) > 1 else None,
+        group, cell.entry, Trajectory.load(cell.trajectory(folder)), seed=cell.seed, status=outcome.status,
+        suites=cell.suites,
+        quasi_static=_positions(cell.quasi_static(folder)) if len(outcome.files) > 1 else None,
         counterpart=counterpart,
     )  # fmt: skip
 
 
-def _positions(path) -> np.ndarray:
+def _positions(path: Path) -> np.ndarray:
     from reference_sim import Trajectory
 
     return Trajectory.load(path).positions

@@ -10,7 +10,6 @@ from typing import Any
 from ..results import Row
 
 METHOD = "simulation"
-WARM_UP_SECONDS = 900.0  # for a process that may have to compile every kernel first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +41,7 @@ class Case:
     description: str
     module: str
     function: str
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict, hash=False)
     scene: str = ""
     metric: str = "check"
     unit: str = "1"

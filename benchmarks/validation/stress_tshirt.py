@@ -14,9 +14,8 @@ from reference_sim.material import GRAVITY
 
 from .case import Measurement
 from .convergence_check import CheckedResult, StressStep, lbfgs_then_newton, solve_and_check
-from .stress_steps import DT, prepared, warm_up
-
-__all__ = ["shirt", "shirt_iterations", "solve_shirt", "warm_up"]
+from .stress_steps import DT, prepared
+from .stress_steps import warm_up as warm_up  # that of its cases too
 
 if TYPE_CHECKING:
     from snug.body import Body
@@ -70,7 +69,7 @@ def shirt(
     energies: list[Energy] = [StretchStVK(cloth), BendHinge(cloth)]
     energies += [Gravity(cloth, acceleration=gravity * GRAVITY), ContactPenalty(cloth)]
     left_behind = jump or turn
-    guess = x if left_behind else obstacle.carried(x, 1, cloth.rest_positions)
+    guess = x if left_behind else obstacle.transported(x, 1, cloth.rest_positions)
     return prepared(cloth, energies, dt, x, v, guess=guess, obstacle=obstacle, frame=1)
 
 

@@ -1,26 +1,27 @@
 """The physical terms. Each file holds one: its formula, its definition in torch, its closed-form kernels.
 
-A new term is one file and one line in HOME. A term's file is imported when its name is first used, so that a
-scene without contact never loads contact.
+A new term is one file, its line in MODULE_OF and its import for type checkers. The file is imported when the
+term's name is first used, so that a scene without contact never loads contact.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .area_barrier import AreaBarrier
-    from .barrier_friction import BarrierFriction
-    from .bend_hinge import BendHinge
-    from .contact_barrier import ContactBarrier
-    from .contact_friction import ContactFriction
-    from .contact_penalty import ContactPenalty
-    from .energy import Energy, Step
-    from .gravity import Gravity
-    from .inertia import Inertia
-    from .stretch_spring import StretchSpring
-    from .stretch_stvk import StretchStVK
+    from .area_barrier import AreaBarrier as AreaBarrier
+    from .barrier_friction import BarrierFriction as BarrierFriction
+    from .bend_hinge import BendHinge as BendHinge
+    from .contact_barrier import ContactBarrier as ContactBarrier
+    from .contact_friction import ContactFriction as ContactFriction
+    from .contact_penalty import ContactPenalty as ContactPenalty
+    from .energy import Energy as Energy
+    from .energy import Step as Step
+    from .gravity import Gravity as Gravity
+    from .inertia import Inertia as Inertia
+    from .stretch_spring import StretchSpring as StretchSpring
+    from .stretch_stvk import StretchStVK as StretchStVK
 
-HOME = {
+MODULE_OF = {
     "StretchStVK": "stretch_stvk",
     "StretchSpring": "stretch_spring",
     "BendHinge": "bend_hinge",
@@ -35,24 +36,12 @@ HOME = {
     "Step": "energy",
 }
 
-__all__ = [
-    "HOME",
-    "AreaBarrier",
-    "BarrierFriction",
-    "BendHinge",
-    "ContactBarrier",
-    "ContactFriction",
-    "ContactPenalty",
-    "Energy",
-    "Gravity",
-    "Inertia",
-    "Step",
-    "StretchSpring",
-    "StretchStVK",
-]
+__all__ = list(MODULE_OF)
 
 
 def __getattr__(name: str) -> type:
-    if name not in HOME:
-        raise AttributeError(f"reference_sim.energies has no term {name!r}: choose one of {', '.join(HOME)}")
-    return getattr(import_module(f".{HOME[name]}", __name__), name)
+    if name not in MODULE_OF:
+        raise AttributeError(
+            f"reference_sim.energies has no term {name!r}: choose one of {', '.join(MODULE_OF)}"
+        )
+    return getattr(import_module(f".{MODULE_OF[name]}", __name__), name)

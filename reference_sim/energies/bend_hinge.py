@@ -13,9 +13,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import njit
 
 from ..cloth import Cloth
+from ..kernel_cache import njit
 from .energy import Energy
 
 if TYPE_CHECKING:

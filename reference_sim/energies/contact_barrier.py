@@ -11,9 +11,9 @@ Distances, pairs and derivatives are those of the package ipctk (see collisions.
 definition: there is none in torch. Networks are trained with ContactPenalty.
 
 Beyond a touch the energy means nothing: a distance has no sign. Hence `largest_step` bounds every line
-search by continuous collision detection, and a step starts without an intersection: `clear_way` and
-`set_progress` let the simulator walk cloth and body together from the start of the step as far as nothing
-meets, minimise there to make room, and go on, until the body is where the frame has it.
+search by continuous collision detection, and a step starts without an intersection: `ccd_fraction` and
+`set_progress` let the simulator move cloth and body together from the start of the step as far as nothing
+meets, minimise there to gain distance, and go on, until the body is where the frame has it.
 """
 
 from __future__ import annotations
@@ -130,17 +130,17 @@ class ContactBarrier(Energy):
         return self._hessians[projection]
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
-        return self.collisions.free_share(x, direction) if np.isfinite(direction).all() else 1.0
+        return self.collisions.largest_step(x, direction) if np.isfinite(direction).all() else 1.0
 
-    def clear_way(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
-        return self.collisions.free_way(x, goal, progress)
+    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+        return self.collisions.ccd_fraction(x, goal, progress)
 
     def set_progress(self, progress: float) -> None:
         self.collisions.place(progress)
 
-    def objection(self, x: np.ndarray) -> str:
+    def infeasibility(self, x: np.ndarray) -> str:
         """An edge that cuts a face, as far as the obstacle has come; "" if there is none."""
-        return self.collisions.crossing(x) if np.isfinite(x).all() else ""
+        return self.collisions.first_intersection(x) if np.isfinite(x).all() else ""
 
 
 def _check_heights(cloth: Cloth, distance: float) -> None:

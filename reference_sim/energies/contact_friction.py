@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import njit
 
+from ..kernel_cache import njit
 from .contact_penalty import ContactPenalty
 from .energy import Energy, Step
 

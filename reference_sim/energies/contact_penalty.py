@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ..cloth import Cloth
+from ..kernel_cache import njit
 from .energy import Energy, Step
 
 if TYPE_CHECKING:

@@ -128,14 +128,14 @@ class Energy:
         raise NotImplementedError
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
-        """Largest share of `direction` (V, 3) [m] that may be walked from x (V, 3); 1 if nothing forbids.
+        """Largest share of `direction` (V, 3) [m] that may be gone from x (V, 3); 1 if nothing forbids.
 
         For terms that are infinite beyond a first touch.
         """
         return 1.0
 
-    def clear_way(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
-        """Share (0 to 1) of the joint way from x (V, 3) to goal (V, 3) that this term leaves open.
+    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+        """Share (0 to 1) of the joint way from x (V, 3) to goal (V, 3) that is free of collisions.
 
         On that way the obstacle moves from its place at `progress` (0: start of the step, 1: end) to its
         place at the end.
@@ -145,7 +145,7 @@ class Energy:
     def set_progress(self, progress: float) -> None:
         """Put the obstacle at `progress` of its motion in this step; `prepare` puts it at the end, 1."""
 
-    def foresee(self, x: np.ndarray, step: np.ndarray) -> None:
+    def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
         """Let the Hessian take, until `forget`, the stresses that linear strain predicts at x + step (V, 3).
 
         Energy and gradient know nothing of it. For stiff terms whose Hessian holds stress: computed from the
@@ -155,7 +155,7 @@ class Energy:
     def forget(self) -> None:
         """Let the Hessian be the true second derivatives again."""
 
-    def objection(self, x: np.ndarray) -> str:
+    def infeasibility(self, x: np.ndarray) -> str:
         """What makes x (V, 3) impossible for this term, in words with the elements; "" if nothing does."""
         return ""
 

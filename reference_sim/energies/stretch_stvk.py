@@ -13,9 +13,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import njit
 
 from ..cloth import Cloth
+from ..kernel_cache import njit
 from .energy import Energy
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class StretchStVK(Energy):
         self.areas = cloth.areas
         self.lam = cloth.material.lame_lambda
         self.mu = cloth.material.lame_mu
-        self._foreseen: np.ndarray | None = None  # (F, 3) stresses S00, S11, S01 [N/m]
+        self._predicted_stress: np.ndarray | None = None  # (F, 3) stresses S00, S11, S01 [N/m]
 
     def parameters(self) -> dict[str, Any]:
         return {"lambda_N_per_m": self.lam, "mu_N_per_m": self.mu}
@@ -61,17 +61,17 @@ class StretchStVK(Energy):
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Negative curvature comes from compressive stress alone, so only that is reduced by `convexity`."""
         blocks = np.empty((len(self.stencils), 9, 9))
-        stress = self._foreseen
+        stress = self._predicted_stress
         if stress is None:
             stress = self._stress(x, np.zeros_like(x))
         _hessian(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, convexity, stress, blocks)
         return np.arange(len(blocks)), blocks
 
-    def foresee(self, x: np.ndarray, step: np.ndarray) -> None:
-        self._foreseen = self._stress(x, step)
+    def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
+        self._predicted_stress = self._stress(x, step)
 
     def forget(self) -> None:
-        self._foreseen = None
+        self._predicted_stress = None
 
     def _stress(self, x: np.ndarray, step: np.ndarray) -> np.ndarray:
         stress = np.empty((len(self.stencils), 3))

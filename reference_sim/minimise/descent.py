@@ -9,11 +9,13 @@ import numpy as np
 
 from ..material import GRAVITY
 from ..potential import Potential
+from .lbfgs_history import LBFGSHistory, dot
 from .result import Result
-from .secants import Secants, dot
 
 SUFFICIENT_DECREASE = 1e-4
 HALVINGS = 24  # of a step before its direction is given up
+
+Observer = Callable[[np.ndarray], object]  # is called with positions (V, 3) [m]
 
 
 class Descent:
@@ -23,10 +25,19 @@ class Descent:
         x: (V, 3), the point kept last; value [J] and g (3n,) [N] belong to it.
         iterations, factorisations: counts. seconds: time by part.
         started: clock [s] at the beginning. All four go on from those of `after`, an earlier descent.
+
+    `observe` is called by `show` with a copy of x.
     """
 
-    def __init__(self, potential: Potential, x: np.ndarray, after: Descent | None = None) -> None:
-        self.potential = potential
+    def __init__(
+        self,
+        potential: Potential,
+        x: np.ndarray,
+        *,
+        after: Descent | None = None,
+        observe: Observer | None = None,
+    ) -> None:
+        self.potential, self.observe = potential, observe
         self.x = np.array(x, dtype=np.float64, order="C")
         self.free = potential.cloth.free
         self.weight = mean_weight(potential)
@@ -42,10 +53,15 @@ class Descent:
         """Whether value and gradient are numbers."""
         return bool(np.isfinite(self.value) and np.isfinite(self.g).all())
 
+    def show(self) -> None:
+        """Let the observer see the point kept last."""
+        if self.observe is not None:
+            self.observe(self.x.copy())
+
     def evaluate(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Value [J] and gradient over the free vertices, flat (3n,) [N], at x (V, 3)."""
         start = time.perf_counter()
-        with np.errstate(all="ignore"):  # a hopeless trial point is judged by its value, not by a warning
+        with np.errstate(all="ignore"):  # a trial point far off is refused by its value, not by a warning
             value, gradient = self.potential.value_and_gradient(x)
         self.seconds["evaluate"] += time.perf_counter() - start
         return value, gradient[self.free].ravel()
@@ -69,26 +85,27 @@ class Descent:
             value, gradient = self.evaluate(trial)
             if np.isfinite(value) and np.isfinite(gradient).all():
                 gain, end = alpha * slope, alpha * dot(gradient, p)
-                if fallen(self.value, value, gain) or level(self.value, value, gain, end):
+                enough = sufficient_decrease(self.value, value, gain)
+                if enough or approximate_wolfe(self.value, value, gain, end):
                     self.x, self.value, self.g = trial, value, gradient
                     return alpha
             alpha *= 0.5
         return 0.0
 
-    def secant_step(self, secants: Secants, solve: Callable[[np.ndarray], np.ndarray]) -> bool:
-        """One quasi-Newton step, remembered; a direction that fails is tried again without memories."""
+    def quasi_newton_step(self, history: LBFGSHistory, solve: Callable[[np.ndarray], np.ndarray]) -> bool:
+        """One step of L-BFGS, added to the history; a direction that fails is tried again without history."""
         while True:
-            p, g = secants.direction(self.g, solve), self.g
+            p, g = history.direction(self.g, solve), self.g
             slope = dot(g, p)
             if np.isfinite(slope) and slope < 0 and (alpha := self.line_search(p, slope)):
-                secants.add(alpha * p, self.g - g)
+                history.add(alpha * p, self.g - g)
                 return True
-            if not secants:
+            if not history:
                 return False
-            secants.clear()
+            history.clear()
 
     def gradient_norm(self) -> float:
-        """Largest component of the gradient, in mean vertex weights."""
+        """Relative residual [1]; see `Result.gradient_norm`."""
         return float(np.abs(self.g).max(initial=0.0)) / self.weight
 
     def late(self, timeout: float) -> bool:
@@ -110,16 +127,16 @@ class Descent:
 
 
 def mean_weight(potential: Potential) -> float:
-    """Mean weight of a vertex of the potential's cloth [N], the unit of gradients here."""
+    """Mean weight of a vertex of the potential's cloth [N]; a gradient over it is a relative residual."""
     return float(potential.cloth.masses.mean() * GRAVITY)
 
 
-def fallen(before: float, after: float, slope: float) -> bool:
+def sufficient_decrease(before: float, after: float, slope: float) -> bool:
     """Whether the energy fell enough on a step whose linear prediction is `slope` (Armijo)."""
     return after <= before + SUFFICIENT_DECREASE * slope
 
 
-def level(before: float, after: float, slope: float, end_slope: float) -> bool:
+def approximate_wolfe(before: float, after: float, slope: float, end_slope: float) -> bool:
     """Whether, within round-off of the energy, the slopes at both ends say that it fell.
 
     Hager and Zhang 2005, approximate Wolfe conditions.

@@ -4,24 +4,23 @@ The first guess of the inverse Hessian is the inverse of an n x n matrix that x,
 dt^2, (mu + lambda/2) times the cotangent Laplacian, and the curvature of the contacts (Liu, Bouaziz and
 Kavan 2017). It is factorised once per minimisation and costs three triangular solves an iteration, so the
 first hundredth of the gap comes several times sooner than with Newton; the last digits do not. So Newton
-takes over where the gradient is SWITCH vertex weights, and its factorisations serve several steps each.
+takes over where the relative residual is SWITCH, and its factorisations serve several steps each.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
 import numpy as np
 
 from ..linear_solver import analyse
 from ..potential import Potential
-from .descent import Descent
+from .descent import Descent, Observer
+from .lbfgs_history import LBFGSHistory
 from .newton import FIRST_SHIFT, Newton
 from .result import Result
-from .secants import Secants
 
-SWITCH = 1.0  # [vertex weights]
+SWITCH = 1.0  # relative residual
 
 
 class LBFGS:
@@ -31,7 +30,7 @@ class LBFGS:
         tolerance: as in Newton.
         max_iterations: iterations, of Newton's too, before giving up with status max_iterations.
         memory: number of remembered steps; 0 is preconditioned gradient descent.
-        switch: gradient norm, in mean vertex weights, at which Newton takes over.
+        switch: relative residual at which Newton takes over.
         patience: iterations after which it takes over in any case.
         finish: whether Newton takes over at all. Without it the result can only be "max_iterations",
             "stalled" or "timeout": nothing but a factorised Hessian can say "converged".
@@ -53,7 +52,7 @@ class LBFGS:
         patience: int = 100,
         finish: bool = True,
         timeout: float = float("inf"),
-        observe: Callable[[np.ndarray], object] | None = None,
+        observe: Observer | None = None,
     ) -> None:
         cloth = potential.cloth
         self.potential, self.memory, self.timeout = potential, memory, timeout
@@ -86,9 +85,9 @@ class _Run(Descent):
     """State of one minimisation by L-BFGS."""
 
     def __init__(self, owner: LBFGS, x: np.ndarray) -> None:
-        super().__init__(owner.potential, x)
+        super().__init__(owner.potential, x, observe=owner.observe)
         self.o = owner
-        self.secants = Secants(owner.memory)
+        self.history = LBFGSHistory(owner.memory)
 
     def to_the_end(self) -> tuple[str, str]:
         if not self.finite:
@@ -101,15 +100,11 @@ class _Run(Descent):
                 return "max_iterations", f"gave up after {self.iterations} iterations"
             if self.late(self.o.timeout):
                 return "timeout", f"gave up after {self.o.timeout:g} s"
-            if not self.secant_step(self.secants, self.solve):
+            if not self.quasi_newton_step(self.history, self.solve):
                 return "stalled", "no step along the quasi-Newton direction lowers the energy"
             self.iterations += 1
             self.show()
         return "max_iterations", "gradient within tolerance; curvature not checked"
-
-    def show(self) -> None:
-        if self.o.observe is not None:
-            self.o.observe(self.x.copy())
 
     def precondition(self) -> bool:
         start = time.perf_counter()

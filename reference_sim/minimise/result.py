@@ -1,4 +1,4 @@
-"""What a minimiser says: where it got to, and the truth about how far that is."""
+"""What a minimiser returns: where it got to, and how far that is from a minimum."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ class Result:
             negligible, and no negative curvature left.
         reason: one line in words.
         iterations, factorisations: counts.
-        gradient_norm: largest component over free vertices, in mean vertex weights [1].
+        gradient_norm: the relative residual [1], by which every minimisation here is stopped: the largest
+            component of dPhi/dx over the free vertices, divided by the mean weight of a vertex.
         energy: value at positions [J].
         terms: energy of each term [J].
         seconds: time by part: assemble, factorise, solve, evaluate.

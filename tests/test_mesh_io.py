@@ -11,7 +11,7 @@ from meshes import grid, sphere
 
 from reference_sim import Trajectory
 from reference_sim.cloth import MeshError
-from reference_sim.exchange import read_mesh, read_sequence, to_metres_y_up
+from reference_sim.mesh_io import read_mesh, read_sequence, to_metres_y_up
 from reference_sim.point_cache import write_point_cache
 from reference_sim.trajectory import TrajectoryError
 

@@ -1,4 +1,4 @@
-"""What a piece of work depends on is found from the source: no more, so that it is kept; no less."""
+"""What a task depends on is found from the source: no more, so that it is kept; no less."""
 
 from __future__ import annotations
 
@@ -7,30 +7,30 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks import fingerprint
-from benchmarks.fingerprint import code_of, digest, preset_values
-from benchmarks.presets import find_preset
+from benchmarks import source
+from benchmarks.methods import METHODS
+from benchmarks.metrics import MODULES
+from benchmarks.scenes import SCENES
+from benchmarks.source import code_of, data_of, digest, packages_of
 
 FILES = {
     "reference_sim/__init__.py": "from .cloth import Cloth\n",
     "reference_sim/cloth.py": "class Cloth:\n    pass\n",
     "reference_sim/stretch.py": "K = 1.0\n",
     "reference_sim/bend.py": "K = 2.0\n",
-    "reference_sim/terms/__init__.py": "HOME = {'Stretch': 'stretch', 'Bend': 'bend'}\n",
+    "reference_sim/terms/__init__.py": "def __getattr__(name):\n    return load(name)\n",
     "reference_sim/terms/stretch.py": "class Stretch:\n    pass\n",
     "reference_sim/terms/bend.py": "class Bend:\n    pass\n",
-    "snug/network.py": "import torch\n",
+    "snug/network.py": "import torch\nfrom reference_sim.terms import Unknown\n",
+    "snug/data/body.npz": "weights",
     "benchmarks/methods/__init__.py": "from . import one, other\n",
     "benchmarks/methods/one.py": (
         '"""Words."""\nfrom typing import TYPE_CHECKING\nfrom reference_sim import Cloth\n'
         "from ..scene import build\nif TYPE_CHECKING:\n    from snug.network import Network\n"
-        "def make(preset):\n    from reference_sim.terms import Stretch\n    return preset.frames\n"
+        "def make():\n    import numpy, nowhere\n    from reference_sim.terms import Stretch\n"
     ),
     "benchmarks/methods/other.py": "import snug.network\nfrom . import one\n",
-    "benchmarks/plan.py": "from .methods import other\n",
-    "benchmarks/scene.py": (
-        "from .plan import Cell\ndef build(sizes: Preset):\n    return sizes.sheet_cells\n"
-    ),
+    "benchmarks/scene.py": "import os\ndef build():\n    return 1\n",
 }
 
 
@@ -41,15 +41,18 @@ def project(tmp_path, monkeypatch):
     def write(path: str, text: str) -> None:
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / path).write_text(text)
-        for name in ("_source", "_names_of", "_file_of"):
-            getattr(fingerprint, name).cache_clear()
+        forget()
 
-    monkeypatch.setattr(fingerprint, "ROOT", tmp_path)
+    monkeypatch.setattr(source, "ROOT", tmp_path)
     for path, text in FILES.items():
         write(path, text)
     yield write
-    for name in ("_source", "_names_of", "_file_of"):
-        getattr(fingerprint, name).cache_clear()
+    forget()
+
+
+def forget() -> None:
+    for name in ("_source", "_bound", "_defined", "_file_of", "_closure", "_data_files"):
+        getattr(source, name).cache_clear()
 
 
 def test_the_code_is_what_is_imported_also_inside_functions_and_by_first_use(project):
@@ -86,10 +89,20 @@ def test_words_and_blanks_do_not_count(project):
     assert code_of("benchmarks.methods.one") == before
 
 
-def test_the_presets_values_are_those_that_are_read(project):
-    smoke = find_preset("smoke")
-    found = preset_values(smoke, code_of("benchmarks.methods.one"))
-    assert found == {"frames": smoke.frames, "sheet_cells": smoke.sheet_cells}
+def test_packages_are_those_that_the_code_imports_installed_or_not(project):
+    assert set(packages_of(code_of("benchmarks.methods.one"))) == {"numpy", "nowhere"}
+    found = packages_of(code_of("benchmarks.methods.other"))
+    assert found["nowhere"] == "absent" and found["numpy"].startswith("numpy ") and "torch" in found
+
+
+def test_a_name_that_nobody_defines_makes_all_of_its_package_count(project):
+    code = code_of("snug.network")
+    assert {"reference_sim/terms/stretch.py", "reference_sim/terms/bend.py"} < set(code)
+
+
+def test_what_lies_beside_the_source_counts_where_its_package_is_reached(project):
+    assert set(data_of(code_of("benchmarks.methods.other"))) == {"snug/data/body.npz"}
+    assert data_of(code_of("benchmarks.methods.one")) == {}
 
 
 def test_an_unknown_module_is_named():
@@ -112,13 +125,35 @@ def test_digests_tell_values_apart():
 
 
 def test_a_scene_without_obstacle_or_body_depends_on_neither():
-    code = code_of("benchmarks.cell", "benchmarks.scenes.hanging_sheet", "benchmarks.methods.simulation")
+    code = code_of(
+        "benchmarks.tasks.cell", "benchmarks.scenes.hanging_sheet", "benchmarks.methods.simulation"
+    )
     assert "reference_sim/energies/bend_hinge.py" in code and "reference_sim/minimise/newton.py" in code
     unused = ("snug/", "reports/", "reference_sim/energies/contact", "benchmarks/methods/__init__")
     assert [path for path in code if path.startswith(unused)] == []
 
 
 def test_training_does_not_hang_on_the_solver():
-    code = code_of("benchmarks.training")
+    code = code_of("benchmarks.tasks.training")
     assert "snug/loss.py" in code and "reference_sim/energies/bend_hinge.py" in code
     assert [path for path in code if path.startswith("reference_sim/minimise")] == []
+
+
+def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
+    """A line more in one of them makes nothing stale."""
+    lists = {f"benchmarks/{name}" for name in (
+        "scenes/__init__.py", "methods/__init__.py", "methods/solvers.py", "methods/learned.py", "presets.py",
+        "selection.py", "suites.py", "plan.py", "schedule.py", "validation/registry.py",
+    )}  # fmt: skip
+    modules = [f"benchmarks.tasks.{name}" for name in ("cell", "ground_truth", "training", "case")]
+    modules += [entry.module for entry in (*SCENES, *METHODS)]
+    modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets"]
+    modules += [f"benchmarks.metrics.{name}" for name in MODULES]
+    assert {name: found for name in modules if (found := lists & set(code_of(name)))} == {}
+
+
+def test_the_packages_that_move_a_number_are_known():
+    assert {"pymetis", "cvxopt", "scipy", "numba"} <= set(
+        packages_of(code_of("benchmarks.methods.simulation"))
+    )
+    assert "ipctk" in packages_of(code_of("reference_sim.energies.contact_barrier"))

@@ -1,4 +1,4 @@
-"""Triangle meshes of other programs: read one, read a sequence, bring both to metres with y up.
+"""Mesh files of other programs: read one, read a sequence, bring both to metres with y up.
 
 The files are meshio's formats (OBJ, PLY, STL, OFF, VTK) and trajectories of this project (VTKHDF).
 """
@@ -97,16 +97,20 @@ def _read_with_meshio(path: Path) -> tuple[Any, list[Any]]:
     import meshio
     import numpy as np
 
-    words = io.StringIO()
+    printed = io.StringIO()
     try:
-        # meshio prints its complaints and then leaves the interpreter; its STL reader overflows on purpose.
-        with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words), np.errstate(over="ignore"):
+        # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
+        with (
+            contextlib.redirect_stdout(printed),
+            contextlib.redirect_stderr(printed),
+            np.errstate(over="ignore"),
+        ):
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:
         if path.suffix.lower() in (".vtk", ".vtp") and (surface := _read_with_vtk(path)):
             return surface
-        complaint = words.getvalue().strip() if isinstance(error, SystemExit) else str(error)
-        reason = " ".join(complaint.split()) or type(error).__name__
+        message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
+        reason = " ".join(message.split()) or type(error).__name__
         raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY") from None
     kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
     return mesh.points, [polygon for block in kinds for polygon in block.data]
@@ -118,7 +122,7 @@ def _read_with_vtk(path: Path) -> tuple[Any, list[Any]] | None:
 
     try:
         surface = pyvista.read(path)
-    except Exception:  # whatever VTK finds wrong with it, meshio's complaint is the one to show
+    except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
     if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
         return None

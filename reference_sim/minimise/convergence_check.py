@@ -2,45 +2,45 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from .factorised import FactorisedDescent
+from .lbfgs_history import dot
 from .result import Result
-from .secants import dot
-
-if TYPE_CHECKING:
-    from .newton import Run
 
 POWER = 8  # inverse iterations for the direction of most negative curvature
 FIRST_ESCAPE = 100  # of the step tolerance: first length of the step along it
 LAST_SHIFT = 1e12  # in units of M/dt^2
 
 
-def verdict(run: Run, data: np.ndarray) -> Result | None:
+def convergence_check(
+    run: FactorisedDescent, data: np.ndarray, *, tolerance: float, step_tolerance: float
+) -> Result | None:
     """Converged, stuck on a saddle, or None: go on. The gradient of `run` is small; data: its true Hessian.
 
     What is left to ask is whether that is positive definite (up to round-off, so that rigid motions of an
-    unpinned cloth do not count) and its step negligible.
+    unpinned cloth do not count) and its step below step_tolerance [m].
     """
-    tiny = run.tiny(data)
-    within = "tolerance" if run.gradient_norm() <= run.n.tolerance else "its round-off, above the tolerance"
-    if run.factorise(data, tiny):
+    within = "tolerance" if run.gradient_norm() <= tolerance else "its round-off, above the tolerance"
+    if run.factorise(data, run.hessian.tiny_shift(data)):
         step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
-        if step <= run.n.step_tolerance or run.gradient_norm() == 0.0:
+        if step <= step_tolerance or run.gradient_norm() == 0.0:
             return run.result("converged", f"gradient within {within}, Newton step {step:.1e} m")
         if not run.factorise(data, 0.0):  # no step along such a direction can be told from another
             return run.result("converged", f"gradient within {within}, a direction without curvature")
         return None
-    if escape_saddle(run, data):
+    if escape_saddle(run, data, FIRST_ESCAPE * step_tolerance):
         run.iterations += 1
         run.show()
         return None
     return run.result("stalled", "a saddle: negative curvature, and no step along it lowers the energy")
 
 
-def escape_saddle(run: Run, data: np.ndarray) -> bool:
-    """Step along the most negative curvature direction, found by inverse iteration."""
+def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bool:
+    """Step along the most negative curvature direction, found by inverse iteration.
+
+    length: of the first step tried [m].
+    """
     shift = 1.0
     while not run.factorise(data, shift):
         shift *= 4
@@ -48,10 +48,10 @@ def escape_saddle(run: Run, data: np.ndarray) -> bool:
             return False
     v = np.random.default_rng(0).standard_normal(len(run.g))
     for _ in range(POWER):
-        v = run.solve(run.n.metric * v)
+        v = run.solve(run.hessian.metric * v)
         v /= np.abs(v).max()
     v *= -1.0 if dot(v, run.g) > 0 else 1.0
-    step = run.spread(FIRST_ESCAPE * run.n.step_tolerance * v)
+    step = run.spread(length * v)
     scale = run.potential.largest_step(run.x, step)
     for _ in range(30):
         trial = run.x + scale * step

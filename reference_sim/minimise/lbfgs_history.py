@@ -1,4 +1,4 @@
-"""What past steps say about the curvature: the memory of L-BFGS."""
+"""The last steps and gradient changes, from which L-BFGS estimates the curvature."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def dot(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.einsum("i,i", a, b))
 
 
-class Secants:
+class LBFGSHistory:
     """The last `memory` pairs of a step s (3n,) [m] and the change y (3n,) [N] of the gradient along it."""
 
     def __init__(self, memory: int) -> None:

@@ -1,0 +1,113 @@
+"""`njit` whose compiled kernels on disk are never stale.
+
+numba keeps on disk what it compiled, and compiles a kernel anew when the kernel's own file has changed. It
+does not see a change in another file: in a kernel that is called, or in a constant that is imported. So each
+module's kernels are kept in a folder whose name holds a digest of the file and of both. Processes with the
+same sources find the same folder.
+
+The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR
+where that is set. No list of modules is kept: what counts for a kernel is what its module has imported.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core.caching import InTreeCacheLocator
+from numba.core.dispatcher import Dispatcher
+from numba.misc.appdirs import AppDirs
+
+KEPT = 4  # folders of one module, so that going back to another branch compiles nothing
+CONSTANTS = (bool, int, float, complex, str, tuple, np.generic)
+USED = ".used"  # file whose date says when a folder was last asked for
+
+_config: Any = numba.config
+_digests: dict[str, str] = {}  # of modules that hold kernels, by name
+_folders: dict[str, Path | None] = {}
+
+
+def njit(**options: Any) -> Callable[[Any], Any]:
+    """Decorator `numba.njit(**options)`, where cache=True means a cache that sees other files too.
+
+    What a kernel takes from another file is to be imported above the first kernel of its own file. Where no
+    folder can be written, every process compiles for itself.
+    """
+
+    def decorate(function: Any) -> Any:
+        module = function.__module__
+        if module not in _digests:
+            _digests[module] = _digest(function)
+            _folders[module] = _folder(function, _digests[module])
+        cached = {"cache": bool(options.get("cache")) and _folders[module] is not None}
+        with _locator_in_use():
+            return numba.njit(**(options | cached))(function)
+
+    return decorate
+
+
+class KernelLocator(InTreeCacheLocator):
+    """Tells numba where the compiled kernels of a function lie and whether they are still good."""
+
+    def __init__(self, function: Any, file: str) -> None:
+        super().__init__(function, file)
+        self._module = function.__module__
+
+    def get_cache_path(self) -> str:
+        return str(_folders[self._module])
+
+    def get_source_stamp(self) -> str:
+        return _digests[self._module]
+
+
+@contextlib.contextmanager
+def _locator_in_use() -> Iterator[None]:
+    """numba asks for a locator when it decorates; kernels of other packages keep their own."""
+    given = _config.CACHE_LOCATOR_CLASSES
+    _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
+    try:
+        yield
+    finally:
+        _config.CACHE_LOCATOR_CLASSES = given
+
+
+def _digest(function: Any) -> str:
+    """Of the file of a module's first kernel, and of the kernels and constants imported above it."""
+    digest = hashlib.blake2b(Path(function.__code__.co_filename).read_bytes(), digest_size=8)
+    for name, value in function.__globals__.items():
+        if isinstance(value, Dispatcher):
+            digest.update(_digests.get(value.py_func.__module__, "").encode())
+        elif isinstance(value, ModuleType):
+            digest.update(_digests.get(value.__name__, "").encode())
+        elif isinstance(value, CONSTANTS) and not name.startswith("__"):
+            digest.update(f"{name}={value!r};".encode())
+    return digest.hexdigest()
+
+
+def _folder(function: Any, digest: str) -> Path | None:
+    """The writable folder for a module's kernels of this digest; None if there can be none."""
+    beside = Path(function.__code__.co_filename).parent / "__pycache__"
+    given, of_user = _config.CACHE_DIR, AppDirs(appname="numba", appauthor=False).user_cache_dir
+    for base in [given] if given else [beside, of_user]:
+        folder = Path(base, f"{function.__module__}-{digest}")
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / USED).touch()
+            _remove_old(folder)
+            return folder
+    return None
+
+
+def _remove_old(folder: Path) -> None:
+    """Keep the KEPT folders of the same module that were used last; whoever misses one compiles again."""
+    others = folder.parent.glob(folder.name.rpartition("-")[0] + "-*/" + USED)
+    with contextlib.suppress(OSError):  # another process removes them at the same time
+        for used in sorted(others, key=lambda file: file.stat().st_mtime)[:-KEPT]:
+            shutil.rmtree(used.parent, ignore_errors=True)

@@ -1,0 +1,108 @@
+"""The Hessian of a potential as Newton's method needs it: assembled, shifted, factorised, solved with."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from ..linear_solver import analyse
+from ..potential import Potential
+from .descent import Descent, Observer, mean_weight
+
+
+class FactorisedHessian:
+    """The Hessian over the free vertices: one symbolic analysis serves every step.
+
+    Args:
+        tolerance: of the relative residual, below which curvature is compared.
+        reference_dt: time [s] in the shift M/dt^2 where the potential has no inertia of its own.
+
+    Attributes:
+        metric: (3n,) M/dt^2 [N/m], the unit of shifts.
+        flat: curvature [N/m] below which a direction gains less than the tolerance over the cloth's
+            width.
+        static: whether the potential has no inertia, so that rigid motions may have no curvature.
+    """
+
+    def __init__(self, potential: Potential, *, tolerance: float, reference_dt: float) -> None:
+        cloth = potential.cloth
+        self._pattern = potential.pattern(cloth.free)
+        self._analyse()
+        self.static = potential.time_step is None
+        self.metric = np.repeat(cloth.masses[cloth.free] / (potential.time_step or reference_dt) ** 2, 3)
+        self.flat = tolerance * mean_weight(potential) / float(np.sqrt(cloth.areas.sum()))
+
+    def _analyse(self) -> None:
+        pattern = self._pattern
+        self._solver = analyse(pattern.indptr, pattern.indices, pattern.order)
+
+    def assemble(self, x: np.ndarray, convexity: float) -> np.ndarray:
+        """Values (nnz,) at x (V, 3), with that share of the elements' negative curvature taken out.
+
+        Dynamic terms may need a wider pattern, analysed anew.
+        """
+        changing = self._pattern.changing(x, convexity)
+        pattern = self._pattern.covering(changing)
+        if pattern is not self._pattern:
+            self._pattern = pattern
+            self._analyse()
+        return pattern.assemble(x, changing, convexity=convexity)
+
+    def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
+        """Factorise the values plus shift M/dt^2; False if that is not positive definite."""
+        if np.any(shift):
+            data = data.copy()
+            data[self._pattern.diagonal] += shift * self.metric
+        return self._solver.factorise(data)
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solve with the last factorisation: b (3n,)."""
+        return self._solver.solve(b)
+
+    def stiffest(self, data: np.ndarray) -> float:
+        """Largest entry of the diagonal [N/m]."""
+        return float(np.abs(data[self._pattern.diagonal]).max(initial=0.0))
+
+    def tiny_shift(self, data: np.ndarray) -> np.ndarray:
+        """The shift (3n,) in units of M/dt^2 below which curvature counts as none."""
+        return max(self.flat, 1e-13 * self.stiffest(data)) / self.metric
+
+
+class FactorisedDescent(Descent):
+    """A descent that factorises a Hessian, counts that and takes its time."""
+
+    def __init__(
+        self,
+        potential: Potential,
+        x: np.ndarray,
+        hessian: FactorisedHessian,
+        *,
+        after: Descent | None = None,
+        observe: Observer | None = None,
+    ) -> None:
+        super().__init__(potential, x, after=after, observe=observe)
+        self.hessian = hessian
+
+    def assemble(self, convexity: float) -> np.ndarray:
+        """Values (nnz,) of the Hessian here."""
+        start = time.perf_counter()
+        with np.errstate(all="ignore"):
+            data = self.hessian.assemble(self.x, convexity)
+        self.seconds["assemble"] += time.perf_counter() - start
+        return data
+
+    def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
+        """As the Hessian's."""
+        start = time.perf_counter()
+        done = self.hessian.factorise(data, shift)
+        self.factorisations += 1
+        self.seconds["factorise"] += time.perf_counter() - start
+        return done
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """As the Hessian's."""
+        start = time.perf_counter()
+        x = self.hessian.solve(b)
+        self.seconds["solve"] += time.perf_counter() - start
+        return x

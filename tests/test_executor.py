@@ -1,0 +1,96 @@
+"""Processes of this machine: outcomes of all tasks, a failure as a value, progress whatever dies."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+
+from benchmarks import executor
+from benchmarks.executor import LocalExecutor
+from benchmarks.results import RunFolder
+from benchmarks.tasks.task import Outcome, Task
+
+
+class Bar:
+    total, n = 100, 0
+
+    def update(self, units=1):
+        self.n += units
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Add(Task):
+    kind = "sum"
+    stage = "adding"
+    terms: tuple = (1, 2)
+    how: str = ""
+
+    def warm_up(self) -> None:
+        if self.how == "cold":
+            raise MemoryError("no room to compile")
+
+    def run(self, context, needed):
+        if self.how == "die telling":
+            executor._context.tell.__self__._wlock.acquire()  # as in the midst of a report
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.how == "hang":
+            signal.pause()
+        context.tell(1)
+        context.memo.setdefault("done", []).append(self.name)
+        first, second = self.terms
+        return Outcome(result={"sum": first + second, "memo": list(context.memo["done"])})
+
+
+def add(name: str, **fields) -> Add:
+    return Add(name=name, label=name, inputs={}, modules=("benchmarks.results",), **fields)
+
+
+def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Bar]:
+    bar = Bar()
+    done = LocalExecutor(RunFolder(folder), None, workers).together([(batch, {}) for batch in batches], bar)
+    return {task.name: outcome for task, outcome in done}, bar
+
+
+def test_a_failure_is_a_value_and_the_others_go_on(tmp_path):
+    found, _ = together(tmp_path, [add("one")], [add("two", terms=(1, "x"))], [add("three", terms=(3, 4))])
+    assert found["one"].result["sum"] == 3 and found["three"].result["sum"] == 7
+    assert found["two"].failed and found["two"].reason.startswith("TypeError")
+    assert all(outcome.seconds > 0.0 for outcome in found.values())
+
+
+def test_a_process_that_was_killed_while_it_reported_keeps_no_other_waiting(tmp_path):
+    found, _ = together(tmp_path, [add("dies", how="die telling")], [add("tells", terms=(3, 4))])
+    assert found["dies"].status == "out-of-memory" and "SIGKILL" in found["dies"].reason
+    assert found["tells"].result["sum"] == 7
+
+
+def test_a_task_that_hangs_is_ended_at_its_deadline(tmp_path):
+    found, _ = together(tmp_path, [add("hangs", how="hang", deadline=0.5)], [add("after")])
+    assert found["hangs"].status == "timeout" and "0.5 s" in found["hangs"].reason
+    assert found["after"].result["sum"] == 3
+
+
+def test_what_cannot_be_made_ready_is_a_failure(tmp_path):
+    found, _ = together(tmp_path, [add("cold", how="cold")], [add("after")])
+    assert found["cold"].status == "out-of-memory" and "no room to compile" in found["cold"].reason
+    assert found["after"].result["sum"] == 3
+
+
+def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
+    batch = [add("one"), add("two"), add("bad", terms=(1, "x")), add("lost")]
+    found, _ = together(tmp_path, batch, [add("three")])
+    assert found["two"].result["memo"] == ["one", "two"] and found["three"].result["memo"] == ["three"]
+    assert found["bad"].failed and found["lost"].failed  # what raises takes the rest of its batch along
+
+
+def test_a_named_process_is_kept_until_it_is_released(tmp_path):
+    alone = LocalExecutor(RunFolder(tmp_path), None, 1)
+    try:
+        first, second = (add(name, process="own") for name in ("first", "second"))
+        assert alone.alone(first, {}).result["memo"] == ["first"]
+        assert alone.alone(second, {}).result["memo"] == ["first", "second"]
+        alone.release("own")
+        assert alone.alone(second, {}).result["memo"] == ["second"]
+    finally:
+        alone.close()
