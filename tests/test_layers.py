@@ -17,7 +17,7 @@ ALLOWED = {
     "reference_sim": ("reference_sim",),
     "snug": ("snug", "reference_sim"),
     "benchmarks": ("benchmarks", "snug", "reference_sim"),
-    "reports": ("reports", "benchmarks.results"),
+    "reports": ("reports", "benchmarks.results", "reference_sim.trajectory"),
 }
 # The referee's solvers are not for the contestants.
 FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate")}
@@ -134,6 +134,7 @@ def test_a_planted_import_is_found(path, source):
         ("snug/baselines/a.py", "from ..loss import f\nimport torch"),
         ("benchmarks/stages.py", "def f():\n    import torch\n    from reports.build import build_report"),
         ("reports/a.py", "from benchmarks.results import RunFolder\nfrom .tables import f"),
+        ("reports/a.py", "def f():\n    from reference_sim.trajectory import Trajectory"),
         ("benchmarks/metrics/geometry.py", "if TYPE_CHECKING:\n    from reference_sim import Obstacle"),
     ],
 )
