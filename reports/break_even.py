@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from benchmarks.results import Row
-from reports import palette
-from reports.canvas import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
-from reports.fronts import TIME, fastest, points_of, solvers
-from reports.numbers import duration, number
-from reports.summary import Measurements, dressed_scenes, speed_measurements, wardrobe, worn_scenes
-from reports.table import Cell, Column, Table
+from reports.data import Run
+from reports.means import mean_of, value_of
+from reports.numbers import number
+from reports.pareto import TIME, fastest, points_of, solvers
+from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
+from reports.styles import leading, style
+from reports.table import Cell, Column, Table, table
 
+NETWORK = "snug"  # the method whose accuracy a solver has to reach to be its rival
 ACCURACIES = (("gap/relative", "energy gap"), ("curvature/error", "curvature error"))
 MOST_FRAMES = 1e7
-FEW = 3  # networks whose crossings a caption has room for; of more it names SNUG's, and a table all
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a method costs [s]: before the first frame (data, making ready, training) and for each frame."""
+    """What a method costs [s]: before the first frame (data, setup, training) and for each frame."""
 
     method: str
     before: float
@@ -34,15 +36,15 @@ class Cost:
         return self.before + frames * self.frame
 
 
-def cost_of(measured: Measurements, method: str, scenes: Sequence[str]) -> Cost | None:
+def cost_of(frame: pd.DataFrame, method: str, scenes: Sequence[str]) -> Cost | None:
     """The cost of a method on the scenes given, or None where it was not timed there, or not in full."""
-    frame = measured.value(method, TIME, scenes)
-    if frame is None:
-        return None
-    costs = {what: measured.value(method, f"cost/{what}", scenes) for what in ("data", "setup", "train")}
-    if costs["train"] is not None and costs["data"] is None:
+    time = value_of(frame, method, TIME, scenes)
+    data, setup, train = (
+        value_of(frame, method, f"cost/{what}", scenes) for what in ("data", "setup", "train")
+    )
+    if time is None or (train is not None and data is None):
         return None  # what its simulations took is not known any more
-    return Cost(method, sum(cost or 0.0 for cost in costs.values()), frame / 1e3)
+    return Cost(method, (data or 0.0) + (setup or 0.0) + (train or 0.0), time / 1e3)
 
 
 def crossing(dear: Cost, cheap: Cost) -> float | None:
@@ -57,111 +59,89 @@ def frames_text(frames: float) -> str:
     return number(float(f"{frames:.1e}"), 6, trim=True)
 
 
-def rivals(measured: Measurements, scenes: Sequence[str], network: str = "snug") -> dict[str, str]:
+def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str], network: str = NETWORK) -> dict[str, str]:
     """Solvers a network competes with: method -> why, the converged one and the fastest as accurate as it."""
-    found = {palette.REFERENCE: "converged"} if palette.REFERENCE in measured.methods else {}
+    found = {run.reference: "converged"} if mean_of(frame, run.reference, TIME, scenes) else {}
     for metric, words in ACCURACIES:
-        points = points_of(measured, scenes, metric)
+        points = points_of(run, frame, scenes, metric)
         own = next((p for p in points if p.method == network), None)
-        best = fastest(solvers(points), own.error) if own else None
-        if best is not None and best.method != palette.REFERENCE:
+        best = fastest(solvers(run, points), own.error) if own else None
+        if best is not None and best.method != run.reference:
             found[best.method] = f"{found[best.method]} and {words}" if best.method in found else words
     return found
 
 
-def compared_scenes(measured: Measurements, network: str = "snug") -> list[str]:
-    """The scenes of any garment on which the network was timed beside a cut solver."""
-    return [
-        scene
-        for scene in worn_scenes(measured)
-        if measured.seeds(scene, network, TIME)
-        and any(palette.cut_of(m) and measured.seeds(scene, m, TIME) for m in measured.methods)
-    ]
+def compared_scenes(run: Run, frame: pd.DataFrame, network: str = NETWORK) -> dict[str, list[str]]:
+    """Garment -> the scenes in which the network was timed beside a truncated solver."""
+    timed = frame[frame["usable"] & (frame["metric"] == TIME) & (frame["garment"] != "")]
+    levels = {name for name, method in run.methods.items() if method.level is not None}
+    both = set(timed[timed["method"] == network]["scene"]) & set(timed[timed["method"].isin(levels)]["scene"])
+    return run.garments(timed[timed["scene"].isin(both)])
 
 
 def compared_costs(
-    measured: Measurements, scenes: Sequence[str], against: Iterable[str]
+    run: Run, frame: pd.DataFrame, scenes: Sequence[str], against: Iterable[str]
 ) -> tuple[list[Cost], list[Cost]]:
     """Costs of the networks that were trained, and of the solvers given, that were timed on the scenes."""
-    trained = [
-        m
-        for m in palette.leading(measured.methods)
-        if not palette.cut_of(m) and (measured.value(m, "cost/train", scenes) or 0.0) > 0.0
-    ]
-    found = ([cost_of(measured, m, scenes) for m in methods] for methods in (trained, against))
-    networks, solvers_ = ([cost for cost in costs if cost is not None] for costs in found)
-    return networks, solvers_
+    rows = frame[frame["scene"].isin(list(scenes))]
+    training = rows[rows["usable"] & (rows["metric"] == "cost/train") & (rows["value"] > 0.0)]["method"]
+    alone = [m for m in training if run.methods[m].role in ("network", "ablation", "baseline")]
+    found = ([cost_of(rows, m, scenes) for m in methods] for methods in (leading(run, alone), against))
+    networks, others = ([cost for cost in costs if cost is not None] for costs in found)
+    return networks, others
 
 
-def crossings(rows: Sequence[Row]) -> Table | None:
+def crossings(run: Run) -> list[Table]:
     """From how many frames on each trained network is cheaper than the solvers it competes with."""
-    measured = speed_measurements(rows)
+    frame = run.cells("speed")
     lines: list[tuple[Cell, ...]] = []
-    for garment, scenes in wardrobe(measured.only(compared_scenes(measured))).items():
-        networks, against = compared_costs(measured, scenes, rivals(measured, scenes))
-        for network in networks:
-            for rival in against:
-                frames = crossing(network, rival)
-                total = None if frames is None else network.total(frames)
-                rounded = None if frames is None else float(f"{frames:.1e}")
-                lines.append((garment, network.method, palette.label(rival.method), rounded, total))
-    if not lines:
-        return None
+    for garment, scenes in compared_scenes(run, frame).items():
+        why = rivals(run, frame, scenes)
+        for network, rival in itertools.product(*compared_costs(run, frame, scenes, why)):
+            frames = crossing(network, rival)
+            total = None if frames is None else network.total(frames)
+            rounded = None if frames is None else float(f"{frames:.1e}")
+            lines.append((garment, network.method, rival.method, why[rival.method], rounded, total))
     columns = (
-        Column("garment", "Garment"),
-        Column("method", "Network"),
-        Column("solver", "Overtakes"),
-        Column("crossing", "From frames on"),
+        Column("garment", "Garment", text=True),
+        Column("method", "Network", text=True, width="1fr"),
+        Column("solver", "Overtakes", text=True, width="1.3fr"),
+        Column("as_good", "As good by", text=True),
+        Column("crossing", "From frames on", digits=2, trim=True),
         Column("total_time", "Total time by then", "s"),
     )
-    return Table("crossings", columns, tuple(lines))
+    caption = (
+        "From how many frames on training pays, against the converged simulation and the fastest solvers "
+    )
+    caption += "as good as SNUG; a dash: never."
+    return table("crossings", columns, lines, caption, grouped_by=("garment",))
 
 
-def break_even(folder: Path, rows: Sequence[Row]) -> list[Picture]:
+def break_even(folder: Path, run: Run) -> list[Picture]:
     """One figure: total time of N frames for each trained network and for the solvers it competes with."""
-    measured = speed_measurements(rows)
-    scenes = dressed_scenes(measured.only(compared_scenes(measured)))
-    if not scenes:
-        return []
-    against = rivals(measured, scenes)
-    trained, rival_costs = compared_costs(measured, scenes, against)
-    costs = [*rival_costs, *trained]
+    frame = run.cells("speed")
+    scenes = next(iter(compared_scenes(run, frame).values()), [])
+    trained, others = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
+    costs = [*others, *trained]
     if not trained or len(costs) < 2:
         return []
     figure = new_figure(PAGE_WIDTH * 0.8, 3.1)
     axes = figure.subplots()
     frames = np.logspace(0, math.log10(MOST_FRAMES), 200)
     for cost in costs:
-        look = palette.style(cost.method)
+        look = style(run, cost.method)
         axes.plot(frames, [cost.total(n) for n in frames], color=look.colour, linestyle=look.line)
-    told = _mark_crossings(axes, trained, rival_costs)
+    for network, rival in itertools.product(trained, others):
+        met = crossing(network, rival)
+        if met is not None and 1.0 <= met <= MOST_FRAMES:
+            colour = style(run, network.method).colour
+            axes.plot(met, network.total(met), "o", color=colour, markersize=4.5)
     axes.set(xlabel="frames", ylabel="data, training and frames [s]")
     axes.set_xscale("log")
     log_axis(axes, "y")
     grid(axes)
-    legend_above(figure, palette.ordered(c.method for c in costs), lines=True)
-    caption = f"Total time against the number of frames ({', '.join(scenes)}). {told} "
-    caption += " ".join(
-        f"{palette.label(m)} is the fastest solver with at most SNUG's {why}."
-        for m, why in against.items()
-        if m != palette.REFERENCE
+    legend_above(figure, [style(run, method) for method in run.ordered(c.method for c in costs)], lines=True)
+    caption = (
+        f"Total time against the number of frames ({', '.join(scenes)}). Dots: where a training has paid."
     )
-    return [save(figure, folder, "break_even", caption=caption, section="speed", kind="break_even")]
-
-
-def _mark_crossings(axes, trained: Sequence[Cost], against: Sequence[Cost]) -> str:
-    """A dot at each crossing, and the sentence that names them."""
-    parts, crossed = [], False
-    for network in trained:
-        for rival in against:
-            frames = crossing(network, rival)
-            if frames is not None and 1.0 <= frames <= MOST_FRAMES:
-                total, crossed = network.total(frames), True
-                axes.plot(frames, total, "o", color=palette.style(network.method).colour, markersize=4.5)
-                if len(trained) > FEW and network.method != "snug":
-                    continue
-                names = f"{palette.label(network.method)} overtakes {palette.label(rival.method)}"
-                parts.append(f"{names} at {frames_text(frames)} frames ({duration(total)})")
-    if parts:
-        return "; ".join(parts) + "."
-    return "SNUG's training does not pay." if crossed else "No training pays within ten million frames."
+    return [save(figure, folder, "break_even", caption=caption, kind="break_even")]

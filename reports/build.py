@@ -13,138 +13,146 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.results import ResultsError, Row, RunFolder, replacing
+from benchmarks.results import ResultsError, RunFolder, replacing
 
 if TYPE_CHECKING:
-    from reports.canvas import Picture
-    from reports.render import Dressed
+    from reference_sim.trajectory import Trajectory
+    from reports.data import Run
+    from reports.plotting import Picture
 
 TEMPLATE = Path(__file__).parent / "report.typ"
 
 
-def build_report(run_dir: str | Path, *, opengl: bool = True) -> tuple[Path, list[str]]:
+def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     """Make everything; returns the path of the PDF and what could not be read, one sentence each.
 
-    Raises ResultsError when run.json or results.csv is absent or broken, before anything is written.
+    Raises ResultsError when run.json or results.csv is absent, broken or of an earlier version, before
+    anything is written.
     """
-    run = RunFolder(run_dir)
-    if not run.path.is_dir():
-        raise ResultsError(f"{run.path}: no such folder")
-    config, rows = run.read_config(), run.read_rows()
-    if not rows:
-        raise ResultsError(f"{run.rows_path}: holds no rows; nothing to report")
+    folder = RunFolder(run_dir)
+    run = read_run(folder)
     from reports.document import document
     from reports.tables import make_tables
 
-    tables = make_tables(rows)
-    for old in run.tables.glob("*.csv"):  # of other suites, asked for in this folder before
+    tables = make_tables(run)
+    for old in folder.tables.glob("*.csv"):  # of other suites, asked for in this folder before
         old.unlink()
     for table in tables.values():
-        table.write_csv(run.tables)
+        table.write_csv(folder.tables)
     problems: list[str] = []
-    pictures = draw(run, rows, problems, opengl=opengl)
-    typeset(run, document(config, rows, tables, pictures, problems), config)
-    return run.report_path, problems
+    pictures = draw(folder, run, problems)
+    typeset(folder, document(run, tables, pictures, problems))
+    return folder.report_path, problems
 
 
-def draw(run: RunFolder, rows: Sequence[Row], problems: list[str], *, opengl: bool) -> list[Picture]:
+def read_run(folder: RunFolder) -> Run:
+    """The rows of the folder and their declarations. Raises ResultsError."""
+    if not folder.path.is_dir():
+        raise ResultsError(f"{folder.path}: no such folder")
+    config, rows = folder.read_config(), folder.read_rows()
+    if not rows:
+        raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
+    from reports.data import run_data
+
+    return run_data(config, rows)
+
+
+def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
     """Every figure that the run holds something for."""
-    from reports import (
-        break_even,
-        figures,
-        hem,
-        profile,
-        render,
-        stability,
-        throughput,
-        training,
-        work_precision,
-    )
+    from reports import figures, stability, training
+    from reports.break_even import break_even
+    from reports.profile import performance_profile
+    from reports.work_precision import error_against_time
 
-    dressed = dressed_trajectories(run, rows, problems)
-    pictures = render.side_by_side(run.figures, dressed, opengl=opengl)
-    series = [figures.energy_series(run.figures, kept.scene, kept.series) for kept in dressed]
-    series += [hem.hem_curves(run.figures, kept.scene, kept.series, kept.body) for kept in dressed]
-    pictures += [picture for picture in series if picture is not None]
-    pictures += work_precision.error_against_time(run.figures, rows)
-    pictures += profile.performance_profile(run.figures, rows)
-    pictures += break_even.break_even(run.figures, rows)
-    pictures += throughput.throughput_bars(run.figures, rows)
-    pictures += training.training_curves(run.figures, run.models, problems)
-    pictures += figures.validation_dots(run.figures, rows)
-    pictures += stability.stability_maps(run.figures, rows)
-    pictures += figures.extremes_outcomes(run.figures, rows)
-    return pictures
+    pictures = draw_trajectories(folder, run, problems)
+    for make in (
+        error_against_time, performance_profile, break_even, figures.throughput,
+        stability.stability_maps, stability.outcomes,
+    ):  # fmt: skip
+        pictures += make(folder.figures, run)
+    return pictures + training.training_curves(folder.figures, run, folder.models, problems)
 
 
-def draw_axes(run: RunFolder, x: str, y: str, scenes: str | None) -> Path:
+def draw_trajectories(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
+    """What the trajectories on disk show of each scene on a moving body; a broken file becomes a problem."""
+    from reports.figures import energy_series
+    from reports.hem import hem_curves
+    from reports.render import side_by_side
+    from reports.styles import leading
+
+    pictures: list[Picture | None] = []
+    energies = run.worn[run.worn["metric"] == "energy/total"]
+    for scene, rows in energies.groupby("scene", sort=False):
+        seeds = rows.drop_duplicates("method").set_index("method")["seed"]
+        paths = {m: folder.trajectory_path(str(scene), m, int(seeds[m])) for m in leading(run, seeds.index)}
+        read = {method: read_trajectory(folder, path, problems) for method, path in paths.items()}
+        series = {method: trajectory for method, trajectory in read.items() if trajectory is not None}
+        if series:
+            body = read_trajectory(folder, folder.trajectory_path(str(scene), "body"), problems)
+            pictures.append(side_by_side(folder.figures, run, str(scene), series, body))
+            pictures.append(energy_series(folder.figures, run, str(scene), series))
+            pictures.append(hem_curves(folder.figures, run, str(scene), series, body))
+    return [picture for picture in pictures if picture is not None]
+
+
+def read_trajectory(folder: RunFolder, path: Path, problems: list[str]) -> Trajectory | None:
+    """A trajectory of the run, None where there is none; one that cannot be read is added to the problems."""
+    from reference_sim.trajectory import Trajectory, TrajectoryError
+
+    if not path.is_file():
+        return None
+    try:
+        trajectory = Trajectory.load(path)
+        if trajectory.frames:
+            return trajectory
+        problems.append(f"{path.relative_to(folder.path)}: holds no whole frame")
+    except (TrajectoryError, ValueError) as error:
+        problems.append(str(error).replace(f"{folder.path}/", ""))
+    return None
+
+
+def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Path:
     """Any metric against any other, into figures/. Raises ResultsError for a name that no row has."""
-    rows = run.read_rows()
-    for what, name, known in (
-        *(("metric", metric, {row.metric for row in rows}) for metric in (x, y)),
-        *(("scene", scene, {row.scene for row in rows}) for scene in (scenes.split(",") if scenes else ())),
-    ):
-        if name not in known:
-            raise ResultsError(f"{run.rows_path}: no row has the {what} '{name}'")
+    run = read_run(folder)
+    asked = scenes.split(",") if scenes else []
+    for what, names in (("metric", (x, y)), ("scene", asked)):
+        for name in names:
+            if name not in set(run.frame[what]):
+                raise ResultsError(f"{folder.rows_path}: no row has the {what} '{name}'")
     from reports.work_precision import metric_against_metric
 
-    asked = scenes.split(",") if scenes else most_shared(rows, x, y)
-    picture = metric_against_metric(run.figures, rows, x, y, asked)
+    asked = asked or most_shared(run, x, y)
+    picture = metric_against_metric(folder.figures, run, x, y, asked)
     if picture is None:
         where = ", ".join(asked) or "every scene"
-        raise ResultsError(f"{run.rows_path}: fewer than two methods have both {x} and {y} on {where}")
+        raise ResultsError(f"{folder.rows_path}: fewer than two methods have both {x} and {y} on {where}")
     return picture.path
 
 
-def most_shared(rows: Sequence[Row], x: str, y: str) -> list[str]:
+def most_shared(run: Run, x: str, y: str) -> list[str]:
     """The scenes in which most methods have both metrics, the same methods in each."""
-    having: dict[str, dict[str, set[str]]] = {x: {}, y: {}}
-    for row in rows:
-        if row.metric in having and row.value is not None:
-            having[row.metric].setdefault(row.scene, set()).add(row.method)
-    both = {scene: methods & having[y].get(scene, set()) for scene, methods in having[x].items()}
-    most = max(both.values(), key=len, default=set())
-    return sorted(scene for scene, methods in both.items() if methods and methods == most)
+    rows = run.frame[run.frame["usable"] & run.frame["metric"].isin((x, y))]
+    count = rows.groupby(["scene", "method"])["metric"].nunique()
+    both = count[count == len({x, y})].reset_index().groupby("scene")["method"].agg(frozenset)
+    most: frozenset[str] = max(both, key=len, default=frozenset())
+    return sorted(str(scene) for scene, methods in both.items() if methods == most)
 
 
-def dressed_trajectories(run: RunFolder, rows: Sequence[Row], problems: list[str]) -> list[Dressed]:
-    """The trajectories on disk of each dressed scene, and its body; a broken file becomes a problem."""
-    from reports.render import Dressed
-    from reports.summary import Measurements, suite_rows, worn_scenes
-    from reports.vtkhdf import MeshFileError, MeshSeries, read_series
-
-    def opened(path: Path) -> MeshSeries | None:
-        try:
-            return read_series(path) if path.is_file() else None
-        except MeshFileError as error:
-            problems.append(str(error).replace(f"{run.path}/", ""))
-            return None
-
-    measured = Measurements(suite_rows(rows, "garments"))
-    found = []
-    for scene in worn_scenes(measured):
-        seeds = {row.method: row.seed for row in reversed(rows) if row.scene == scene}
-        series = {m: opened(run.trajectory_path(scene, m, seeds[m])) for m in measured.methods if m in seeds}
-        kept = {method: mesh for method, mesh in series.items() if mesh is not None}
-        if kept:
-            found.append(Dressed(scene, kept, opened(run.trajectory_path(scene, "body"))))
-    return found
-
-
-def typeset(run: RunFolder, content: dict[str, Any], config: dict[str, Any]) -> None:
+def typeset(folder: RunFolder, content: dict[str, Any]) -> None:
     """report.pdf from the template, with fonts of the typesetter alone and the run's own date."""
     import typst
 
     from reports.configuration import moment
 
+    config = folder.read_config()
     finished = moment(config.get("finished")) or moment(config.get("started"))
     compiler = typst.Compiler(
         TEMPLATE.read_bytes(),
-        root=str(run.path),
+        root=str(folder.path),
         ignore_system_fonts=True,
         sys_inputs={"content": json.dumps(content, ensure_ascii=False, allow_nan=False)},
     )
-    with replacing(run.report_path) as temporary:
+    with replacing(folder.report_path) as temporary:
         stamp = int(finished.timestamp()) if finished else 0
         compiler.compile(output=str(temporary), format="pdf", timestamp=stamp)
 
@@ -158,7 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "names it), 2 when RUN_DIR is no run folder.",
     )
     parser.add_argument("run_dir", metavar="RUN_DIR", help="folder with run.json and results.csv")
-    parser.add_argument("--no-opengl", action="store_true", help="draw the frames without OpenGL")
+    parser.add_argument("--no-opengl", action="store_true", help="changes nothing: no picture needs OpenGL")
     parser.add_argument(
         "--axes",
         nargs=2,
@@ -177,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             x, y = options.axes
             print(draw_axes(RunFolder(options.run_dir), x, y, options.scenes))
             return 0
-        path, problems = build_report(options.run_dir, opengl=not options.no_opengl)
+        path, problems = build_report(options.run_dir)
     except ResultsError as error:
         print(f"reports.build: {error}", file=sys.stderr)
         return 2

@@ -2,73 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from benchmarks.results import Row
-from reports.numbers import duration, number
+import pandas as pd
 
-_FIRST = (
-    "command", "preset", "commit", "started", "finished", "suites", "scenes", "methods", "motions", "seeds",
-)  # fmt: skip
+from reports.numbers import DASH, duration, number
+
+# What the rows mean, not how they were made: the tables say it.
+DECLARED = ("format", "metrics", "scenes_declared", "cases")
+UNITS = {" gb": "GB", " mb": "MB", " seconds": "s"}  # endings of names
 
 
-def configuration(config: dict[str, Any], rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Groups {"title", "pairs": [[name, value], ...]}, all of run.json, whatever it holds."""
-    said = {name: config[name] for name in _FIRST if config.get(name) not in (None, [], "")}
-    run = [[_title(name), _text(value)] for name, value in said.items() if not isinstance(value, dict)]
-    wall = _wall_seconds(config)
-    run += [["Wall time", duration(wall)]] if wall is not None else []
-    for name in ("dtype", "threads", "hardware"):
-        values = sorted({str(getattr(row, name)) for row in rows if getattr(row, name) not in ("", None)})
-        if values and not (name == "hardware" and config.get("hardware")):
-            run.append([f"{_title(name)} of the rows", ", ".join(values)])
-    groups: list[dict[str, Any]] = [{"title": "Run", "pairs": run}]
+def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Groups {"title", "pairs": [[name, value], ...]} of run.json, whatever it holds, three floors deep.
+
+    Of the scenes and methods that are declared in full, the names alone.
+    """
+    run: dict[str, str] = {}
+    groups: dict[str, dict[str, str]] = {"Run": run}
     for name, value in config.items():
+        if name in DECLARED or value in (None, "", [], {}):
+            continue
         if name == "stages":
-            groups.append({"title": "Time of each stage", "pairs": _stages(value)})
-        elif isinstance(value, dict):
-            pairs = [[_title(key), _text(item)] for key, item in value.items()]
-            groups.append({"title": _title(name), "pairs": pairs})
-        elif name not in _FIRST and value not in (None, "", []):
-            run.append([_title(name), _text(value)])
-    return [group for group in groups if group["pairs"]]
-
-
-def _stages(stages: Any) -> list[list[str]]:
-    if not isinstance(stages, list):
-        return []
-    kept = [stage for stage in stages if isinstance(stage, dict)]
-    return [[str(stage.get("name", "?")), duration(stage.get("seconds"))] for stage in kept]
-
-
-def _flat(value: dict[str, Any], above: str = "") -> Iterable[tuple[str, str]]:
-    for name, item in value.items():
-        if isinstance(item, dict):
-            yield from _flat(item, f"{above}{name} ")
+            groups["Time of each stage"] = {s["name"]: duration(s["seconds"]) for s in value}
+        elif isinstance(value, dict) and name not in ("scenes", "methods"):
+            groups[_title(name)] = {_title(key): _text(item) for key, item in value.items()}
         else:
-            yield f"{above}{name}", _text(item)
+            run[_title(name)] = _text(list(value) if isinstance(value, dict) else value)
+    start, end = moment(config.get("started")), moment(config.get("finished"))
+    if start and end and (start.tzinfo is None) == (end.tzinfo is None):
+        run["Wall time"] = duration((end - start).total_seconds())
+    for name in ("dtype", "threads", "hardware"):
+        run[f"{_title(name)} of the rows"] = ", ".join(sorted(set(frame[name].astype(str)) - {""})) or DASH
+    return [
+        {"title": title, "pairs": [list(pair) for pair in pairs.items()]}
+        for title, pairs in groups.items()
+        if pairs
+    ]
 
 
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, int):
-        return str(value)
     if isinstance(value, float):
         return number(value, 4, trim=True)
     if isinstance(value, list | tuple):
-        return ", ".join(_text(item) for item in value) or "–"
+        return ", ".join(_text(item) for item in value) or DASH
     if isinstance(value, dict):
-        return ", ".join(f"{name} {text}" for name, text in _flat(value)) or "–"
-    return "–" if value is None else str(value)
+        plain = {name: item for name, item in value.items() if not isinstance(item, dict)}
+        return ", ".join(f"{name} {_text(item)}" for name, item in plain.items()) or DASH
+    return DASH if value is None else str(value)
 
 
 def _title(name: str) -> str:
     """From "memory_gb" to "Memory [GB]"."""
     words = name.replace("_", " ")
-    for ending, unit in ((" gb", "GB"), (" mb", "MB"), (" seconds", "s")):
+    for ending, unit in UNITS.items():
         if words.endswith(ending):
             words = f"{words.removesuffix(ending)} [{unit}]"
     return words[:1].upper() + words[1:]
@@ -80,10 +71,3 @@ def moment(text: Any) -> datetime | None:
         return datetime.fromisoformat(str(text))
     except ValueError:
         return None
-
-
-def _wall_seconds(config: dict[str, Any]) -> float | None:
-    start, end = moment(config.get("started")), moment(config.get("finished"))
-    if start is None or end is None or (start.tzinfo is None) != (end.tzinfo is None):
-        return None
-    return (end - start).total_seconds()

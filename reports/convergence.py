@@ -7,34 +7,31 @@ convergence.png there.
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
+import pandas as pd
 
 from benchmarks.results import ResultsError
-from reports import palette
-from reports.canvas import PAGE_WIDTH, Picture, grid, log_axis, new_figure, save
+from reports.plotting import PAGE_WIDTH, Picture, grid, log_axis, new_figure, save
+from reports.styles import KNOWN
 
 PAPER_SECONDS = 2 * 3600.0  # the paper's training: 4424 vertices, 6500 frames, a GPU
 CURVES = {"validation": ("rolled out on a held-out motion", "-"), "loss": ("windows of training", ":")}
 
 
-def read_curve(path: Path) -> dict[str, np.ndarray]:
+def read_curve(path: Path) -> pd.DataFrame:
     """Seconds of training, and for each name in CURVES joules a frame. Raises ResultsError."""
     try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.DictReader(stream))
-        columns = {name: np.array([float(row[name]) for row in rows]) for name in ("seconds", *CURVES)}
+        curve = pd.read_csv(path)[["seconds", *CURVES]].astype(float)
     except FileNotFoundError:
         raise ResultsError(f"{path}: no such file; run part convergence of training_speed first") from None
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, ValueError) as error:
         raise ResultsError(f"{path}: not a curve of training_speed ({error})") from None
-    if not rows:
-        raise ResultsError(f"{path}: holds no rows")
-    return columns
+    if curve.empty or curve.isna().any(axis=None):
+        raise ResultsError(f"{path}: holds no rows, or not all of their numbers")
+    return curve
 
 
 def convergence_curve(folder: Path) -> Picture:
@@ -43,21 +40,19 @@ def convergence_curve(folder: Path) -> Picture:
     figure = new_figure(PAGE_WIDTH * 0.7, 2.6)
     axes = figure.subplots()
     for name, (label, line) in CURVES.items():
-        colour = palette.style("snug").colour
+        colour = KNOWN["snug"].colour
         axes.plot(curve["seconds"], curve[name], color=colour, linestyle=line, label=label)
     axes.axvline(PAPER_SECONDS, color="#444444", linestyle="--", linewidth=0.9)
     axes.annotate("the paper's 2 h", (PAPER_SECONDS, 0.97), xycoords=axes.get_xaxis_transform(),
         xytext=(-4, 0), textcoords="offset points", ha="right", va="top", fontsize=8)  # fmt: skip
     axes.set(xlabel="time of training [s]", ylabel="energy [J per frame]")
-    seconds = curve["seconds"]
-    axes.set_xlim(0.8 * float(seconds[0]), 1.3 * max(PAPER_SECONDS, float(seconds[-1])))
+    first, last = curve["seconds"].iloc[[0, -1]]
+    axes.set_xlim(0.8 * first, 1.3 * max(PAPER_SECONDS, last))
     log_axis(axes, "x")
     grid(axes)
     axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     caption = "SNUG trained at the paper's size: energy of a frame against the time of training."
-    return save(
-        figure, folder, "convergence", caption=caption, section="garments", kind="training", vector=False
-    )
+    return save(figure, folder, "convergence", caption=caption, kind="training", vector=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -2,142 +2,123 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
-from reports import palette
-from reports.canvas import Picture
+from reports.data import Run
+from reports.means import Mean
 from reports.numbers import DASH, aligned, duration, number
-from reports.summary import Mean
-from reports.table import Cell, Table
+from reports.plotting import Picture
+from reports.table import Cell, Column, Table
 
 Block = dict[str, Any]
 LONG = 24  # rows from which a table may run over pages
-
-# Texts that need room get a share of the page's width; every other column is as wide as its content.
-WIDTHS = {
-    "reason": "2fr", "check": "1fr", "recipe": "1fr", "finding": "2fr", "case": "1fr", "scene": "1fr",
-    "worse": "1fr", "better": "1fr", "beaten": "1fr", "solver": "1.3fr", "hybrid": "1.3fr",
-}  # fmt: skip
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
-TEXTS = (
-    "method", "finding", "recipe", "scene", "suite", "check", "case", "outcome", "status", "reason", "unit",
-    "worse", "better", "bound", "measure", "beaten", "solver", "hybrid",
-)  # fmt: skip
-COSTS = ("data_generation", "training", "run_time", "memory")
+MOST = 8  # columns of numbers that fit on a page; a wider table goes on below
 REMARKS = {
-    "*": "* A mean over fewer scenes than in the other rows, for want of the rest.",
+    "*": "* A mean over fewer scenes or seeds than in the other rows, for want of the rest.",
     "†": "† The solver left some frames unconverged.",
 }
-_WORDS: dict[str, Callable[[str], str]] = {
-    "method": palette.label,
-    "outcome": lambda text: "converged" if text == "ok" else text,
-    "status": lambda text: "pass" if text == "ok" else text,
-}
-_DIGITS = {
-    "measured": 7, "expected": 7, "tolerance": 2, "gradient": 2, "apart": 2, "scatter": 2, "gain": 2,
-    "crossing": 2,
-}  # fmt: skip
-_NOISE = 1e-3  # what is measured below it is an error, of which two digits say enough
-_ZERO = {"lag": 5e-3}  # lags are looked for in hundredths of a frame: less is none
-_TIMES = ("data_generation", "training", "total_time")
+NOISE = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
+METHODS = (
+    "method",
+    "solver",
+    "lower",
+    "higher",
+)  # columns that hold names of methods, printed by their labels
 
 
-def table_block(
-    table: Table,
-    caption: str,
-    *,
-    references: Sequence[tuple[str, Sequence[str]]] = (),
-    note: str = "",
-    grouped_by: Sequence[str] = (),
-) -> Block:
-    """A table for the page.
+def table_blocks(run: Run, table: Table) -> Iterator[Block]:
+    """A table for the page, in parts where it has more columns than fit."""
+    texts = [column for column in table.columns if column.text]
+    numbers = [column for column in table.columns if not column.text]
+    parts = max(1, -(-len(numbers) // MOST))
+    each = max(1, -(-len(numbers) // parts))
+    for first in range(0, max(len(numbers), 1), each):
+        shown = {column.name for column in (*texts, *numbers[first : first + each])}
+        places = [place for place, column in enumerate(table.columns) if column.name in shown]
+        rows = [tuple(row[place] for place in places) for row in table.rows]
+        columns = tuple(table.columns[place] for place in places)
+        heads = len(texts)
+        rows = [row for row in rows if first == 0 or any(cell is not None for cell in row[heads:])]
+        caption = table.caption + (" (continued)" if first else "")
+        yield _block(run, replace(table, columns=columns, rows=tuple(rows), caption=caption))
 
-    `references` are rows of others' numbers as they print them, set apart below and never mixed in.
-    Columns in `grouped_by` become headings over the rows that share their values.
-    """
-    places = [place for place, column in enumerate(table.columns) if column.name not in grouped_by]
+
+def _block(run: Run, table: Table) -> Block:
+    heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
+    places = [place for place in range(len(table.columns)) if place not in heads]
     columns = [table.columns[place] for place in places]
-    lines = [[row[place] for place in places] for row in table.rows]
-    texts = [
-        _column_texts(column.name, [line[place] for line in lines], [r[1][place - 1] for r in references])
-        if place
-        else _column_texts(column.name, [line[0] for line in lines], [r[0] for r in references])
-        for place, column in enumerate(columns)
-    ]
-    cells = [list(line) for line in zip(*texts)]
+    references = [r for r in table.references if any(column.name in r[1] for column in columns)]
+    cells = []
+    for number_, (place, column) in enumerate(zip(places, columns)):
+        printed = [label if number_ == 0 else own.get(column.name, DASH) for label, own in references]
+        cells.append(_column_texts(run, column, [row[place] for row in table.rows], printed))
+    lines = [list(line) for line in zip(*cells)]
     groups: dict[str, list[list[dict[str, str]]]] = {}
-    heads = [place for place, column in enumerate(table.columns) if column.name in grouped_by]
-    for row, line in zip(table.rows, cells):
+    for row, line in zip(table.rows, lines):
         groups.setdefault(" · ".join(str(row[place]) for place in heads), []).append(line)
-    remarks = [note]
-    if any(cell["spread"] for line in cells for cell in line):
-        means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
-        seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
-        number_of = " or ".join(str(count) for count in seeds)
-        lone = " Without it: one seed, or nothing random." if any(m.spread is None for m in means) else ""
-        remarks.append(f"±: standard deviation over {number_of} seeds.{lone}")
-    marks = {mark for line in cells for cell in line for mark in cell["mark"]}
-    remarks += [REMARKS[mark] for mark in sorted(marks)]
     return {
         "kind": "table",
-        "caption": caption,
-        "note": " ".join(remark for remark in remarks if remark),
+        "caption": table.caption,
+        "note": _note(table, lines),
         "columns": [
-            {
-                "title": column.title,
-                "unit": column.unit,
-                "left": column.name in TEXTS,
-                "width": width,
-            }
-            for column, width in zip(columns, _widths([column.name for column in columns]))
+            {"title": column.title, "unit": column.unit, "left": column.text, "width": width}
+            for column, width in zip(columns, _widths(columns))
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
-        "references": cells[len(table.rows) :],
+        "references": lines[len(table.rows) :],
         "breakable": len(table.rows) > LONG,
     }
 
 
-def _widths(names: Sequence[str]) -> list[str]:
-    if any(name in WIDTHS for name in names):
-        return [WIDTHS.get(name, "auto") for name in names]
-    rest = "1fr" if len(names) <= FEW else "auto"
-    return ["1.4fr" if len(names) <= FEW else "1fr", *[rest] * (len(names) - 1)]
+def _note(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
+    """What the table says of itself, of its spreads and of the marks in it."""
+    remarks = [table.note] if table.note else []
+    if any(cell["spread"] for line in lines for cell in line):
+        means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
+        seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
+        lone = " Without it: one seed, or nothing random." if any(m.spread is None for m in means) else ""
+        remarks.append(f"±: standard deviation over {' or '.join(map(str, seeds))} seeds.{lone}")
+    marks = {mark for line in lines for cell in line for mark in cell["mark"]}
+    return " ".join([*remarks, *(REMARKS[mark] for mark in sorted(marks))])
 
 
-def _column_texts(name: str, cells: Sequence[Cell], references: Sequence[str]) -> list[dict[str, str]]:
-    """Text, spread over seeds and mark of an incomplete mean, for each cell of a column."""
-    texts = [*(_text(name, cell) for cell in cells), *references]
-    texts = texts if name in TEXTS else aligned(texts)
+def _widths(columns: Sequence[Column]) -> list[str]:
+    """Columns of numbers share the width evenly; beside columns of words they take what they need."""
+    if all(not column.text for column in columns[1:]):
+        return ["1.4fr" if len(columns) <= FEW else "2.4fr", *["1fr"] * (len(columns) - 1)]
+    return [column.width for column in columns]
+
+
+def _column_texts(
+    run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]
+) -> list[dict[str, str]]:
+    """Text, spread over seeds and marks for each cell of a column; `printed` are rows of others below."""
+    texts = [*(_text(run, column, cell) for cell in cells), *printed]
+    texts = texts if column.text else aligned(texts)
     found = []
-    for text, cell in zip(texts, [*cells, *[None] * len(references)]):
-        mean = cell if isinstance(cell, Mean) else None
-        spread = _spread(name, mean.spread) if mean and mean.spread else ""
-        # A cost is measured where it arises: a training has no scene, so none is missing from its mean.
-        mark = "*" if mean and not mean.complete and name not in COSTS else ""
-        mark += "†" if mean and mean.stalled else ""
+    for text, cell in zip(texts, [*cells, *[None] * len(printed)]):
+        spread, mark = "", ""
+        if isinstance(cell, Mean):
+            mark = ("" if cell.complete else "*") + ("†" if cell.stalled else "")
+            if cell.spread:
+                spread = f"± {duration(cell.spread) if column.unit == 's' else number(cell.spread, 1)}"
         found.append({"text": text, "spread": spread, "mark": mark})
     return found
 
 
-def _spread(name: str, spread: float) -> str:
-    return f"± {duration(spread) if name in _TIMES else number(spread, 1)}"
-
-
-def _text(name: str, cell: Cell) -> str:
+def _text(run: Run, column: Column, cell: Cell) -> str:
     value = cell.value if isinstance(cell, Mean) else cell
-    if isinstance(value, float) and abs(value) < _ZERO.get(name, 0.0):
-        value = 0.0
     if isinstance(value, str):
-        return _WORDS.get(name, str)(value) or DASH
-    if name in _TIMES:
-        return duration(value)
+        return (run.label(value) if column.name in METHODS else value) or DASH
     if isinstance(value, int):
         return str(value)
-    if name not in _DIGITS:
-        return number(value)
-    small = name == "measured" and value is not None and abs(value) < _NOISE
-    return number(value, 2 if small else _DIGITS[name], trim=True)
+    if column.unit == "s":
+        return duration(value)
+    small = column.digits > 3 and value is not None and abs(value) < NOISE
+    return number(value, 2 if small else column.digits, trim=column.trim)
 
 
 def figure_block(picture: Picture) -> Block:

@@ -7,33 +7,32 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import Row
-from reports import palette
-from reports.canvas import PAGE_WIDTH, Picture, grid, legend_above, new_figure, power_text, save
-from reports.fronts import Point, fastest, points_of
-from reports.summary import Measurements, speed_measurements, suite_rows
+from reports.data import Run
+from reports.pareto import PERTURBED, SMALLER_STEPS, Point, fastest, points_of
+from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, new_figure, power_text, save
+from reports.styles import family_style
 
 METRIC = "gap/relative"
 TARGETS = (1e-1, 1e-2, 1e-4)
 LONGEST = 1e3  # times the fastest: the right edge
 
 
-def performance_profile(folder: Path, rows: Sequence[Row]) -> list[Picture]:
+def performance_profile(folder: Path, run: Run) -> list[Picture]:
     """One figure (Dolan and More 2002): a panel for each error to be reached, a staircase per family.
 
     Scenes on which nobody reaches an error do not count for its panel.
     """
-    measured = speed_measurements(rows)
-    scenes = list(dict.fromkeys(row.scene for row in suite_rows(rows, "speed")))
-    reached = {target: times_to_reach(measured, scenes, target) for target in TARGETS}
+    scenes = list(dict.fromkeys(run.suite("speed")["scene"]))
+    reached = {target: times_to_reach(run, scenes, target) for target in TARGETS}
     panels = {target: times for target, times in reached.items() if len(times) > 1}
     if not panels:
         return []
+    looks = {method.family: family_style(run, method) for method in run.methods.values()}
     figure = new_figure(PAGE_WIDTH, 2.9)
     shown: set[str] = set()
     for axes, (target, times) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels.items()):
         for family, (ratios, shares) in staircases(times).items():
-            look = palette.family_style(family) if family not in measured.methods else palette.style(family)
+            look = looks[family]
             axes.step(ratios, shares, where="post", color=look.colour, linestyle=look.line, linewidth=1.2)
             axes.plot(ratios[0], shares[0], color=look.colour, marker=look.marker, markersize=4.5)
             shown.add(family)
@@ -42,24 +41,25 @@ def performance_profile(folder: Path, rows: Sequence[Row]) -> list[Picture]:
         axes.set_title(f"gap at most {power_text(target)}, {len(times)} scenes")
         grid(axes)
     figure.axes[0].set_ylabel("share of scenes")
-    legend_above(figure, palette.ordered(shown), lines=True)
-    caption = "Performance profile: the share of scenes on which a method, cut where it is fastest, reaches "
-    caption += "a relative energy gap within so many times the time of the fastest. A method that never gets "
-    caption += "there has no line; networks and what starts from a body run on dressed bodies alone."
-    return [save(figure, folder, "performance_profile", caption=caption, section="speed", kind="profile")]
+    families = dict.fromkeys(run.methods[name].family for name in run.ordered(run.methods))
+    legend_above(figure, [looks[family] for family in families if family in shown], lines=True)
+    caption = (
+        "Performance profile: the share of scenes on which a family reaches a relative energy gap within "
+    )
+    caption += "so many times the time of the fastest. A family that never gets there has no line."
+    return [save(figure, folder, "performance_profile", caption=caption, kind="profile")]
 
 
-def times_to_reach(
-    measured: Measurements, scenes: Sequence[str], target: float
-) -> dict[str, dict[str, float]]:
+def times_to_reach(run: Run, scenes: Sequence[str], target: float) -> dict[str, dict[str, float]]:
     """scene -> family -> time [ms per frame] of its fastest member with at most that gap."""
+    frame = run.cells("speed")
     found: dict[str, dict[str, float]] = {}
     for scene in scenes:
         families: dict[str, list[Point]] = {}
-        for point in points_of(measured, [scene], METRIC):
-            cut = palette.cut_of(point.method)
-            if point.method != palette.MOVED and (cut is None or cut.family != "simulation-dt"):
-                families.setdefault(cut.family if cut else point.method, []).append(point)
+        for point in points_of(run, frame, [scene], METRIC):
+            family = run.methods[point.method].family
+            if family not in (PERTURBED, SMALLER_STEPS):
+                families.setdefault(family, []).append(point)
         times = {name: best.time for name, points in families.items() if (best := fastest(points, target))}
         if times:
             found[scene] = times

@@ -1,223 +1,134 @@
 """Pictures of garments on the body, side by side for every method at the same frame.
 
-OpenGL is used through pyvista where it works. On a machine without a GL library the plotter does not
-raise but kills its process, so the views are made in a process of their own; when that one does not
-come back with all of them, a painter that needs matplotlib alone makes them instead.
+Drawn with matplotlib alone, triangles painted back to front: no OpenGL is needed, whose drivers kill the
+process where there is no display, and every machine gives the same bytes.
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-import tempfile
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports import palette
-from reports.canvas import PAGE_WIDTH, Picture, file_name, new_figure, save, wrapped
+from reports.data import Run
 from reports.numbers import number
-from reports.painter import paint
-from reports.vtkhdf import MeshSeries, read_series
+from reports.plotting import PAGE_WIDTH, Picture, file_name, new_figure, save, wrapped
+from reports.styles import leading, style
 
-SIZE = (420, 520)  # pixels of one view
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from reference_sim.trajectory import Trajectory
+
 BODY_COLOUR = "#D9CFC6"
 CLOTH_COLOUR = "#7FA8C9"
-GL_SECONDS = 20.0, 1.5  # to start pyvista, and for each view; some drivers hang rather than crash
+LIGHT = (0.35, 0.45, 0.82)  # towards the light, in the camera's axes: right, up, towards
+TALL = 1.24  # height of a view over its width
+LIFT = 0.03  # [m] that cloth is nearer in the order of painting: about a triangle, for it lies on the body
 LETTERS = 15  # of a view's title in an inch
 PER_ROW = 6  # of up to so many views; more share as few rows as there have to be evenly
-
-
-@dataclass(frozen=True)
-class View:
-    """One picture to take: files, frame, where the camera looks [m] and how much height it sees [m]."""
-
-    garment: str
-    body: str  # empty: no body
-    frame: int
-    centre: tuple[float, float, float]
-    height: float
-    image: str
+INERTIA = "energy/inertia"
 
 
 @dataclass(frozen=True)
 class Camera:
-    """An orthographic camera: unit axes of the picture and the middle of what it sees [m]."""
+    """An orthographic camera: the middle [m] and the height [m] of what it sees, from the front, a little to
+    the left and above; y is up and the body faces +z.
+    """
 
-    right: np.ndarray
-    up: np.ndarray
-    towards: np.ndarray  # from the scene to the camera
     centre: np.ndarray
     height: float
 
-
-def camera_of(view: View) -> Camera:
-    """From the front, a little to the left and above: y is up and the body faces +z."""
-    side, lift = np.radians(25.0), np.radians(8.0)
-    towards = np.array([np.sin(side) * np.cos(lift), np.sin(lift), np.cos(side) * np.cos(lift)])
-    right = np.array([np.cos(side), 0.0, -np.sin(side)])
-    return Camera(right, np.cross(towards, right), towards, np.array(view.centre), view.height)
-
-
-def render_views(views: Sequence[View], *, opengl: bool = True) -> str:
-    """Take all views; returns which renderer made them, "OpenGL" or "painter"."""
-    if opengl and _rendered_by_opengl(views):
-        return "OpenGL"
-    for view in views:
-        body = read_series(Path(view.body)) if view.body else None
-        garment = read_series(Path(view.garment))
-        meshes = [(garment.positions(view.frame), garment.faces, CLOTH_COLOUR, 0.03)]
-        if body:
-            meshes.append((body.positions(view.frame), body.faces, BODY_COLOUR, 0.0))
-        paint(meshes, camera_of(view), SIZE, Path(view.image))
-    return "painter"
+    def seen(self, positions: np.ndarray) -> np.ndarray:
+        """(V,3) [m] -> (V,3): right, up and towards the camera, from the middle of the picture [m]."""
+        side, lift = np.radians(25.0), np.radians(8.0)
+        towards = np.array([np.sin(side) * np.cos(lift), np.sin(lift), np.cos(side) * np.cos(lift)])
+        right = np.array([np.cos(side), 0.0, -np.sin(side)])
+        return (positions - self.centre) @ np.stack([right, np.cross(towards, right), towards], axis=1)
 
 
-def _rendered_by_opengl(views: Sequence[View]) -> bool:
-    """Whether a process of its own made every picture; a crash of it is an answer, not an error."""
-    with tempfile.TemporaryDirectory() as folder:
-        jobs = Path(folder) / "views.json"
-        jobs.write_text(json.dumps([asdict(view) for view in views]), encoding="utf-8")
-        command = [sys.executable, "-m", "reports.render", str(jobs)]
-        try:
-            limit = GL_SECONDS[0] + GL_SECONDS[1] * len(views)
-            ended = subprocess.run(command, capture_output=True, timeout=limit)
-        except (OSError, subprocess.TimeoutExpired):
-            return False
-    return ended.returncode == 0 and all(Path(view.image).is_file() for view in views)
+def camera_for(positions: np.ndarray) -> Camera:
+    """One that sees all of a garment, positions (V,3) [m], with some of its body."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    width = float(np.hypot(high[0] - low[0], high[2] - low[2]))
+    return Camera((low + high) / 2.0, 1.1 * max(float(high[1] - low[1]), width * TALL) + 0.1)
 
 
-def _opengl_views(jobs: Path) -> None:
-    """The body of that process: one plotter, one picture per view."""
-    import pyvista
+def paint(axes: Axes, meshes: list[tuple[np.ndarray, np.ndarray, str, float]], camera: Camera) -> None:
+    """Draw meshes (positions (V,3) [m], faces (F,3), colour, lift [m]), triangles in order of their depth."""
+    from matplotlib.collections import PolyCollection
 
-    for raw in json.loads(jobs.read_text(encoding="utf-8")):
-        view = View(**raw)
-        plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE), lighting="three lights")
-        plotter.background_color = pyvista.Color("white")
-        for name, colour in ((view.body, BODY_COLOUR), (view.garment, CLOTH_COLOUR)):
-            if name:
-                series = read_series(Path(name))
-                mesh = pyvista.PolyData.from_regular_faces(series.positions(view.frame), series.faces)
-                plotter.add_mesh(mesh, color=colour, smooth_shading=True, specular=0.1, ambient=0.15)
-        camera = camera_of(view)
-        plotter.camera.position = tuple(camera.centre + 5.0 * camera.towards)
-        plotter.camera.focal_point = tuple(camera.centre)
-        plotter.camera.up = tuple(camera.up)
-        plotter.camera.enable_parallel_projection()
-        plotter.camera.parallel_scale = camera.height / 2.0
-        plotter.reset_camera_clipping_range()
-        plotter.renderer.enable_anti_aliasing("ssaa")
-        plotter.screenshot(view.image)
-        plotter.close()
+    parts = [_shaded(camera.seen(x)[faces], colour, lift) for x, faces, colour, lift in meshes]
+    corners, depths, colours = (np.concatenate(part) for part in zip(*parts))
+    order = np.argsort(depths)
+    # One array, not a list: matplotlib then makes all outlines at once.
+    polygons: Any = corners[order]
+    painted = PolyCollection(polygons, facecolors=colours[order], edgecolors=colours[order], linewidths=0.2)
+    painted.set_in_layout(False)
+    axes.add_collection(painted)
+    half = camera.height / 2.0
+    axes.set(xlim=(-half / TALL, half / TALL), ylim=(-half, half), aspect="equal")
+    axes.set_axis_off()
 
 
-def chosen_frame(series: dict[str, MeshSeries]) -> int:
-    """The frame worth looking at: where the simulation's inertia term is largest, else the middle one.
+def _shaded(corners: np.ndarray, colour: str, lift: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles (F,3,3) in camera axes -> outlines (F,3,2), depths (F,), colours (F,3), lit on both sides."""
+    from matplotlib.colors import to_rgb
+
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
+    light = np.array(LIGHT) / np.linalg.norm(LIGHT)
+    brightness = 0.45 + 0.6 * np.clip(normals @ light, 0.0, 1.0)
+    shade = np.clip(brightness[:, None] * np.array(to_rgb(colour)), 0.0, 1.0)
+    return corners[:, :, :2], corners[:, :, 2].mean(axis=1) + lift, shade
+
+
+def chosen_frame(series: Mapping[str, Trajectory], reference: str) -> tuple[int, str]:
+    """The frame worth looking at, and why: where the simulation's inertia is largest, else the middle one.
 
     The first fifth is left out, in which a method may still be settling.
     """
     frames = min(mesh.frames for mesh in series.values())
-    reference = series.get(palette.REFERENCE)
-    inertia = reference.fields.get("energy/inertia") if reference else None
+    inertia = series[reference].frame_fields.get(INERTIA) if reference in series else None
     if inertia is None:
-        return frames // 2
+        return frames // 2, "the middle"
     first = frames // 5
-    return first + int(np.argmax(np.nan_to_num(inertia[first:frames])))
+    most = first + int(np.argmax(np.nan_to_num(inertia[first:frames])))
+    return most, "where the simulation's inertia term is largest"
 
 
-def look_at(mesh: MeshSeries, frame: int) -> tuple[tuple[float, float, float], float]:
-    """The middle of a garment and the height of a picture that holds it with some of its body."""
-    x = mesh.positions(frame)
-    low, high = x.min(axis=0), x.max(axis=0)
-    x_middle, y_middle, z_middle = (float(value) for value in (low + high) / 2.0)
-    width = float(np.hypot(high[0] - low[0], high[2] - low[2]))
-    return (x_middle, y_middle, z_middle), 1.1 * max(float(high[1] - low[1]), width * SIZE[1] / SIZE[0]) + 0.1
-
-
-@dataclass(frozen=True)
-class Dressed:
-    """What was kept of one scene: a trajectory per method and, where there is one, its body."""
-
-    scene: str
-    series: dict[str, MeshSeries]
-    body: MeshSeries | None
-
-
-def side_by_side(folder: Path, dressed: Sequence[Dressed], *, opengl: bool = True) -> list[Picture]:
-    """One picture per scene: a view per method, all at the same frame from the same place."""
-    if not dressed:
-        return []
-    parted = [_whole(scene) for scene in dressed]
-    with tempfile.TemporaryDirectory() as scratch:
-        planned = [_views_of(scene, Path(scratch) / str(place)) for place, (scene, _) in enumerate(parted)]
-        renderer = render_views([view for views in planned for view in views], opengl=opengl)
-        return [
-            _compose(folder, scene, views, ended, renderer) for (scene, ended), views in zip(parted, planned)
-        ]
-
-
-def _whole(dressed: Dressed) -> tuple[Dressed, list[str]]:
-    """The scene without the methods that ended early, and those."""
-    last = max(mesh.frames for mesh in dressed.series.values())
-    ended = [method for method, mesh in dressed.series.items() if mesh.frames < last]
-    whole = {method: mesh for method, mesh in dressed.series.items() if method not in ended}
-    return replace(dressed, series=whole), ended
-
-
-def _views_of(dressed: Dressed, scratch: Path) -> list[View]:
-    scratch.mkdir()
-    methods = palette.leading(dressed.series)
-    body = {"": dressed.body} if dressed.body else {}
-    frame = chosen_frame(dressed.series | body)
-    centre, height = look_at(dressed.series[methods[0]], frame)
-    skin = str(dressed.body.path) if dressed.body else ""
-    return [
-        View(str(dressed.series[method].path), skin, frame, centre, height, str(scratch / f"{place}.png"))
-        for place, method in enumerate(methods)
-    ]
-
-
-def _compose(
-    folder: Path, dressed: Dressed, views: Sequence[View], ended: Sequence[str], renderer: str
+def side_by_side(
+    folder: Path, run: Run, scene: str, series: Mapping[str, Trajectory], body: Trajectory | None
 ) -> Picture:
-    """The views of one scene in rows, each under its method's name in its method's colour."""
-    from matplotlib.image import imread
-
-    lines = -(-len(views) // PER_ROW)
-    columns = -(-len(views) // lines)
+    """One picture of a scene: a view per method, all at the same frame from the same place."""
+    last = max(mesh.frames for mesh in series.values())
+    ended = run.ordered(method for method, mesh in series.items() if mesh.frames < last)
+    methods = leading(run, series.keys() - set(ended))
+    whole = {method: series[method] for method in methods}
+    frame, why = chosen_frame(whole | ({"": body} if body else {}), run.reference)
+    camera = camera_for(whole[methods[0]].positions[frame])
+    behind = [(body.positions[frame], body.faces, BODY_COLOUR, 0.0)] if body else []
+    lines = -(-len(methods) // PER_ROW)
+    columns = -(-len(methods) // lines)
     width = min(PAGE_WIDTH, columns * 1.6)
-    methods = palette.leading(dressed.series)
-    titles = [wrapped(palette.label(method), round(LETTERS * width / columns)) for method in methods]
+    titles = [wrapped(run.label(method), round(LETTERS * width / columns)) for method in methods]
     room = 0.2 * max(title.count("\n") for title in titles) + 0.25
-    figure = new_figure(width, lines * (width / columns * SIZE[1] / SIZE[0] + room))
+    figure = new_figure(width, lines * (width / columns * TALL + room))
     panels = np.atleast_1d(figure.subplots(lines, columns)).ravel()
-    for axes in panels:
+    for axes in panels[len(methods) :]:
         axes.set_axis_off()
-    for axes, method, title, view in zip(panels, methods, titles, views):
-        axes.imshow(imread(view.image))
-        axes.set_title(title, color=palette.style(method).colour, fontsize=9)
-    frame = views[0].frame
-    time = float(next(iter(dressed.series.values())).times[frame])
-    caption = f"{dressed.scene}: frame {frame} (t = {number(time)} s), "
-    by_inertia = _by_inertia(dressed.series)
-    caption += "where the simulation's inertia term is largest." if by_inertia else "the middle."
+    for axes, method, title in zip(panels, methods, titles):
+        paint(
+            axes, [*behind, (whole[method].positions[frame], whole[method].faces, CLOTH_COLOUR, LIFT)], camera
+        )
+        axes.set_title(title, color=style(run, method).colour, fontsize=9)
+    caption = f"{scene}: frame {frame} (t = {number(float(whole[methods[0]].times[frame]))} s), {why}."
     if ended:
-        names = ", ".join(palette.label(method) for method in palette.ordered(ended))
+        names = ", ".join(map(run.label, ended))
         caption += f" Not shown, for they ended before their last frame: {names}."
-    if renderer == "painter":
-        caption += " Drawn without OpenGL, which did not start here."
-    name = f"frames_{file_name(dressed.scene)}"
-    return save(figure, folder, name, caption=caption, section="garments", kind="frames", vector=False)
-
-
-def _by_inertia(series: dict[str, MeshSeries]) -> bool:
-    reference = series.get(palette.REFERENCE)
-    return reference is not None and "energy/inertia" in reference.fields
-
-
-if __name__ == "__main__":
-    _opengl_views(Path(sys.argv[1]))
+    name = f"frames_{file_name(scene)}"
+    return save(figure, folder, name, caption=caption, kind="frames", vector=False)

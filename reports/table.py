@@ -5,64 +5,75 @@ It knows nothing of the page it is printed on: the CSV keeps nine digits, the PD
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import pandas as pd
+
 from benchmarks.results import replacing
+from reports.means import Mean
 from reports.numbers import CSV_DASH, csv_number
-from reports.summary import Mean
 
 Cell = float | int | str | Mean | None
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its name in the CSV, its title and unit in the PDF."""
+    """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
+
+    text: words, set from the left. width: "auto", or a share of the page's width as "1fr". digits: of its
+    numbers; trim: without zeros at their end.
+    """
 
     name: str
     title: str
     unit: str = ""
+    text: bool = False
+    width: str = "auto"
+    digits: int = 3
+    trim: bool = False
 
 
 @dataclass(frozen=True)
 class Table:
-    """Columns and rows; each row has one cell per column."""
+    """Columns and rows; each row has one cell per column.
+
+    grouped_by: columns that become headings in the PDF. references: label and texts by column of rows that
+    others printed; they are in no CSV.
+    """
 
     name: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
+    caption: str = ""
+    grouped_by: tuple[str, ...] = ()
+    references: tuple[tuple[str, dict[str, str]], ...] = ()
+    note: str = ""
 
     def write_csv(self, folder: Path) -> Path:
         """Write <folder>/<name>.csv, whole or not at all. A mean with seeds gets a column for its spread."""
         path = folder / f"{self.name}.csv"
-        spread = [any(isinstance(row[i], Mean) for row in self.rows) for i in range(len(self.columns))]
-        header = []
-        for column, is_mean in zip(self.columns, spread):
-            header.append(_csv_title(column))
-            header += [f"{column.name}_spread"] if is_mean else []
-        with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(header)
-            for row in self.rows:
-                line: list[str] = []
-                for cell, is_mean in zip(row, spread):
-                    line += _csv_cells(cell, is_mean)
-                writer.writerow(line)
+        texts: dict[str, list[str]] = {}
+        for column, cells in zip(self.columns, zip(*self.rows)):
+            title = f"{column.name} [{column.unit}]" if column.unit else column.name
+            texts[title] = [_csv_text(cell.value if isinstance(cell, Mean) else cell) for cell in cells]
+            if any(isinstance(cell, Mean) for cell in cells):
+                spreads = [cell.spread if isinstance(cell, Mean) else None for cell in cells]
+                texts[f"{column.name}_spread"] = [csv_number(spread) for spread in spreads]
+        with replacing(path) as temporary:
+            pd.DataFrame(texts).to_csv(temporary, index=False, lineterminator="\n")
         return path
 
 
-def _csv_title(column: Column) -> str:
-    return f"{column.name} [{column.unit}]" if column.unit else column.name
+def table(
+    name: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], caption: str = "", **more
+) -> list[Table]:
+    """The table in a list; an empty one where it has no rows."""
+    return [Table(name, tuple(columns), tuple(rows), caption, **more)] if rows else []
 
 
-def _csv_cells(cell: Cell, is_mean: bool) -> list[str]:
-    if isinstance(cell, Mean):
-        return [csv_number(cell.value), csv_number(cell.spread)]
+def _csv_text(cell: float | int | str | None) -> str:
     if isinstance(cell, str):
-        text = cell or CSV_DASH
-    elif isinstance(cell, int):
-        text = str(cell)
-    else:
-        text = csv_number(cell)
-    return [text, CSV_DASH] if is_mean else [text]
+        return cell or CSV_DASH
+    return str(cell) if isinstance(cell, int) else csv_number(cell)

@@ -1,171 +1,236 @@
 """The tables of a run: which numbers stand in which row and column.
 
-Each maker takes the rows of results.csv and gives a table, or None where the run holds nothing for it.
-What was not measured is None, and printed as a dash.
+A metric declares the table in which it is a column, so most tables make themselves: <table> has a row for
+each garment and method, <table>_by_scene one for each scene and method. What was not measured is None, and
+printed as a dash.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 
-from benchmarks.results import Row
-from reports import bars
+import numpy as np
+import pandas as pd
+
+from reports import paper
 from reports.ablations import ablations, ablations_judged
-from reports.answers import by_scene
 from reports.break_even import crossings
-from reports.findings import findings, recipes
-from reports.garment_tables import cost, curvature, dynamics, energies, energies_by_scene, geometry, shape
-from reports.stability import refusals
-from reports.study_tables import dependence, hard_aftermath, hard_motions, laws
-from reports.summary import Measurements, excess_energy, speed_measurements, suite_rows
-from reports.table import Cell, Column, Table
-from reports.throughput import throughput
+from reports.data import CELL, SUITES, Metric, Run
+from reports.means import means
+from reports.pareto import ERRORS, TIME
+from reports.table import Cell, Column, Table, table
+
+BY_SCENE = ("suite", "scene")  # what groups the lines of a table that is not averaged over scenes
+METHOD = Column("method", "Method", text=True, width="1fr")
+GARMENT, SCENE, SUITE = (Column(name, name.capitalize(), text=True) for name in ("garment", "scene", "suite"))
+REASON = Column("reason", "Reason", text=True, width="2fr")
 
 
-def speed(rows: Sequence[Row]) -> Table | None:
-    """Every point of the error-against-run-time plots."""
-    measured = speed_measurements(rows)
-    metrics = {
-        "cost/frame": Column("run_time", "Run time", "ms"),
-        "gap/relative": Column("gap", "Gap"),
-        "gradient/norm": Column("gradient", "Gradient", "weights"),
-        "curvature/error": Column("curvature_error", "Curvature", "1/m"),
-        "curvature/histogram": Column("histogram", "Histogram", "1/m"),
-        "distance/rms": Column("distance_rms", "Distance", "mm"),
-    }
-    lines: list[tuple[Cell, ...]] = []
-    for scene in dict.fromkeys(row.scene for row in suite_rows(rows, "speed")):
-        for method in measured.methods:
-            means = [measured.mean(method, metric, [scene]) for metric in metrics]
-            excess = excess_energy(measured, scene, method)
-            if means[0] is not None:
-                lines.append((scene, method, *means, excess))
-    if not lines:
-        return None
-    head = (Column("scene", "Scene"), Column("method", "Method"))
-    last = Column("excess_energy", "Excess", "J")
-    return Table("speed", (*head, *metrics.values(), last), tuple(lines))
+def metric_column(metric: Metric) -> Column:
+    return Column(metric.name, metric.title, "" if metric.unit == "1" else metric.unit)
 
 
-def validation(rows: Sequence[Row]) -> Table | None:
-    """Measured against expected, each with its tolerance."""
-    lines = [
-        (check_name(row), row.unit, row.value, row.expected, row.tolerance, _judgement(row))
-        for row in suite_rows(rows, "validation")
-        if row.metric.startswith("check") and row.status != "skipped"
-    ]
-    if not lines:
-        return None
-    columns = (
-        Column("check", "Check"),
-        Column("unit", "Unit"),
-        Column("measured", "Measured"),
-        Column("expected", "Expected"),
-        Column("tolerance", "Tolerance"),
-        Column("status", "Result"),
-    )
-    return Table("validation", columns, tuple(lines))
-
-
-def _judgement(row: Row) -> str:
-    """What a check says; a row without a tolerance is a number to know, not a test."""
-    return "reported" if row.status == "ok" and row.tolerance is None else row.status
-
-
-def check_name(row: Row) -> str:
-    """The scene, and what is measured on it where a scene has several checks."""
-    detail = row.metric.partition("/")[2]
-    return f"{row.scene}: {detail}" if detail else row.scene
-
-
-def extremes(rows: Sequence[Row]) -> Table | None:
-    """How each extreme case ended, with the gradient norm it ended at."""
-    lines = [
-        (row.scene, row.method, row.status, row.value, row.reason or "")
-        for row in suite_rows(rows, "extremes")
-        if row.metric == "outcome"
-    ]
-    if not lines:
-        return None
-    columns = (
-        Column("case", "Case"),
-        Column("method", "Method"),
-        Column("outcome", "Outcome"),
-        Column("gradient", "Largest gradient", "vertex weights"),
-        Column("reason", "In words"),
-    )
-    return Table("extremes", columns, tuple(lines))
-
-
-def unfinished(rows: Sequence[Row]) -> Table | None:
-    """Every cell that failed or was skipped, once per reason, whatever the number of its metrics."""
-    seen: dict[tuple[Cell, ...], int] = {}
-    for row in rows:
-        if row.status != "ok" and not (row.suite in ("validation", "extremes") and row.status != "skipped"):
-            line = (row.suite, row.scene, row.method, row.seed, row.status, row.reason or "no reason given")
-            seen[line] = seen.get(line, 0) + 1
-    if not seen:
-        return None
-    columns = (
-        Column("suite", "Suite"),
-        Column("scene", "Scene"),
-        Column("method", "Method"),
-        Column("seed", "Seed"),
-        Column("status", "Status"),
-        Column("reason", "Reason"),
-    )
-    return Table("unfinished", columns, tuple(seen))
-
-
-def metrics(rows: Sequence[Row]) -> Table | None:
-    """Everything measured, one line per suite, scene, method and metric: the file to plot from."""
-    lines: list[tuple[Cell, ...]] = []
-    for suite in dict.fromkeys(row.suite for row in rows):
-        own = Measurements(suite_rows(rows, suite))
-        for scene in own.scenes:
-            for method in own.methods:
-                for metric in own.metrics:
-                    mean = own.mean(method, metric, [scene])
-                    if mean is not None:
-                        lines.append((suite, scene, method, metric, own.units[metric], mean, mean.seeds))
-    if not lines:
-        return None
-    columns = tuple(
-        Column(name, name) for name in ("suite", "scene", "method", "metric", "unit", "value", "seeds")
-    )
-    return Table("metrics", columns, tuple(lines))
-
-
-MAKERS = (
-    energies,
-    energies_by_scene,
-    curvature,
-    geometry,
-    shape,
-    dynamics,
-    cost,
-    throughput,
-    findings,
-    ablations,
-    ablations_judged,
-    bars.table,
-    recipes,
-    by_scene,
-    crossings,
-    speed,
-    validation,
-    laws,
-    dependence,
-    extremes,
-    hard_motions,
-    hard_aftermath,
-    refusals,
-    unfinished,
-    metrics,
-)
-
-
-def make_tables(rows: Sequence[Row]) -> dict[str, Table]:
+def make_tables(run: Run) -> dict[str, Table]:
     """Every table the rows have something for, by name."""
-    made = (make(rows) for make in MAKERS)
-    return {table.name: table for table in made if table is not None}
+    names = list(dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table))
+    found = [made for name in names for made in (*by_garment(run, name), *by_scene(run, name))]
+    for make in (
+        paper.findings, ablations, ablations_judged, crossings, speed, validation, extremes, unfinished,
+        metrics,
+    ):  # fmt: skip
+        found += make(run)
+    return {made.name: made for made in found}
+
+
+def by_garment(run: Run, name: str) -> list[Table]:
+    """Means over the scenes of each garment in suite garments. Ablations beside their base stand apart."""
+    rows = run.worn[run.worn["table"] == name]
+    place = {garment: place for place, garment in enumerate(run.garments(rows))}
+    apart = {garment: run.standing_apart(own) for garment, own in rows.groupby("garment")}
+    columns, lines = _pivot(run, _with_failed(run.worn, rows), rows, ("garment", "method"))
+    lines = [line for line in lines if line[1] not in apart[line[0]]]
+    lines.sort(key=lambda line: place[line[0]])
+    title = name.replace("_", " ").capitalize()
+    return table(
+        name, (GARMENT, METHOD, *columns), lines, f"{title}: mean over the scenes of each garment.",
+        grouped_by=("garment",), references=tuple(paper.PRINTED.get(name, {}).items()),
+        note=paper.NOTES.get(name, ""),
+    )  # fmt: skip
+
+
+def by_scene(run: Run, name: str) -> list[Table]:
+    """The same scene by scene, in every suite. A cell of several suites stands in the first of them."""
+    order = {suite: place for place, suite in enumerate(SUITES)}
+    kept = run.frame[run.frame["case"] == ""]
+    kept = kept.sort_values("suite", key=lambda suites: suites.map(order), kind="stable")
+    kept = kept.drop_duplicates(CELL)
+    columns, lines = _pivot(run, kept, kept[kept["table"] == name], ("suite", "scene", "method"))
+    title = name.replace("_", " ").capitalize()
+    return table(
+        f"{name}_by_scene", (SUITE, SCENE, METHOD, *columns), lines, f"{title}, scene by scene.",
+        grouped_by=BY_SCENE,
+    )  # fmt: skip
+
+
+def _with_failed(frame: pd.DataFrame, rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows and those of cells that failed, whatever metric these would have given."""
+    return frame.loc[rows.index.union(frame.index[~frame["usable"]])]
+
+
+def _pivot(
+    run: Run, frame: pd.DataFrame, rows: pd.DataFrame, keys: tuple[str, ...], first: tuple[str, ...] = ()
+) -> tuple[list[Column], list[tuple]]:
+    """Columns of these rows' metrics, `first` before the rest; lines of keys and of means over the frame."""
+    usable = set(rows[rows["usable"]]["metric"])
+    chosen = [run.metrics[name] for name in dict.fromkeys((*first, *run.metrics)) if name in usable]
+    if not chosen:
+        return [], []
+    found = means(frame[frame["metric"].isin(usable) | ~frame["usable"]], *keys, "metric")
+    wide = found.unstack("metric", sort=False).astype(object)
+    wide = wide.where(wide.notna(), None)[[metric.name for metric in chosen]]
+    place = {method: place for place, method in enumerate(run.ordered(wide.index.get_level_values("method")))}
+    lines = sorted(
+        ((*key, *line) for key, line in zip(wide.index, wide.itertuples(index=False))),
+        key=lambda line: place[line[len(keys) - 1]],
+    )
+    if len(keys) > 1:  # back into the order of the outer keys, methods in theirs
+        outer = {key[:-1]: place for place, key in reversed(list(enumerate(wide.index)))}
+        lines.sort(key=lambda line: outer[line[: len(keys) - 1]])
+    return [metric_column(metric) for metric in chosen], lines
+
+
+def speed(run: Run) -> list[Table]:
+    """Every point of the plots of error against run time, in the scenes of suite speed."""
+    cells = run.cells("speed")
+    rows = cells[cells["scene"].isin(run.suite("speed")["scene"])]
+    own = [name for name, metric in run.metrics.items() if metric.table == "speed"]
+    names = dict.fromkeys((TIME, *ERRORS, *own))
+    columns, lines = _pivot(run, rows, rows[rows["metric"].isin(names)], ("scene", "method"), (TIME, *ERRORS))
+    timed = [place for place, column in enumerate(columns, 2) if column.name == TIME]
+    lines = [line for line in lines if timed and line[timed[0]] is not None]
+    caption = "Run time of a frame and errors, scene by scene: the points of the plots."
+    return table("speed", (SCENE, METHOD, *columns), lines, caption, grouped_by=("scene",))
+
+
+def validation(run: Run) -> list[Table]:
+    """Measured against expected, each with its tolerance; without one it is reported, not judged."""
+    lines = [
+        (
+            check_name(run, row),
+            row.unit,
+            row.value,
+            row.expected,
+            row.tolerance,
+            tolerances_away(row),
+            _result(row),
+        )
+        for row in checks(run).itertuples()
+    ]
+    columns = (
+        Column("check", "Check", text=True, width="1fr"),
+        Column("unit", "Unit", text=True),
+        Column("measured", "Measured", digits=7, trim=True),
+        Column("expected", "Expected", digits=7, trim=True),
+        Column("tolerance", "Tolerance", digits=2, trim=True),
+        Column("away", "Tolerances away", digits=2),
+        Column("status", "Result", text=True),
+    )
+    return table("validation", columns, lines, "Checks with a known answer.")
+
+
+def tolerances_away(row) -> float | None:
+    """|measured - expected| / tolerance; a number that must be exact is 0 or infinitely many away."""
+    distance = abs(row.value - row.expected)
+    if pd.isna(distance) or pd.isna(row.tolerance):
+        return None
+    if row.tolerance:
+        return distance / row.tolerance
+    return math.inf if distance else 0.0
+
+
+def checks(run: Run) -> pd.DataFrame:
+    """The cases of suite validation, and what any other suite judges by a tolerance."""
+    is_case, rows = run.frame["case"] != "", run.frame
+    asked = np.where(is_case, rows["suite"] == "validation", rows["tolerance"].notna())
+    return rows[asked & (rows["status"] != "skipped")]
+
+
+def check_name(run: Run, row) -> str:
+    """The case, or the scene and what is judged there."""
+    return row.case or f"{row.scene}: {run.metrics[row.metric].title}"
+
+
+def _result(row) -> str:
+    if row.status != "ok":
+        return row.status
+    return "reported" if pd.isna(row.tolerance) else "pass"
+
+
+def extremes(run: Run) -> list[Table]:
+    """How each stress test ended, with the gradient left; points of maps over options stand in a figure."""
+    rows = stress_tests(run)
+    lines = [(r.scene, r.method, "converged" if r.status == "ok" else r.status, r.value, r.reason)
+        for r in rows.itertuples()]  # fmt: skip
+    unit = rows["unit"].iloc[0] if len(rows) else ""
+    columns = (
+        Column("case", "Case", text=True, width="1fr"),
+        Column("method", "Method", text=True),
+        Column("outcome", "Outcome", text=True),
+        Column("gradient", "Largest gradient", unit, digits=2, trim=True),
+        Column("reason", "In words", text=True, width="2fr"),
+    )
+    return table("extremes", columns, lines, "Every stress test and how it ended.")
+
+
+def stress_tests(run: Run) -> pd.DataFrame:
+    """The rows of single cases of suite extremes."""
+    rows = run.suite("extremes")
+    return rows[(rows["case"] != "") & ~rows["case"].isin(map_points(run)) & (rows["status"] != "skipped")]
+
+
+def map_points(run: Run) -> dict[str, tuple[float, float]]:
+    """Case -> factor on the stiffness and time step [s], of the cases of stability maps.
+
+    A case with these two options alone is a point of a map.
+    """
+    cases = run.config.get("cases") or {}
+    options = {name: case.get("options") or {} for name, case in cases.items()}
+    return {
+        name: (float(own["stiffness"]), float(own["dt"]))
+        for name, own in options.items()
+        if own.keys() == {"stiffness", "dt"}
+    }
+
+
+def unfinished(run: Run) -> list[Table]:
+    """Every cell that failed or was skipped, once per reason, whatever the number of its metrics."""
+    judged_elsewhere = (run.frame["case"] != "") & (run.frame["status"] != "skipped")
+    rows = run.frame[(run.frame["status"] != "ok") & ~judged_elsewhere]
+    names = ["suite", "scene", "method", "seed", "status", "reason"]
+    lines = rows[names].drop_duplicates().itertuples(index=False)
+    columns = (SUITE, Column("scene", "Scene", text=True, width="1fr"), Column("method", "Method", text=True),
+        Column("seed", "Seed", text=True), Column("status", "Status", text=True), REASON)  # fmt: skip
+    cells = [(*line[:5], line[5] or "no reason given") for line in lines]
+    return table("unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each.")
+
+
+def metrics(run: Run) -> list[Table]:
+    """Everything measured, one line per suite, scene, method and metric: the file to plot from."""
+    found = means(run.frame[run.frame["method"] != ""], "suite", "scene", "method", "metric")
+    lines: list[tuple[Cell, ...]] = [
+        (*key[:4], run.metrics[key[3]].unit, mean, mean.seeds) for key, mean in found.items()
+    ]
+    names = ("suite", "scene", "method", "metric", "unit", "value", "seeds")
+    return table("metrics", [Column(name, name) for name in names], lines)
+
+
+def merged(made: Table, names: Iterable[str]) -> Table:
+    """Lines that differ in one of the columns alone, as one line with all that stands there."""
+    rows: Sequence[tuple[Cell, ...]] = made.rows
+    for place in [place for place, column in enumerate(made.columns) if column.name in set(names)]:
+        found: dict[tuple[Cell, ...], list[str]] = {}
+        for row in rows:
+            found.setdefault((*row[:place], *row[place + 1 :]), []).append(str(row[place]))
+        rows = [(*key[:place], ", ".join(words), *key[place:]) for key, words in found.items()]
+    return Table(made.name, made.columns, tuple(rows), made.caption)

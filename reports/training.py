@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from reports import palette
-from reports.canvas import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
+from reports.data import Run
+from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
+from reports.styles import leading, style
 
 LARGEST_HEADER = 64_000_000  # bytes; a longer one is a broken file
 PHYSICS = "physics loss [J per frame]"
+# A loss of another kind has a panel of its own, known by the terms of it that were logged.
+PANELS = {"vertices": "vertex loss [cm²]", "low": "vertex loss of two bands [cm]"}
 
 
 class ModelHeaderError(ValueError):
@@ -31,9 +32,7 @@ class History:
 
     @property
     def panel(self) -> str:
-        """What its loss is, by the terms of it that were logged: each kind has a panel of its own."""
-        terms = {"vertices": "vertex loss [cm²]", "low": "vertex loss of two bands [cm]"}
-        return next((title for term, title in terms.items() if term in self.rows[0]), PHYSICS)
+        return next((title for term, title in PANELS.items() if term in self.rows[0]), PHYSICS)
 
     def column(self, name: str) -> np.ndarray:
         return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
@@ -54,10 +53,11 @@ def read_history(path: Path) -> History | None:
     except (OSError, ValueError, AttributeError) as error:
         raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
     rows = data.get("history") or []
-    return History(re.sub(r"-seed\d+$", "", path.stem), rows) if len(rows) > 1 else None
+    method = path.stem.removesuffix(f"-seed{data.get('seed', 0)}")  # as the run names its files
+    return History(method, rows) if len(rows) > 1 else None
 
 
-def training_curves(folder: Path, models: Path, problems: list[str]) -> list[Picture]:
+def training_curves(folder: Path, run: Run, models: Path, problems: list[str]) -> list[Picture]:
     """Loss against training time: energies in one panel, distances of vertices in others."""
     histories = []
     for path in sorted(models.glob("[!.]*.safetensors")):  # no checkpoint of a training that was stopped
@@ -66,25 +66,22 @@ def training_curves(folder: Path, models: Path, problems: list[str]) -> list[Pic
         except ModelHeaderError as error:
             problems.append(str(error).replace(f"{models.parent}/", ""))
             continue
-        if history:
+        if history and history.method in run.methods:
             histories.append(history)
-    shown = palette.leading({history.method for history in histories})
+    shown = leading(run, {history.method for history in histories})
     histories = [history for history in histories if history.method in shown]
-    titles = sorted({history.panel for history in histories}, key=lambda title: (title != PHYSICS, title))
-    panels = [(title, [h for h in histories if h.panel == title]) for title in titles]
-    return [_draw(folder, panels)] if panels else []
-
-
-def _draw(folder: Path, panels: Sequence[tuple[str, list[History]]]) -> Picture:
-    figure = new_figure(PAGE_WIDTH if len(panels) > 1 else PAGE_WIDTH * 0.6, 2.2)
-    for axes, (title, histories) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels):
+    titles = [title for title in (PHYSICS, *PANELS.values()) if any(h.panel == title for h in histories)]
+    if not titles:
+        return []
+    figure = new_figure(PAGE_WIDTH * (1.0 if len(titles) > 1 else 0.6), 2.2)
+    for axes, title in zip(np.atleast_1d(figure.subplots(1, len(titles))), titles):
         for history in histories:
-            look = palette.style(history.method)
-            axes.plot(history.column("seconds"), history.column("loss"), color=look.colour, linewidth=1.1)
+            if history.panel == title:
+                colour = style(run, history.method).colour
+                axes.plot(history.column("seconds"), history.column("loss"), color=colour, linewidth=1.1)
         axes.set(xlabel="training time [s]", title=title)
         log_axis(axes, "y")
         grid(axes)
-    methods = palette.ordered(history.method for _, histories in panels for history in histories)
-    legend_above(figure, methods, lines=True)
+    legend_above(figure, [style(run, method) for method in shown], lines=True)
     caption = "Training loss against wall time; one curve per model and seed."
-    return save(figure, folder, "training", caption=caption, section="garments", kind="training")
+    return [save(figure, folder, "training", caption=caption, kind="curves")]

@@ -14,7 +14,7 @@ from dressing import swaying, tube_dress
 
 from reference_sim import Material
 from snug import tensor_file
-from snug.dresser import DressedBody
+from snug.dressed_body import DressedBody
 from snug.recipe import DEFAULT, DYNAMIC, PAPER, SANTESTEBAN2019, SUPERVISED, TAILORNET
 from snug.tensor_file import TensorFileError, read_tensors
 from snug.train import train
@@ -61,7 +61,7 @@ def asked_after(steps):
         ("snug", replace(DEFAULT, mixed=2.0)),
         ("snug", PAPER),
         ("pbns", PLAIN),
-        ("dynamic", replace(DYNAMIC, swing_components=6, rehearsal=3)),
+        ("dynamic", replace(DYNAMIC, pca_components=6, pretraining=3)),
         ("supervised", SUPERVISED),
         ("santesteban2019", SANTESTEBAN2019),
         ("tailornet", TAILORNET),

@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from benchmarks.methods.free_bound import ClipInertia, FreeBound
 from dressing import swaying, tube_dress
 
-from benchmarks.methods.free_bound import ClipInertia, FreeBound
 from benchmarks.metrics.energy import energy_series
 from benchmarks.scene import BuiltScene, Dressed
 from reference_sim import Obstacle

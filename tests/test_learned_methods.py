@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import pytest
 import torch
+from benchmarks.methods.networks import model_path
+from benchmarks.training import train_network
+from benchmarks.wardrobe import Wardrobe
 from dressing import swaying, tube_dress
 
 from benchmarks import training
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
-from benchmarks.methods.networks import model_path
 from benchmarks.plan import Network
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results import RunFolder
 from benchmarks.run import make_parser, make_plan
 from benchmarks.suites import garments
-from benchmarks.training import train_network
-from benchmarks.wardrobe import Wardrobe
 from snug.recipe import ABLATIONS, RECIPES, TERMS, TRAININGS
 from snug.trained_model import TrainedModel
 

@@ -8,8 +8,8 @@ import time
 
 import numpy as np
 import pytest
-
 from benchmarks.curves import CURVES, remarked
+
 from benchmarks.methods import METHODS
 from benchmarks.metrics.curvature import (
     CurvatureSeries,

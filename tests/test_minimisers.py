@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from benchmarks.methods.hybrids import FromElsewhere, Hybrid
+
 from benchmarks.metrics.optimality import first_guess
 from benchmarks.minimisers.block_descent import VertexBlockDescent
 from benchmarks.minimisers.elements import contacts, hinges, membrane, terms_of, weights

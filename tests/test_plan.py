@@ -101,7 +101,7 @@ def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
 
 
 def test_motions_are_divided_as_help_says(tmp_path):
-    from snug.motion import TEST, TRAIN
+    from snug.motion_library import TEST, TRAIN
 
     quick = find_preset("quick")
     library = choose_motions([], [], quick)

@@ -3,31 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from report_folder import FRAMES, row, sheet, write_mesh, write_model
+from report_folder import FRAMES, mesh, row, run_of, sheet, write_model
 
-from reference_sim import Trajectory
-from reports import figures, hem, palette, render, training, vtkhdf, work_precision
-from reports.fronts import Point
-
-
-def test_the_reader_knows_the_simulators_files(tmp_path):
-    positions = np.random.default_rng(0).normal(size=(3, 4, 3))
-    fields = {"energy/strain": np.array([0.0, 1.0, 2.0])}
-    faces = np.array([[0, 1, 2], [0, 2, 3]])
-    times = np.arange(3) / 30.0
-    Trajectory(positions, faces, times, np.zeros(3), frame_fields=fields).save(tmp_path / "t.vtkhdf")
-    series = vtkhdf.read_series(tmp_path / "t.vtkhdf")
-    assert np.array_equal(series.positions(1), positions[1]) and np.array_equal(series.faces, faces)
-    assert np.array_equal(series.positions(-1), positions[2]) and np.allclose(series.times, times)
-    assert np.array_equal(series.fields["energy/strain"], fields["energy/strain"])
+from reports import build, figures, hem, render, stability, styles, training, work_precision
+from reports.pareto import Point
 
 
 def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
-    from reports.canvas import new_figure
+    from reports.plotting import new_figure
 
     axes = new_figure(3, 3).subplots()
+    run = run_of([row(method=method) for method in ("snug", "newton-8")])
     points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
-    hollow = work_precision._draw_points(axes, points, 20.0, floor=0.0)
+    hollow = work_precision._draw_points(axes, run, points, 20.0, sensitivity=0.0)
     assert hollow == {"newton-8"}
     low, high = axes.get_ylim()
     shown = [
@@ -36,20 +24,30 @@ def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
     assert len(shown) >= 2 and all(low < y < high for y in shown[:2])
 
 
-def test_a_check_that_must_be_exact_is_on_an_edge():
-    exact = row("modes", "simulation", "check", 6.0, suite="validation", expected=6.0, tolerance=0.0)
-    off = row("modes", "simulation", "check", 7.0, suite="validation", expected=6.0, tolerance=0.0)
-    assert figures._tolerances_away(exact) == 0.0 and figures._tolerances_away(off) == float("inf")
-
-
 def test_methods_keep_their_order_and_their_look():
     names = ["zebra", "newton-8", "snug", "newton-2", "simulation", "newton-16", "skinning"]
-    known = ["simulation", "skinning", "snug", "newton-2", "newton-8", "newton-16", "zebra"]
-    assert palette.ordered(names) == known
-    assert palette.label("newton-1") == "Newton, 1 iteration"
-    assert palette.style("newton-2").colour == palette.style("newton-16").colour
-    colours = [palette.style(name).colour for name in palette._KNOWN]
+    run = run_of([row(method=name) for name in names])
+    known = ["simulation", "skinning", "snug", "zebra", "newton-2", "newton-8", "newton-16"]
+    assert run.ordered(names) == known
+    assert styles.style(run, "newton-2").label == "Newton, 2 iterations"
+    assert styles.style(run, "newton-2").colour == styles.style(run, "newton-16").colour
+    assert styles.style(run, "newton-2").line != styles.style(run, "newton-8").line
+    assert styles.style(run, "zebra") == styles.style(run_of([row(method="zebra")]), "zebra")
+    colours = [look.colour for look in styles.KNOWN.values() if look.colour]
     assert len(set(colours)) == len(colours)
+
+
+def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
+    run = run_of([row(method=m) for m in ("snug", "snug+lbfgs-4", "snug-no-inertia", "snug+cleanup")])
+    own, less, warm, cleaned = (
+        styles.style(run, m) for m in ("snug", "snug-no-inertia", "snug+lbfgs-4", "snug+cleanup")
+    )
+    assert warm.colour == cleaned.colour == own.colour != less.colour
+    assert less.marker == own.marker and warm.marker != own.marker
+    family = styles.family_style(run, run.methods["snug+lbfgs-4"])
+    assert (family.label, warm.label) == ("SNUG + L-BFGS", "SNUG + L-BFGS, 4 iterations")
+    alone = run_of([row(method="snug+cleanup")])  # what it starts from did not run
+    assert styles.style(alone, "snug+cleanup").label == "SNUG, cleaned up"
 
 
 def test_the_hem_is_drawn_where_it_swings(tmp_path):
@@ -57,18 +55,13 @@ def test_the_hem_is_drawn_where_it_swings(tmp_path):
         "hem/yaw": np.radians(np.linspace(0.0, 40.0, FRAMES)),
         "hem/from_end": np.linspace(0.1, 0.0, FRAMES),
     }
-    series = {}
-    for method in ("simulation", "snug"):
-        cloth, faces = sheet(0.1)
-        write_mesh(tmp_path / f"{method}.vtkhdf", cloth, faces, turn)
-        series[method] = vtkhdf.read_series(tmp_path / f"{method}.vtkhdf")
-    picture = hem.hem_curves(tmp_path, "tunic/twist", series)
+    run = run_of([row(method=method) for method in ("simulation", "snug")])
+    cloth, faces = sheet(0.1)
+    series = {method: mesh(cloth, faces, turn) for method in run.methods}
+    picture = hem.hem_curves(tmp_path, run, "tunic/twist", series)
     assert picture is not None and picture.path.is_file()
-    write_mesh(tmp_path / "still.vtkhdf", cloth, faces, {name: 0.01 * curve for name, curve in turn.items()})
-    assert (
-        hem.hem_curves(tmp_path, "tunic/still", {"snug": vtkhdf.read_series(tmp_path / "still.vtkhdf")})
-        is None
-    )
+    still = mesh(cloth, faces, {name: 0.01 * curve for name, curve in turn.items()})
+    assert hem.hem_curves(tmp_path, run, "tunic/still", {"snug": still}) is None
 
 
 def test_a_stop_is_where_the_body_no_longer_moves(tmp_path):
@@ -76,28 +69,25 @@ def test_a_stop_is_where_the_body_no_longer_moves(tmp_path):
     frames = 40
     moving = np.repeat(cloth[:1], frames, axis=0)
     moving[:12] += 0.01 * np.arange(12, 0, -1)[:, None, None]
-    write_mesh(tmp_path / "body.vtkhdf", moving, faces, {})
-    body = vtkhdf.read_series(tmp_path / "body.vtkhdf")
+    body = mesh(moving, faces, {})
     assert hem.stop_frame(body) == 12
-    short = moving[: 12 + hem.HELD]
-    write_mesh(tmp_path / "short.vtkhdf", short, faces, {})
-    assert hem.stop_frame(vtkhdf.read_series(tmp_path / "short.vtkhdf")) is None
+    assert hem.stop_frame(mesh(moving[: 12 + hem.HELD], faces, {})) is None
+    assert hem.stop_frame(mesh(moving[12:], faces, {})) is None  # it never moved
     after = np.arange(frames) - 12.0
     curves = {
         "swings": np.radians(30.0 * np.exp(-0.1 * np.maximum(after, 0)) * np.cos(0.4 * after)),
         "creeps": np.radians(30.0 * np.exp(-0.3 * np.maximum(after, 0))),
     }
-    series = {}
-    for method, yaw in curves.items():
-        path = tmp_path / f"{method}.vtkhdf"
-        write_mesh(path, moving, faces, {"hem/yaw": yaw, "hem/from_end": np.abs(yaw - yaw[-1])})
-        series[method] = vtkhdf.read_series(path)
+    series = {
+        method: mesh(moving, faces, {"hem/yaw": yaw, "hem/from_end": np.abs(yaw - yaw[-1])})
+        for method, yaw in curves.items()
+    }
     torn = {"hem/yaw": curves["swings"][:8], "hem/from_end": np.abs(curves["swings"][:8])}
-    write_mesh(tmp_path / "torn.vtkhdf", moving[:8], faces, torn)  # it has no end to be measured from
-    series["torn"] = vtkhdf.read_series(tmp_path / "torn.vtkhdf")
-    picture = hem.hem_curves(tmp_path, "tunic/stop", series, body)
+    series["torn"] = mesh(moving[:8], faces, torn)  # it has no end to be measured from
+    run = run_of([row(method=method) for method in series])
+    picture = hem.hem_curves(tmp_path, run, "tunic/stop", series, body)
     assert picture is not None and "torn" not in picture.caption.lower()
-    assert picture is not None and "the body has stopped, at 0.400 s" in picture.caption
+    assert "the body has stopped, at 0.400 s" in picture.caption
     assert hem.overshoot(curves["swings"], 12) > np.radians(10.0)
     assert hem.overshoot(curves["creeps"], 12) == 0.0
 
@@ -108,9 +98,9 @@ def test_what_ended_early_moves_nobody_elses_picture(tmp_path):
     series = {}
     for method, frames in (("simulation", FRAMES), ("snug", FRAMES), ("lbfgs-5", 2)):
         fields = {name: values[:frames] for name, values in inertia.items()}
-        write_mesh(tmp_path / f"{method}.vtkhdf", cloth[:frames], faces, fields)
-        series[method] = vtkhdf.read_series(tmp_path / f"{method}.vtkhdf")
-    (picture,) = render.side_by_side(tmp_path, [render.Dressed("dressed/a", series, None)], opengl=False)
+        series[method] = mesh(cloth[:frames], faces, fields)
+    run = run_of([row(method=method) for method in series])
+    picture = render.side_by_side(tmp_path, run, "tshirt/a", series, None)
     assert "frame 3 " in picture.caption
     assert "Not shown, for they ended before their last frame: L-BFGS, 5 iterations." in picture.caption
 
@@ -118,6 +108,67 @@ def test_what_ended_early_moves_nobody_elses_picture(tmp_path):
 def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
     write_model(tmp_path / "snug-seed0.safetensors", "snug", strain=0.1)
     write_model(tmp_path / ".pbns-seed0.0123.checkpoint.safetensors", "pbns", strain=0.1)
-    monkeypatch.setattr(training, "_draw", lambda folder, panels: panels)
-    ((_, histories),) = training.training_curves(tmp_path, tmp_path, [])[0]
-    assert [history.method for history in histories] == ["snug"]
+    run, read = run_of([row(), row(method="pbns")]), []
+    monkeypatch.setattr(training, "read_history", read.append)
+    assert training.training_curves(tmp_path, run, tmp_path, []) == []
+    assert [path.name for path in read] == ["snug-seed0.safetensors"]
+
+
+def point(stiffness: float, dt: float, status="ok"):
+    more = {"suite": "extremes", "metric": "map", "unit": "iterations", "status": status}
+    value = 3.0 if status == "ok" else None
+    return row("map_sheet", "simulation", value=value, **{**more, "metric": f"map/{stiffness:g}/{dt:.3g}"})
+
+
+def test_a_map_of_every_outcome_is_drawn_from_the_options_of_its_cases(tmp_path):
+    statuses = ("ok", "stalled", "failed", "timeout", "diverged")
+    rows, cases = [], {}
+    for k, status in enumerate(statuses):
+        for dt in (1e-4, 1 / 30):
+            rows.append(point(10.0**k, dt, status))
+            cases[f"case {len(rows)}"] = {
+                "suite": "extremes", "scene": "map_sheet", "metric": rows[-1].metric,
+                "options": {"stiffness": 10.0**k, "dt": dt},
+            }  # fmt: skip
+    other = row("another", "simulation", "outcome", 1.0, suite="extremes")
+    cases["another"] = {"suite": "extremes", "options": {"stiffness": 1e3}}
+    run = run_of([*rows, other], cases=cases)
+    from reports.tables import map_points, stress_tests
+
+    assert set(map_points(run).values()) >= {(1.0, 1e-4), (1e4, 1 / 30)} and len(map_points(run)) == 10
+    assert list(stress_tests(run)["scene"]) == ["another"]
+    (picture,) = stability.stability_maps(tmp_path, run)
+    assert picture.path.is_file() and picture.path.with_suffix(".png").is_file()
+    assert stability.stability_maps(tmp_path, run_of([other], cases=cases)) == []
+    blues = [stability.shade(n)[0] for n in (1.0, 2.0, 20.0, 300.0, 1e6)]
+    assert blues == sorted(blues, reverse=True) and blues[0] == blues[1] and blues[3] == blues[4]
+
+
+def test_throughput_is_of_the_scenes_that_were_measured_both_ways(tmp_path, monkeypatch):
+    cost = {"unit": "ms", "method": "snug"}
+    rows = [row(metric="cost/frame", value=0.5, **cost), row(metric="cost/batch", value=0.1, **cost)]
+    rows += [row("tshirt/jump", metric="cost/frame", value=9.0, **cost)]
+    rows += [row(metric="cost/frame", value=70.0, unit="ms", method="simulation")]
+    ablation = {"unit": "ms", "method": "snug-springs"}
+    rows += [row(metric="cost/frame", **ablation), row(metric="cost/batch", **ablation)]
+    drawn = []
+    monkeypatch.setattr(figures, "save", lambda figure, *_, **more: drawn.append(figure) or more["caption"])
+    assert figures.throughput(tmp_path, run_of(rows))[0].startswith("tshirt: frames per second")
+    (axes,) = drawn.pop().axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["SNUG"]
+    assert [list(line.get_xdata()) for line in axes.get_lines()] == [[2000.0, 10000.0], [2000.0], [10000.0]]
+    figures.throughput(tmp_path, run_of(rows[-2:]))  # without its base the ablation stands for itself
+    assert [label.get_text() for label in drawn.pop().axes[0].get_yticklabels()] == ["SNUG, springs"]
+    assert figures.throughput(tmp_path, run_of(rows[3:4])) == []
+
+
+def test_only_what_was_drawn_is_read(tmp_path):
+    """A scene of another kind, such as a roll-out of a thousand frames, has no pictures of its frames."""
+    from benchmarks.results import RunFolder
+
+    run = run_of([row("tshirt/there_and_back", metric="roll_out/drift", unit="mm")])
+    folder, problems = RunFolder(tmp_path), []
+    path = folder.trajectory_path("tshirt/there_and_back", "snug")
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"no mesh")
+    assert build.draw_trajectories(folder, run, problems) == [] and problems == []

@@ -9,10 +9,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_folder import FRAMES, METHODS, SCENES, TERMS, all_rows, sheet, write_mesh, write_model
+from report_folder import (
+    FRAMES,
+    METHODS,
+    SCENES,
+    TERMS,
+    all_rows,
+    declaration,
+    row,
+    run_of,
+    sheet,
+    write_mesh,
+    write_model,
+)
 
-from benchmarks.results import RunFolder
+from benchmarks.results import COLUMNS, FORMAT, RunFolder
 from reports import build, render, training
+from reports.data import run_data
+from reports.means import Mean
+from reports.tables import make_tables
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +35,8 @@ def made(tmp_path_factory) -> RunFolder:
     """A whole run folder with its report, drawn without OpenGL."""
     run = RunFolder(tmp_path_factory.mktemp("run"))
     run.write_rows(all_rows())
-    run.write_config({"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"})
+    said = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
+    run.write_config(declaration(all_rows(), **said))
     for scene in SCENES:
         body, faces = sheet(0.0)
         write_mesh(run.trajectory_path(scene, "body"), body, faces, {})
@@ -41,20 +57,20 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 
 def test_table_1_is_the_mean_over_scenes(made):
     lines = {line["method"]: line for line in read_csv(made.tables / "energies.csv")}
-    assert list(lines) == ["simulation", "skinning", "pbns", "snug"]
+    assert list(lines) == ["simulation", "skinning", "snug", "pbns"]
     for method, factor in METHODS.items():
         for term, value in TERMS.items():
-            assert float(lines[method][f"{term} [J]"]) == pytest.approx(1.5 * factor * value, rel=1e-8)
-        assert float(lines[method]["total [J]"]) == pytest.approx(1.5 * factor, rel=1e-8)
+            assert float(lines[method][f"energy/{term} [J]"]) == pytest.approx(1.5 * factor * value, rel=1e-8)
+        assert float(lines[method]["energy/total [J]"]) == pytest.approx(1.5 * factor, rel=1e-8)
 
 
 def test_what_is_not_declared_is_a_dash_and_zero_stays_zero(made):
     lines = read_csv(made.tables / "energies_by_scene.csv")
     sheet_line = next(x for x in lines if x["scene"] == "hanging_sheet" and x["method"] == "newton-1")
-    assert sheet_line["strain [J]"] == "0"
-    assert sheet_line["collision [J]"] == sheet_line["total [J]"] == "-"
+    assert sheet_line["energy/strain [J]"] == "0"
+    assert sheet_line["energy/collision [J]"] == sheet_line["energy/total [J]"] == "-"
     fall = next(x for x in lines if x["scene"] == "free_fall")
-    assert fall["strain [J]"] == "-" and fall["gravity [J]"] == "-0.5"
+    assert fall["energy/strain [J]"] == "-" and fall["energy/gravity [J]"] == "-0.5"
 
 
 def test_every_file_of_the_report_is_there(made):
@@ -62,9 +78,9 @@ def test_every_file_of_the_report_is_there(made):
     wanted = ("energies", "energies_by_scene", "curvature", "cost", "validation", "extremes", "unfinished")
     assert {f"{name}.csv" for name in wanted} <= names
     pictures = {path.name for path in made.figures.iterdir()}
-    for stem in ("energy_series_dressed-walk", "error_against_time_dressed-walk", "validation_1", "training"):
+    for stem in ("energy_series_tshirt-walk", "error_against_time_tshirt-walk", "training"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
-    assert {"frames_dressed-walk.png", "frames_dressed-jump.png", "extremes_1.png"} <= pictures
+    assert {"frames_tshirt-walk.png", "frames_tshirt-jump.png", "extremes_1.png"} <= pictures
     assert made.report_path.read_bytes().startswith(b"%PDF")
 
 
@@ -86,8 +102,8 @@ def test_failed_cells_are_listed_once_with_their_reason(made):
     lines = read_csv(made.tables / "unfinished.csv")
     found = [(x["scene"], x["method"], x["status"], x["reason"]) for x in lines]
     assert found == [
-        ("dressed/walk", "supervised", "failed", "diverged at step 7"),
-        ("dressed/jump", "supervised", "failed", "diverged at step 7"),
+        ("tshirt/walk", "supervised", "failed", "diverged at step 7"),
+        ("tshirt/jump", "supervised", "failed", "diverged at step 7"),
         ("hanging_sheet", "snug", "skipped", "no body here"),
     ]
 
@@ -98,7 +114,7 @@ def test_no_run_folder_is_one_line_and_status_2(tmp_path, capsys, what):
     if what != "absent":
         run.path.mkdir()
     if what not in ("absent", "empty"):
-        run.write_config({})
+        run.write_config({"format": FORMAT})
         run.write_rows([])
     if what == "broken config":
         run.config_path.write_text("{", encoding="utf-8")
@@ -113,7 +129,7 @@ def test_no_run_folder_is_one_line_and_status_2(tmp_path, capsys, what):
 
 def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     run = RunFolder(tmp_path)
-    run.write_config({})
+    run.write_config(declaration(all_rows()))
     run.write_rows(all_rows())
     path = run.trajectory_path(SCENES[0], "snug")
     path.parent.mkdir(parents=True)
@@ -122,40 +138,56 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     (run.models / "snug-seed0.safetensors").write_bytes(b"\xff" * 20)
     assert build.main([str(tmp_path), "--no-opengl"]) == 1
     said = capsys.readouterr()
-    assert "dressed-walk/snug.vtkhdf" in said.err and "snug-seed0.safetensors" in said.err
+    assert "tshirt-walk/snug.vtkhdf" in said.err and "snug-seed0.safetensors" in said.err
     assert said.out.strip() == str(run.report_path) and run.report_path.is_file()
 
 
-@pytest.mark.parametrize("ending", ["kill -SEGV $$", "exit 0"])
-def test_without_opengl_the_painter_draws(made, tmp_path, monkeypatch, ending):
-    crashing = tmp_path / "python"
-    crashing.write_text(f"#!/bin/sh\n{ending}\n", encoding="utf-8")
-    crashing.chmod(0o755)
-    monkeypatch.setattr(render.sys, "executable", str(crashing))
-    garment = str(made.trajectory_path(SCENES[0], "snug"))
-    body = str(made.trajectory_path(SCENES[0], "body"))
-    view = render.View(garment, body, 2, (0.2, 1.25, 0.0), 0.8, str(tmp_path / "view.png"))
-    assert render.render_views([view]) == "painter"
+def test_cloth_is_painted_over_the_body_on_white(made, tmp_path):
+    run, scene = run_of(all_rows()), SCENES[0]
+    body = build.read_trajectory(made, made.trajectory_path(scene, "body"), [])
+    cloth = build.read_trajectory(made, made.trajectory_path(scene, "snug"), [])
+    picture = render.side_by_side(tmp_path, run, scene, {"snug": cloth}, body)
     from matplotlib.image import imread
 
-    picture = imread(view.image)
-    assert picture.shape[:2] == (render.SIZE[1], render.SIZE[0])
+    image = imread(picture.path)
     # The sheet is in front of the body and of the same size: the middle has the cloth's hue, blue over red.
-    red, _, blue = picture[picture.shape[0] // 2, picture.shape[1] // 2, :3]
+    red, _, blue = image[image.shape[0] * 3 // 5, image.shape[1] // 2, :3]
     assert blue > red + 0.05
-    assert picture[0, 0, :3].min() == 1.0
+    assert image[-1, 0, :3].min() == 1.0
 
 
-@pytest.mark.slow
-def test_with_opengl_or_without_there_is_a_picture(made, tmp_path):
-    garment = str(made.trajectory_path(SCENES[0], "snug"))
-    view = render.View(garment, "", -1, (0.2, 1.25, 0.0), 0.8, str(tmp_path / "view.png"))
-    assert render.render_views([view]) in ("OpenGL", "painter")
-    from matplotlib.image import imread
+def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, capsys):
+    run = RunFolder(tmp_path)
+    run.write_rows(all_rows())
+    run.write_config({})
+    assert build.main([str(tmp_path)]) == 2
+    assert "run the benchmark again" in capsys.readouterr().err
+    run.write_config({"format": FORMAT})
+    lines = run.rows_path.read_text(encoding="utf-8").splitlines()
+    old = COLUMNS.index("garment")
+    run.rows_path.write_text("\n".join(",".join(line.split(",")[:old]) for line in lines), encoding="utf-8")
+    assert build.main([str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "run the benchmark again" in error and str(run.rows_path) in error
 
-    picture = imread(view.image)
-    middle = picture[picture.shape[0] // 2, picture.shape[1] // 2, :3]
-    assert middle[2] > middle[0] + 0.05 and picture[0, 0, :3].min() > 0.98
+
+def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
+    rows = [*all_rows(), row(SCENES[0], "snug", "sound/volume", 60.0, unit="dB")]
+    said = declaration(rows)
+    said["metrics"]["sound/volume"] |= {"table": "acoustics", "title": "Volume"}
+    rows.append(row(SCENES[0], "snug", "energy/heat", 5.0))
+    said["metrics"]["energy/heat"] = {
+        "unit": "J",
+        "title": "Heat",
+        "table": "energies",
+        "definition": "warmth",
+    }
+    found = make_tables(run_data(said, rows))
+    assert found["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1, True)),)
+    found["acoustics"].write_csv(tmp_path)
+    assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"
+    (heat,) = (column for column in found["energies"].columns if column.name == "energy/heat")
+    assert (heat.title, heat.unit) == ("Heat", "J")
 
 
 def test_histories_come_from_the_models_headers(made):
@@ -170,7 +202,7 @@ def test_the_command_answers_without_loading_anything_heavy():
     probe = (
         "import sys, reports.build\n"
         "try:\n    reports.build.main(['--help'])\nexcept SystemExit:\n    pass\n"
-        "heavy = {'numpy', 'matplotlib', 'torch', 'h5py', 'typst', 'pyvista', 'reference_sim', 'snug'}\n"
+        "heavy = {'numpy', 'pandas', 'scipy', 'matplotlib', 'torch', 'typst', 'reference_sim', 'snug'}\n"
         "sys.exit(bool(heavy & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=60).returncode == 0

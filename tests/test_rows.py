@@ -6,20 +6,20 @@ import dataclasses
 
 import numpy as np
 import pytest
-
-from benchmarks import provenance
 from benchmarks.cell import Outcome, frames_computed, judge
 from benchmarks.clock import Reading
 from benchmarks.closing import remarks, summary
-from benchmarks.methods import METHODS
 from benchmarks.named_metrics import UNITS, unit_of
+from benchmarks.record import Record
+from benchmarks.stages import accepted
+
+from benchmarks import provenance
+from benchmarks.methods import METHODS
 from benchmarks.plan import Cell, Plan
 from benchmarks.presets import find_preset
-from benchmarks.record import Record
 from benchmarks.results import NOT_FALLING, Row
 from benchmarks.rows import model_costs, rows_of
 from benchmarks.scenes import SMALL_SCENES, dressed_scene
-from benchmarks.stages import accepted
 from benchmarks.validation.registry import KNOWN_ANSWERS
 from reference_sim import Trajectory
 

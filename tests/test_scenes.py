@@ -7,9 +7,10 @@ import json
 
 import numpy as np
 import pytest
+from benchmarks.agenda import Agenda
+from benchmarks.wardrobe import embedded_motions, open_wardrobe
 
 from benchmarks import agenda
-from benchmarks.agenda import Agenda
 from benchmarks.clips import clip, joint_speeds
 from benchmarks.methods import find_method
 from benchmarks.plan import choose_suites, network_of
@@ -19,9 +20,8 @@ from benchmarks.scenes import SMALL_SCENES, all_scenes, dressed_scene
 from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from snug.body import Body
-from snug.motion import make_motion
+from snug.motion_library import make_motion
 
 SMOKE = find_preset("smoke")
 TINY = dataclasses.replace(SMOKE, garment_vertices=300, frames=8)

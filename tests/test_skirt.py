@@ -5,17 +5,17 @@ import dataclasses
 import igl
 import numpy as np
 import pytest
+from benchmarks.hem_dynamics import held_simulation
+from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from meshes import edge_counts, girth
 
-from benchmarks.hem_dynamics import held_simulation
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.scenes import dressed_scene
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from snug.body import Body
-from snug.dresser import DressedBody
+from snug.dressed_body import DressedBody
 from snug.garments import GarmentError, tailor_skirt, tailor_tshirt
-from snug.motion import make_motion
+from snug.motion_library import make_motion
 from snug.recipe import DEFAULT
 from snug.rollout import roll_out
 from snug.train import train, untrained_model
@@ -78,11 +78,11 @@ def test_the_body_carries_the_waistband_close_and_nothing_of_a_shirt(body, skirt
     motion = make_motion("turning_stop")
     frames = slice(20, 60, 10)
     poses, translations = motion.poses[frames], motion.translations[frames]
-    carried, skins = skirt.carried(body, poses, translations), body.vertices(poses, translations)
-    assert carried.shape == (4, len(skirt.pins), 3)
-    for band, skin in zip(carried, skins, strict=True):
+    transported, skins = skirt.body_transported(body, poses, translations), body.vertices(poses, translations)
+    assert transported.shape == (4, len(skirt.pins), 3)
+    for band, skin in zip(transported, skins, strict=True):
         assert np.abs(igl.signed_distance(band, skin, body.faces)[0]).max() < 0.02
-    still = skirt.carried(body, np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
+    still = skirt.body_transported(body, np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
     assert still == pytest.approx(skirt.rest_positions[skirt.pins], abs=1e-12)
     assert len(tailor_tshirt(body, vertices=300).pins) == 0
 

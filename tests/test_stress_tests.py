@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from meshes import grid
 
-from benchmarks.results import Row
 from benchmarks.validation import convergence_check, stress_tests
 from benchmarks.validation.case import timed_out
 from benchmarks.validation.convergence_check import lbfgs_then_newton, solve_and_check
@@ -18,7 +15,6 @@ from benchmarks.validation.stress_steps import sheet
 from benchmarks.validation.stress_tests import MAPS, STEPS
 from reference_sim import Cloth, minimise
 from reference_sim.energies import Energy, StretchStVK
-from reports import stability
 
 SMOKE = [case for case in STRESS_TESTS if case.smoke]
 
@@ -57,37 +53,6 @@ def test_a_point_of_a_map_counts_iterations_and_names_its_place():
 
 
 # --- the report's part ----------------------------------------------------------------------------------
-
-
-def point(factor, dt, status="ok", value=12.0):
-    row = Row(
-        "extremes", "map_sheet", "simulation", 0, f"map/{factor:g}/{dt:.3g}", "iterations", value, status
-    )
-    return dataclasses.replace(row, reason="why" if status != "ok" else "")
-
-
-def test_a_map_of_every_outcome_is_drawn(tmp_path):
-    statuses = ("ok", "stalled", "failed", "timeout", "diverged")
-    rows = [point(10.0**k, dt, status) for k, status in enumerate(statuses) for dt in (1e-4, 1 / 30)]
-    rows.append(dataclasses.replace(rows[0], metric="outcome", scene="another"))
-    found = stability.points(rows)
-    assert list(found) == ["map_sheet"] and len(found["map_sheet"]) == 10
-    assert {(p.stiffness, p.dt) for p in found["map_sheet"]} >= {(1.0, 1e-4), (1e4, 0.0333)}
-    (picture,) = stability.stability_maps(tmp_path, rows)
-    assert picture.path.is_file() and picture.path.with_suffix(".png").is_file()
-    assert stability.stability_maps(tmp_path, rows[-1:]) == []
-    blues = [stability.shade(n)[0] for n in (1.0, 2.0, 20.0, 300.0, 1e6)]
-    assert blues == sorted(blues, reverse=True) and blues[0] == blues[1] and blues[3] == blues[4]
-
-
-def test_refused_inputs_have_a_table():
-    rows = [
-        Row("extremes", f"refused/{name}", "simulation", 0, "refusal", "1", 1.0, "ok", "face 3")
-        for name in ("zero_area", "zero_area_uv")
-    ]
-    table = stability.refusals(rows)
-    assert [line[:2] for line in table.rows] == [("zero_area", "ok"), ("zero_area_uv", "ok")]
-    assert stability.refusals([point(1.0, 1.0)]) is None
 
 
 # --- the solver's part ----------------------------------------------------------------------------------

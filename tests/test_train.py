@@ -10,8 +10,9 @@ import torch
 from dressing import leaning, swaying, tube_dress
 
 from snug.baselines.supervised import TargetError, vertex_loss
-from snug.mixing import lap_clearance, mirrored, mixed_for, mixed_motions
-from snug.motion import Motion, arm_clearance, make_motion
+from snug.motion import Motion, arm_clearance
+from snug.motion_augmentation import lap_clearance, mirrored, mixed_for, mixed_motions
+from snug.motion_library import make_motion
 from snug.recipe import DEFAULT, PAPER, Recipe
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.results import replacing
-from reports import palette
+from reports.styles import Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
-LINE_LETTERS = 115  # of a legend that fit on one line of it
+LINE_LETTERS = 115  # of a legend that fit on one line of a figure as wide as the page
 GRID = "#E3E3E3"
 _LOOK: dict[Any, Any] = {
     "font.family": "STIXGeneral",
@@ -107,18 +107,15 @@ def file_name(text: str) -> str:
 
 @dataclass(frozen=True)
 class Picture:
-    """A finished figure: its file for the PDF, caption, section, kind and share of the page's width."""
+    """A finished figure: its file for the PDF, caption, kind and share of the page's width."""
 
     path: Path
     caption: str
-    section: str
     kind: str
     width: float
 
 
-def save(
-    figure: Figure, folder: Path, name: str, *, caption: str, section: str, kind: str, vector: bool = True
-) -> Picture:
+def save(figure: Figure, folder: Path, name: str, *, caption: str, kind: str, vector: bool = True) -> Picture:
     """Write <name>.png and, unless it is a photograph, <name>.svg, which the PDF then takes."""
     path = folder / f"{name}.png"
     with replacing(path) as temporary:
@@ -128,33 +125,29 @@ def save(
         path = folder / f"{name}.svg"
         with replacing(path) as temporary:
             figure.savefig(temporary, metadata={"Date": None})
-    return Picture(path, caption, section, kind, min(1.0, float(figure.get_figwidth()) / PAGE_WIDTH))
+    return Picture(path, caption, kind, min(1.0, float(figure.get_figwidth()) / PAGE_WIDTH))
 
 
-def legend_above(figure: Figure, methods: Sequence[str], *, lines: bool) -> None:
-    """One legend for all panels, above them."""
+def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
+    """One legend for all panels, above them: of lines, or else of markers (of none where that is empty)."""
     from matplotlib.lines import Line2D
 
-    handles = []
-    for method in methods:
-        look = palette.style(method)
-        dotted = not lines and method == palette.REFERENCE  # drawn as a line at its run time
-        line: Any = ":" if dotted else look.line if lines else "none"
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=look.colour,
-                linestyle=line,
-                marker="" if lines or dotted else look.marker,
-                markersize=9 if look.marker == "*" else 6,
-                label=look.label,
-            )
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=look.colour,
+            linestyle=look.line if lines or not look.marker else "none",  # type: ignore[arg-type]
+            marker="" if lines else look.marker,
+            markersize=9 if look.marker == "*" else 6,
+            label=look.label,
         )
+        for look in entries
+    ]
     figure.legend(
         handles=handles,
         loc="outside upper center",
-        ncols=_columns([len(palette.label(method)) + 8 for method in methods]),
+        ncols=_columns([len(look.label) + 8 for look in entries], figure.get_figwidth() / PAGE_WIDTH),
         frameon=False,
         handlelength=1.6 if lines else 0.8,
         handletextpad=0.5,
@@ -162,14 +155,13 @@ def legend_above(figure: Figure, methods: Sequence[str], *, lines: bool) -> None
     )
 
 
-def _columns(letters: Sequence[int]) -> int:
-    """As many columns of a legend as fit side by side: it is filled column by column, each as wide as its
-    longest entry.
+def _columns(letters: Sequence[int], width: float = 1.0) -> int:
+    """As many columns of a legend as fit into that share of the page's width: it is filled column by column,
+    each as wide as its longest entry.
     """
     count = len(letters)
     for columns in range(count, 1, -1):
-        lines, longer = divmod(count, columns)
-        ends = np.cumsum([lines + (place < longer) for place in range(columns)])
-        if sum(max(part) for part in np.split(np.array(letters), ends[:-1])) <= LINE_LETTERS:
+        parts = np.array_split(np.array(letters), columns)  # the longer ones first, as matplotlib fills them
+        if sum(int(part.max()) for part in parts) <= LINE_LETTERS * width:
             return columns
     return 1

@@ -1,0 +1,161 @@
+"""What a run left behind: its rows as one table, and what run.json declares of metrics, methods and cases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from benchmarks.results import COLUMNS, Row
+
+USABLE = ("ok", "stalled")
+SUITES = ("garments", "speed", "validation", "extremes")
+# Methods stand in this order of their roles, and within a role as they are declared.
+ROLES = (
+    "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
+    "warm-started", "",
+)  # fmt: skip
+CELL = ["scene", "method", "seed", "metric"]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A metric as it is declared: head of its column, a sentence on it, and the table that has the column."""
+
+    name: str
+    unit: str = ""
+    title: str = ""
+    definition: str = ""
+    table: str = ""
+    lower_is_better: bool | None = None
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method as its rows declare it, see benchmarks.results.Row; label is its name for people."""
+
+    name: str
+    label: str
+    role: str = ""
+    family: str = ""
+    level: float | None = None
+    base: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The rows and their declarations.
+
+    frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table` (of
+    its metric) and `case` (the check or stress test that it is, else empty).
+    """
+
+    config: Mapping[str, Any]
+    frame: pd.DataFrame
+    metrics: Mapping[str, Metric]
+    methods: Mapping[str, Method]
+
+    def suite(self, *names: str) -> pd.DataFrame:
+        return self.frame[self.frame["suite"].isin(names)]
+
+    def cells(self, first: str) -> pd.DataFrame:
+        """The rows of garments and speed, each cell once: one that both report is taken from `first`."""
+        kept = self.suite("garments", "speed")
+        order = (kept["suite"] != first).sort_values(kind="stable").index
+        return kept.loc[order].drop_duplicates(CELL).sort_index()
+
+    @property
+    def worn(self) -> pd.DataFrame:
+        """The rows of suite garments, which are averaged over the scenes of a garment."""
+        rows = self.suite("garments")
+        return rows[rows["garment"] != ""]
+
+    def garments(self, frame: pd.DataFrame) -> dict[str, list[str]]:
+        """Garment -> its scenes among these rows, in the order in which run.json declares them."""
+        declared = {name: place for place, name in enumerate(self.config.get("scenes_declared", ()))}
+        pairs = frame[frame["garment"] != ""][["garment", "scene"]].drop_duplicates()
+        found: dict[str, list[str]] = {}
+        for garment, scene in sorted(pairs.itertuples(index=False), key=lambda p: declared.get(p[1], 0)):
+            found.setdefault(garment, []).append(scene)
+        return found
+
+    def ordered(self, methods: Iterable[str]) -> list[str]:
+        """Without repeats: by role, then as declared, members of a family by their level."""
+        places = list(self.methods)
+        first: dict[str, int] = {}
+        for method in self.methods.values():
+            first.setdefault(method.family, places.index(method.name))
+
+        def rank(name: str) -> tuple[int, int, float, str]:
+            method = self.methods[name]
+            return ROLES.index(method.role), first[method.family], method.level or 0.0, name
+
+        return sorted(set(methods), key=rank)
+
+    def with_role(self, *roles: str) -> list[str]:
+        return [name for name, method in self.methods.items() if method.role in roles]
+
+    @property
+    def reference(self) -> str:
+        """The name of the simulation that others are measured against; empty where it did not run."""
+        return next(iter(self.with_role("reference")), "")
+
+    def label(self, method: str) -> str:
+        return self.methods[method].label if method in self.methods else method
+
+    def standing_apart(self, frame: pd.DataFrame) -> set[str]:
+        """The ablations among these rows whose base has a usable number too: they have their own table."""
+        usable = set(frame[frame["usable"]]["method"])
+        return {name for name in self.with_role("ablation") if self.methods[name].base in usable}
+
+
+def run_data(config: Mapping[str, Any], rows: Sequence[Row]) -> Run:
+    """The run of these rows. What run.json does not declare is named after itself and has no table."""
+    frame = pd.DataFrame.from_records(
+        [[getattr(row, name) for name in COLUMNS] for row in rows], columns=list(COLUMNS)
+    )
+    numbers = ["value", "expected", "tolerance", "level"]
+    frame[numbers] = frame[numbers].astype(float)
+    finite = frame["value"].abs() < float("inf")
+    frame["usable"] = frame["status"].isin(USABLE) & finite
+    declared = config.get("metrics") or {}
+    units = dict(zip(frame["metric"], frame["unit"]))
+    names = [*(name for name in declared if name in units), *(name for name in units if name not in declared)]
+    metrics = {name: _metric(name, units[name], declared.get(name) or {}) for name in names}
+    frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
+    frame["case"] = _cases(frame, config.get("cases") or {})
+    methods = _methods(frame, config.get("methods") or {})
+    scenes = config.get("scenes")
+    own = {**config, "scenes_declared": list(scenes) if isinstance(scenes, dict) else ()}
+    return Run(own, frame, metrics, methods)
+
+
+def _metric(name: str, unit: str, said: Mapping[str, Any]) -> Metric:
+    lower = said.get("lower_is_better")
+    return Metric(
+        name, unit, str(said.get("title") or name), str(said.get("definition") or ""),
+        str(said.get("table") or ""), None if lower is None else bool(lower),
+    )  # fmt: skip
+
+
+def _methods(frame: pd.DataFrame, declared: Mapping[str, Any]) -> dict[str, Method]:
+    """In the order of run.json, those that it does not know behind."""
+    columns = ["method", "role", "family", "level", "base"]
+    rows = frame[frame["method"] != ""][columns].drop_duplicates("method")
+    found = {
+        name: Method(
+            name, str((declared.get(name) or {}).get("label") or name), role, family or name,
+            None if pd.isna(level) else level, base,
+        )
+        for name, role, family, level, base in rows.itertuples(index=False)
+    }  # fmt: skip
+    return {name: found[name] for name in dict.fromkeys([*declared, *found]) if name in found}
+
+
+def _cases(frame: pd.DataFrame, declared: Mapping[str, Any]) -> list[str]:
+    """The case of each row. A case may say the scene and metric of its row; else the scene is its name."""
+    places = {(case.get("scene") or name, case.get("metric") or ""): name for name, case in declared.items()}
+    pairs = zip(frame["scene"], frame["metric"])
+    return [places.get(pair) or places.get((pair[0], "")) or "" for pair in pairs]

@@ -1,0 +1,136 @@
+"""Means over scenes and seeds of the rows of a run.
+
+Only finite values of cells that ended ok, or stalled at some frames, enter a mean; a mean says when one
+of its cells stalled. Nothing is filled in for a cell that failed.
+The mean is first taken over the scenes of one seed, then over seeds; the spread is the standard
+deviation over seeds (n - 1), absent for a single seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import pandas as pd
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean of a metric, its spread over seeds, and what went into it.
+
+    `complete` says that every seed has every scene in which anybody has the metric; otherwise the mean is
+    over fewer cells than its neighbours in a table, and the table must say so. `stalled` says that a solver
+    left some frames of some cell unconverged, `seeded` that another seed would give another value. `by_seed`:
+    the mean over scenes of each seed. `lost`: seeds of which nothing usable is left, as of a network that
+    diverged. `pairing_group`: means of one group begin with the same draws at equal seeds; empty for none.
+    """
+
+    value: float
+    spread: float | None
+    scenes: int
+    seeds: int
+    complete: bool
+    stalled: bool = False
+    seeded: bool = True
+    by_seed: Mapping[int, float] = field(default_factory=dict, compare=False)
+    lost: int = 0
+    pairing_group: str = field(default="", compare=False)
+
+    @property
+    def fewer(self) -> str:
+        """Words behind a number or verdict: over how many scenes or seeds, where these are not all."""
+        if self.lost:
+            return f" ({self.seeds} of {self.seeds + self.lost} seeds)"
+        return "" if self.complete else f" ({self.scenes} {'scene' if self.scenes == 1 else 'scenes'} only)"
+
+
+def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
+    """A Mean for each group of the usable rows, by keys such as ("garment", "method", "metric").
+
+    The keys hold "method" and "metric". In the order of the rows.
+    """
+    own = list(keys)
+    places, cells = ([key for key in own if key != name] for name in ("method", "metric"))
+    tried = frame[frame["status"] != "skipped"]
+    asked = tried.groupby(places)["scene"].nunique()
+    failed = tried[~tried["usable"]].groupby(cells)["seed"].agg(set)
+    usable = frame[frame["usable"]].assign(stalled=frame["status"] == "stalled")
+    of_seed, of_all = (usable.groupby(names, sort=False) for names in ([*own, "seed"], own))
+    seeds = of_seed["value"].mean()
+    by_seed: dict[tuple, dict[int, float]] = {}
+    for (*key, seed), value in seeds.items():  # type: ignore[misc]
+        by_seed.setdefault(tuple(key), {})[int(seed)] = float(value)
+    across = seeds.groupby(own, sort=False)
+    columns = (
+        across.mean(), across.std(), of_seed.size().groupby(own, sort=False).min(), of_all["scene"].nunique(),
+        of_all["stalled"].any(), of_all["seeded"].any(), of_all["pairing_group"].first(),
+    )  # fmt: skip
+    found = {}
+    for key, value, spread, fewest, scenes, stalled, seeded, pairing_group in zip(by_seed, *columns):
+        group = dict(zip(own, key))
+        lost = failed.get(_key(group, cells), set()) - by_seed[key].keys()
+        found[key] = Mean(
+            value=float(value),
+            spread=None if pd.isna(spread) else float(spread),
+            scenes=int(scenes),
+            seeds=len(by_seed[key]),
+            complete=not lost and fewest == asked[_key(group, places)],
+            stalled=bool(stalled),
+            seeded=bool(seeded),
+            by_seed=by_seed[key],
+            lost=len(lost),
+            pairing_group=pairing_group,
+        )
+    index = pd.MultiIndex.from_arrays([list(column) for column in zip(*found)] or [[]] * len(own), names=own)
+    return pd.Series(list(found.values()), index=index, dtype=object)
+
+
+def _key(group: Mapping[str, str], names: Sequence[str]) -> tuple | str:
+    return group[names[0]] if len(names) == 1 else tuple(group[name] for name in names)
+
+
+def mean_of(
+    frame: pd.DataFrame, method: str, metric: str, scenes: Iterable[str] | None = None
+) -> Mean | None:
+    """The mean over the scenes (all by default) and seeds that have the metric, None if there are none."""
+    rows = frame if scenes is None else frame[frame["scene"].isin(list(scenes))]
+    rows = rows[(rows["metric"] == metric) | ~rows["usable"]]
+    return means(rows, "method", "metric").get((method, metric))
+
+
+def value_of(
+    frame: pd.DataFrame, method: str, metric: str, scenes: Iterable[str] | None = None
+) -> float | None:
+    """The mean alone, or None."""
+    mean = mean_of(frame, method, metric, scenes)
+    return None if mean is None else mean.value
+
+
+def shared_scenes(frame: pd.DataFrame, methods: Iterable[str], metric: str) -> list[str]:
+    """The scenes where each of the methods has the metric, with all of its seeds."""
+    rows = frame[frame["usable"] & (frame["metric"] == metric)]
+    kept = list(dict.fromkeys(frame["scene"]))
+    for method in methods:
+        own = rows[rows["method"] == method]
+        seeds = own.groupby("scene")["seed"].nunique()
+        full = set(seeds[seeds == own["seed"].nunique()].index)
+        kept = [scene for scene in kept if scene in full]
+    return kept
+
+
+def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean | None, Mean | None]:
+    """Both means over the scenes that the two methods share, None where they share none.
+
+    Where one of them was not measured at all, the other's mean is over its own scenes.
+    """
+    rows = frame[frame["method"].isin((one, other)) & ((frame["metric"] == metric) | ~frame["usable"])]
+    both = shared_scenes(rows, (one, other), metric)
+    found = means(rows[rows["scene"].isin(both)] if both else rows, "method", "metric")
+    first, second = (found.get((method, metric)) for method in (one, other))
+    if first is None or second is None:
+        return first, second
+    if not both:
+        return None, None
+    asked = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
+    first, second = (replace(m, complete=len(both) == asked and not m.lost) for m in (first, second))
+    return first, second

@@ -1,0 +1,132 @@
+"""The summary on page one: a few sentences, computed from the numbers and printed as they come out."""
+
+from __future__ import annotations
+
+import re
+
+import pandas as pd
+
+from reports import tables
+from reports.break_even import NETWORK, compared_scenes, cost_of, crossing, frames_text, rivals
+from reports.data import Run
+from reports.means import mean_of, pair, shared_scenes
+from reports.numbers import duration, number, with_spread
+from reports.pareto import TIME, beaten_by, fastest, points_of, truncated
+
+TOTAL, CURVATURE = "energy/total", "curvature/error"
+
+
+def summary(run: Run) -> list[tuple[str, str]]:
+    """(topic, sentences), of what the run holds numbers for; means are of the first garment."""
+    scenes = next(iter(run.garments(run.worn).values()), [])
+    worn = run.worn[run.worn["scene"].isin(scenes)]
+    found = [
+        ("Total energy", least(run, worn, TOTAL, "J")),
+        ("Wrinkles", least(run, worn, CURVATURE, "1/m")),
+        ("Run time", run_time(run, worn if NETWORK in set(worn["method"]) else run.cells("speed"))),
+        ("Error against time", fronts(run)),
+        ("When training pays", training_pays(run)),
+        ("Known answers", f"{checks(run)} {stress(run)}".strip()),
+        ("Not finished", trouble(run)),
+    ]
+    # A number keeps its unit on its line.
+    return [(topic, re.sub(r"(?<=\d) (?=(J|ms|1/m|%)\b|%)", "\u00a0", said)) for topic, said in found if said]
+
+
+def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
+    """The networks by a metric, the lowest first, and then what was not trained, over the scenes of all."""
+    rows = worn[worn["metric"] == metric]
+    have = set(rows[rows["usable"]]["method"])
+    networks = [name for name in run.with_role("network") if name in have and not run.methods[name].base]
+    others = [name for name in run.ordered(run.with_role("reference", "bound", "baseline")) if name in have]
+    scenes = shared_scenes(rows, [*networks, *others], metric)
+    means = {name: mean_of(rows, name, metric, scenes) for name in (*networks, *others)}
+    found = {name: mean for name, mean in means.items() if mean is not None}
+    order = sorted((name for name in networks if name in found), key=lambda name: found[name].value)
+    if not order:
+        return ""
+    best = found[order[0]]
+    text = f"{run.label(order[0])} has {with_spread(best.value, best.spread)} {unit}"
+    after, beside = (
+        ", ".join(f"{run.label(name)} {number(found[name].value)}" for name in names if name in found)
+        for names in (order[1:], others)
+    )
+    text += f", {after}." if after else "."
+    text += f" Beside them: {beside}." if beside else ""
+    asked = rows["scene"].nunique()
+    return text + (f" Over {len(scenes)} of {asked} scenes." if len(scenes) < asked else "")
+
+
+def run_time(run: Run, frame: pd.DataFrame) -> str:
+    own, reference = pair(frame, NETWORK, run.reference, TIME)
+    if own is None or reference is None or not own.value or not reference.value:
+        return ""
+    text = f"{run.label(NETWORK)} takes {number(own.value)} ms per frame, the simulation "
+    text += f"{number(reference.value)} ms: {number(reference.value / own.value, 2)} times"
+    return f"{text}{own.fewer}."
+
+
+def fronts(run: Run) -> str:
+    """By each error, what beats the network, and the fastest truncated solver that is as accurate."""
+    frame = run.cells("speed")
+    scenes = next(iter(compared_scenes(run, frame).values()), [])
+    sentences = []
+    for metric in ("gap/relative", CURVATURE):
+        points = points_of(run, frame, scenes, metric) if scenes else []
+        own = next((p for p in points if p.method == NETWORK), None)
+        if own is None:
+            continue
+        title = run.metrics[metric].title
+        title = f"{title[:1].lower()}{title[1:]}"
+        best, solver = beaten_by(points, own), fastest(truncated(run, points), own.error)
+        text = f"By {title} ({number(own.error)} in {number(own.time)} ms) "
+        text += (
+            "nothing as fast as SNUG is nearer" if best is None else f"{run.label(best.method)} beats SNUG"
+        )
+        text += f" ({number(best.error)} in {number(best.time)} ms)" if best else ""
+        text += (
+            f"; the fastest solver as near is {run.label(solver.method)}, {number(solver.time)} ms."
+            if solver
+            else "."
+        )
+        sentences.append(text)
+    return " ".join(sentences)
+
+
+def training_pays(run: Run) -> str:
+    frame = run.cells("speed")
+    scenes = next(iter(compared_scenes(run, frame).values()), [])
+    own = cost_of(frame, NETWORK, scenes) if scenes else None
+    if own is None or own.before <= 0.0:
+        return ""
+    parts = []
+    for method in rivals(run, frame, scenes):
+        rival = cost_of(frame, method, scenes)
+        frames = crossing(own, rival) if rival else None
+        after = "never" if frames is None else f"after {frames_text(frames)} frames"
+        parts.append(f"{after} against {run.label(method)}")
+    return f"SNUG's {duration(own.before)} of training pay {', '.join(parts)}."
+
+
+def checks(run: Run) -> str:
+    """How many validation checks passed, and which did not."""
+    rows = tables.checks(run)
+    rows = rows[rows["tolerance"].notna() | (rows["status"] != "ok")]
+    bad = [tables.check_name(run, row) for row in rows[rows["status"] != "ok"].itertuples()]
+    text = f"{len(rows) - len(bad)} of {len(rows)} checks pass" if len(rows) else ""
+    return f"{text}; failed: {', '.join(bad)}." if bad else text and f"{text}."
+
+
+def stress(run: Run) -> str:
+    """How many stress tests converged; the rest by status."""
+    counts = tables.stress_tests(run)["status"].value_counts()
+    rest = "".join(f"; {count} {status}" for status, count in counts.items() if status != "ok")
+    return f"{counts.get('ok', 0)} of {counts.sum()} stress tests converged{rest}." if len(counts) else ""
+
+
+def trouble(run: Run) -> str:
+    rows = run.suite("garments", "speed")
+    rows = rows[rows["status"] != "ok"].drop_duplicates(["scene", "method", "seed"])
+    counts = rows["status"].value_counts()
+    words = ", ".join(f"{count} {status}" for status, count in counts.items())
+    return f"Cells of garments and speed: {words}; the reasons stand near the end." if words else ""

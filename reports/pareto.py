@@ -1,0 +1,105 @@
+"""Methods as points in the plane of run time and error: which are beaten by none, who first reaches what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from reports.data import Run
+from reports.means import means
+
+TIME, REPEATS = "cost/frame", "cost/spread"
+ERRORS = ("gap/relative", "curvature/error", "distance/rms", "gradient/norm")
+PERTURBED = "simulation-perturbed"  # whose distance is the sensitivity of the reference, not an error
+SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
+
+
+@dataclass(frozen=True)
+class Point:
+    """A method's run time [ms per frame] and error.
+
+    time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
+    standard deviations over seeds. error_spread: one standard deviation over seeds. Both 0 where unknown.
+    """
+
+    method: str
+    time: float
+    error: float
+    time_spread: float = 0.0
+    error_spread: float = 0.0
+
+
+def points_of(
+    run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str, x: str = TIME
+) -> list[Point]:
+    """Every method that has both numbers in all the scenes, as means over them."""
+    rows = frame[frame["scene"].isin(list(scenes)) & frame["metric"].isin([metric, x, REPEATS])]
+    if not len(rows):
+        return []
+    wide = means(rows, "method", "metric")
+    found = []
+    for method in run.ordered(rows["method"]):
+        time, error, repeats = (wide.get((method, name)) for name in (x, metric, REPEATS))
+        if time is None or error is None or min(time.scenes, error.scenes) < len(scenes):
+            continue
+        spread = 2.0 * (time.spread or 0.0)
+        if repeats is not None and x == TIME:
+            spread = time.value * repeats.value / 100.0
+        found.append(Point(method, time.value, error.value, spread, error.spread or 0.0))
+    return found
+
+
+def front(points: Iterable[Point]) -> list[Point]:
+    """Those to which no other is at once at least as fast and as accurate, from fast to accurate."""
+    best: list[Point] = []
+    for point in sorted(points, key=lambda p: (p.time, p.error, p.method)):
+        if not best or point.error < best[-1].error:
+            best.append(point)
+    return best
+
+
+def fastest(points: Iterable[Point], error: float) -> Point | None:
+    """The fastest with at most that error, or None."""
+    reached = [point for point in points if point.error <= error]
+    return min(reached, key=lambda p: (p.time, p.error, p.method)) if reached else None
+
+
+def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
+    """Solvers alone, truncated or to a tolerance, with nothing learned, of the reference's own problem."""
+    kept = set(run.with_role("reference", "solver", "reference-variant"))
+    return [
+        p
+        for p in points
+        if p.method in kept and run.methods[p.method].family not in (PERTURBED, SMALLER_STEPS)
+    ]
+
+
+def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
+    """Of the solvers alone those that differ from others of their family by one number."""
+    return [p for p in solvers(run, points) if run.methods[p.method].level is not None]
+
+
+def warm_started(run: Run, points: Iterable[Point]) -> list[Point]:
+    """Solvers that start each step from another method's guess."""
+    return [p for p in points if run.methods[p.method].role == "warm-started"]
+
+
+def beaten_by(points: Sequence[Point], own: Point) -> Point | None:
+    """The most accurate of those that are no slower and no less accurate, None where there is none."""
+    faster = [p for p in points if p is not own and overtaken(own, [p])]
+    return min(faster, key=lambda p: p.error) if faster else None
+
+
+def overtaken(point: Point, others: Sequence[Point]) -> bool:
+    """Whether one of the others is no less accurate, and no slower by more than run times scatter.
+
+    The range of three repeats is 1.7 standard deviations on average, so both ranges together are near two of
+    the difference.
+    """
+    return any(
+        p.error <= point.error and p.time <= point.time + math.hypot(p.time_spread, point.time_spread)
+        for p in others
+    )

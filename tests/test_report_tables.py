@@ -1,0 +1,307 @@
+"""Means, tables, numbers and the page of the report: as the rows say, dashes where there are none."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+
+import numpy as np
+import pytest
+from report_folder import SCENES, all_rows, row, run_of, skipped
+
+from reports import numbers
+from reports.ablations import ablations, ablations_judged
+from reports.document import document
+from reports.layout import table_blocks
+from reports.means import Mean, mean_of, pair
+from reports.narrative import fronts, least, run_time, summary, trouble
+from reports.tables import make_tables, merged
+
+
+def seeds_of(method, metric, values, **more):
+    return [row(method=method, metric=metric, value=value, seed=k, **more) for k, value in enumerate(values)]
+
+
+def column(table, name):
+    return [column.name for column in table.columns].index(name)
+
+
+def test_mean_and_spread_over_seeds():
+    rows = [row(scene, seed=s, value=v) for scene in SCENES for s, v in ((0, 1.0), (1, 3.0), (2, 8.0))]
+    mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
+    assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), scenes=2, seeds=3, complete=True)
+    assert dict(mean.by_seed) == {0: 1.0, 1: 3.0, 2: 8.0}
+    assert mean_of(run_of(rows[:1]).frame, "snug", "energy/strain", SCENES[:1]).spread is None
+    assert mean_of(run_of(rows).frame, "snug", "energy/bending") is None
+
+
+def test_the_mean_is_over_scenes_first():
+    """One seed has one scene of two: it weighs as much as the other."""
+    rows = [row(SCENES[0], value=1.0), row(SCENES[1], value=3.0), row(SCENES[0], value=8.0, seed=1)]
+    mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
+    assert mean.value == 5.0 and not mean.complete and mean.fewer == " (2 scenes only)"
+
+
+def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
+    rows = [
+        row("tshirt/walk", value=1.0),
+        row("tshirt/jump", value=100.0, status="failed", reason="x"),
+        row("tshirt/walk", "simulation", value=4.0, status="stalled", reason="2 frames"),
+        row("tshirt/jump", "simulation", value=6.0),
+    ]
+    run = run_of(rows)
+    table = make_tables(run)["energies"]
+    lines = {line[1]: line[2] for line in table.rows}
+    assert lines["snug"].value == 1.0 and not lines["snug"].complete
+    assert lines["simulation"].value == 5.0 and lines["simulation"].complete and lines["simulation"].stalled
+    (block,) = table_blocks(run, table)
+    assert [line[1]["mark"] for line in block["groups"][0]["rows"]] == ["†", "*"]
+    assert "fewer scenes" in block["note"] and "unconverged" in block["note"]
+
+
+def test_a_seed_that_is_lost_is_said_wherever_the_mean_of_the_others_stands():
+    rows = seeds_of("snug", "energy/total", (1.0, 1.1)) + seeds_of("pbns", "energy/total", (2.0, 2.1, 2.2))
+    gone = row(metric="cost/frame", value=None, seed=2, status="diverged", reason="no end")
+    rows += [gone, row("tunic/stop", metric="cost/frame", value=None, seed=3, status="failed", reason="gone")]
+    (mean,) = (
+        line[2] for line in make_tables(run_of(rows))["energies"].rows if line[:2] == ("tshirt", "snug")
+    )
+    assert (mean.lost, mean.complete, mean.fewer) == (1, False, " (2 of 3 seeds)")
+    assert mean_of(run_of(rows).worn, "snug", "energy/total", ["tshirt/walk"]) == mean
+
+
+def test_garments_have_their_own_means_and_stand_as_they_are_declared():
+    rows = [row("tunic/stop", value=9.0), row("tshirt/walk", value=1.0), row("tshirt/kick", value=3.0)]
+    run = run_of(rows)
+    assert run.garments(run.worn) == {"tshirt": ["tshirt/walk", "tshirt/kick"], "tunic": ["tunic/stop"]}
+    assert list(run.garments(run.worn[run.worn["garment"] == "tunic"])) == ["tunic"]
+    found = [(line[0], line[2].value) for line in make_tables(run)["energies"].rows]
+    assert found == [("tshirt", 2.0), ("tunic", 9.0)]
+
+
+def test_a_cell_of_two_suites_counts_once_in_its_own_table():
+    rows = [row(value=v, metric="cost/frame", suite=s) for v, s in ((1.0, "garments"), (2.0, "speed"))]
+    rows += [row(value=v, suite=s) for v, s in ((1.0, "garments"), (2.0, "speed"))]
+    rows += [row(metric="gap/relative", suite="speed")]
+    made = make_tables(run_of(rows))
+    by_scene, speed = made["energies_by_scene"], made["speed"]
+    assert [line[3].value for line in by_scene.rows] == [1.0]
+    assert [line[column(speed, "cost/frame")].value for line in speed.rows] == [2.0]
+
+
+def test_lines_that_differ_in_their_scene_alone_become_one():
+    table = make_tables(run_of([skipped(scene="a"), skipped(scene="b"), skipped(scene="c", reason="other")]))
+    assert [line[1] for line in merged(table["unfinished"], ("scene",)).rows] == ["a, b", "c"]
+
+
+def test_what_is_judged_outside_of_the_checks_stands_with_them():
+    more = {"unit": "weights", "method": "simulation", "tolerance": 2e-6, "expected": 0.0}
+    rows = [row(metric="conservation/momentum_worst", value=1e-9, **more), *all_rows()]
+    table = make_tables(run_of(rows))["validation"]
+    assert [line[0] for line in table.rows] == [
+        "tshirt/walk: Momentum_worst", "falls_freely", "zero_modes", "sag",
+    ]  # fmt: skip
+    assert [line[-1] for line in table.rows] == ["pass", "pass", "pass", "failed"]
+    assert "3 of 4 checks pass; failed: sag." in dict(summary(run_of(rows)))["Known answers"]
+
+
+def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
+    numbers_of = {"suite": "validation", "method": "simulation", "metric": "check", "expected": 6.0}
+    rows = [
+        row("exact", value=6.0, tolerance=0.0, **numbers_of),
+        row("near", value=6.5, tolerance=2.0, **numbers_of),
+    ]
+    rows += [row("off", value=7.0, tolerance=0.0, **numbers_of), row("told", value=7.0, **numbers_of)]
+    table = make_tables(run_of(rows))["validation"]
+    assert [line[column(table, "away")] for line in table.rows] == [0.0, 0.25, float("inf"), None]
+
+
+def test_a_wide_table_goes_on_below_with_its_heads():
+    rows = [row(metric=f"energy/{k}", value=float(k)) for k in range(11)]
+    run = run_of(rows)
+    blocks = list(table_blocks(run, make_tables(run)["energies"]))
+    heads = [[column["title"] for column in block["columns"]] for block in blocks]
+    assert [len(head) for head in heads] == [7, 6] and {head[0] for head in heads} == {"Method"}
+    assert blocks[1]["caption"].endswith("(continued)")
+
+
+# --- ablations ----------------------------------------------------------------------------------------------
+
+
+def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
+    rows = seeds_of("snug-no-noise", "energy/total", (2.0, 2.2, 2.4))
+    rows += seeds_of("snug-window6", "energy/total", (1.0, 1.2, 1.4))
+    rows += seeds_of("snug", "energy/total", (1.0, 1.1, 1.2))
+    long = {"scene": "tshirt/there_and_back", "unit": "mm"}
+    rows += seeds_of("snug", "roll_out/drift", (1.0, 1.1, 1.2), **long)
+    rows += seeds_of("snug-no-noise", "roll_out/drift", (0.1,), **long)
+    made = make_tables(run_of(rows))
+    assert [line[1] for line in made["energies"].rows] == ["snug"]
+    assert [line[1] for line in made["ablations"].rows] == ["snug", "snug-no-noise", "snug-window6"]
+    full = made["ablations"].rows[0]
+    assert full[-1] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, complete=True)
+    assert made["ablations_judged"].rows == (
+        ("tshirt", "snug-no-noise", "Total", "Drift"),
+        ("tshirt", "snug-window6", "", ""),
+    )
+
+
+def test_without_the_full_recipe_ablations_stand_in_the_other_tables():
+    cost = {"unit": "ms", "method": "snug-springs"}
+    rows = [row(method="snug-springs", metric="energy/total"), row(metric="cost/frame", **cost)]
+    full = [row(metric=r.metric) for r in rows]
+    assert [line[1] for line in make_tables(run_of(rows))["energies"].rows] == ["snug-springs"]
+    assert [line[1] for line in make_tables(run_of([*rows, *full]))["energies"].rows] == ["snug"]
+    assert ablations(run_of(rows)) == ablations_judged(run_of(rows)) == ablations(run_of(full)) == []
+
+
+def on_two_scenes(method, *values, metric="energy/total"):
+    return [row(scene, method, metric, value) for scene, value in zip(SCENES, values)]
+
+
+def test_ablations_are_judged_over_the_scenes_that_both_have():
+    run = run_of(on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("snug-no-noise", 2.0))
+    assert ablations_judged(run)[0].rows == (("tshirt", "snug-no-noise", "Total (1 scene only)", ""),)
+    assert [line[2].value for line in ablations(run)[0].rows] == [5.0, 2.0]
+
+
+def test_pairs_share_their_scenes_or_have_their_own():
+    rows = [*on_two_scenes("snug", 1.0, 9.0), row(SCENES[1], "pbns", "energy/total", 4.0)]
+    own, other = pair(run_of(rows).frame, "snug", "pbns", "energy/total")
+    assert (own.value, other.value, own.complete) == (9.0, 4.0, False)
+    apart = [row(SCENES[0], metric="energy/total"), row(SCENES[1], "pbns", "energy/total")]
+    assert pair(run_of(apart).frame, "snug", "pbns", "energy/total") == (None, None)
+    assert pair(run_of(rows[:2]).frame, "snug", "pbns", "energy/total")[0].value == 5.0
+
+
+# --- numbers ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.064349, "0.0643"),
+        (12.34, "12.3"),
+        (1734.0, "1,734"),
+        (-0.5, "−0.500"),
+        (0.0, "0"),
+        (9.996, "10.0"),
+        (2.5e-7, "2.50×10⁻⁷"),
+        (3.2e9, "3.20×10⁹"),
+        (None, "–"),
+        (float("nan"), "–"),
+        (float("inf"), "–"),
+    ],
+)
+def test_numbers_as_text(value, text):
+    assert numbers.number(value) == text
+
+
+def test_other_texts():
+    assert numbers.number(0.2835, 7, trim=True) == "0.2835" and numbers.number(6.0, 7, trim=True) == "6"
+    assert numbers.with_spread(0.5, 0.012) == "0.500 ± 0.012" and numbers.with_spread(0.5, None) == "0.500"
+    assert [numbers.duration(s) for s in (0.0, 61.0, 402.0, 104400.0, None)] == [
+        "0 s", "61.0 s", "6.70 min", "29.0 h", "–",
+    ]  # fmt: skip
+    assert numbers.csv_number(None) == "-" and numbers.csv_number(0.0) == "0"
+
+
+def test_decimal_points_stand_in_a_column():
+    padded = numbers.aligned(["0.123", "18.2", "400", "–"])
+    assert len({len(text) - text.index(".") for text in padded[:2]}) == 1
+    assert len(padded[2]) - 3 == len(padded[0]) - 1 and padded[3] == "–"
+
+
+# --- the page -----------------------------------------------------------------------------------------------
+
+
+def test_the_summary_follows_the_numbers():
+    def said(snug: float, pbns: float) -> str:
+        rows = [row(method=m, metric="energy/total", value=v) for m, v in (("snug", snug), ("pbns", pbns))]
+        return dict(summary(run_of(rows)))["Total energy"]
+
+    assert (
+        said(1.0, 2.5) == "SNUG has 1.00\u00a0J, PBNS 2.50."
+        and said(2.5, 1.0) == "PBNS has 1.00\u00a0J, SNUG 2.50."
+    )
+
+
+def test_the_summary_compares_means_over_the_scenes_that_all_have():
+    rows = [row(scene, "snug", "energy/total", v) for scene, v in zip(SCENES, (1.0, 9.0))]
+    rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
+    run = run_of(rows)
+    said = "SNUG has 1.00 J, PBNS 2.00. Over 1 of 2 scenes."
+    assert least(run, run.worn, "energy/total", "J") == said
+    alone = run_of(rows[:2])
+    assert least(alone, alone.worn, "energy/total", "J") == "SNUG has 5.00 J."
+    # The reference's twin is no rival, however near it is.
+    twin = [row(s, "simulation-perturbed", "energy/total", 1e-8) for s in SCENES]
+    assert least(run_of(rows + twin), run_of(rows + twin).worn, "energy/total", "J") == said
+
+
+def test_run_times_are_of_the_scenes_that_both_have():
+    times = [(SCENES[0], "snug", 9.0), (SCENES[1], "snug", 0.25), (SCENES[1], "simulation", 100.0)]
+    run = run_of([row(s, m, "cost/frame", t, unit="ms") for s, m, t in times])
+    assert run_time(run, run.worn) == (
+        "SNUG takes 0.250 ms per frame, the simulation 100 ms: 400 times (1 scene only)."
+    )
+
+
+def test_what_did_not_end_well_is_counted_by_cell():
+    rows = [*all_rows(), row("tshirt/walk", "pbns", "energy/bending", status="stalled", reason="a frame")]
+    assert trouble(run_of(rows)).startswith("Cells of garments and speed: 2 failed, 1 skipped, 1 stalled;")
+    assert trouble(run_of(rows[:3])) == "" and fronts(run_of(rows[:3])) == ""
+
+
+@pytest.mark.parametrize(
+    ("workers", "said"),
+    [(None, ""), (1, "one after another, "), (4, "up to 4 side by side, ")],
+)
+def test_times_say_what_ran_beside(workers, said):
+    run = run_of(all_rows()[-5:], workers=workers)
+    assert document(run, {}, [], [])["workers"] == f"{said}one thread each."
+
+
+def test_sections_exist_only_for_what_ran():
+    check = row("falls", "simulation", "check", 0.0, suite="validation", expected=0.0, tolerance=1.0)
+    run = run_of([check])
+    made_tables = make_tables(run)
+    content = document(run, made_tables, [], [])
+    assert [section["title"] for section in content["sections"]] == ["Validation: known answers"]
+    assert content["definitions"] == [] and content["lead"] is None and content["main"] == []
+    assert set(made_tables) == {"validation", "metrics"}
+
+
+def test_every_metric_in_a_table_is_defined_as_it_defines_itself():
+    run = run_of(all_rows())
+    groups = document(run, make_tables(run), [], [])["definitions"]
+    assert [group["title"] for group in groups] == ["Energies", "Cost", "Curvature"]
+    assert ["Strain [J]", "definition of energy/strain"] in groups[0]["pairs"]
+
+
+def test_other_suites_stand_scene_by_scene_in_their_sections():
+    run = run_of([*all_rows(), row("tshirt/fast", suite="extremes"), row("tshirt/walk", suite="extremes")])
+    sections = {s["title"]: s["blocks"] for s in document(run, make_tables(run), [], [])["sections"]}
+    (block,) = [b for b in sections["Extremes: where it breaks"] if b["caption"].startswith("Energies")]
+    assert [group["title"] for group in block["groups"]] == [
+        "tshirt/fast"
+    ]  # the walk stands in its own suite
+
+
+def test_no_number_of_the_report_is_infinite_or_nan():
+    run = run_of(all_rows())
+    content = document(run, make_tables(run), [], [])
+    assert not re.search(r"\b(nan|inf|NaN|None)\b", json.dumps(content, allow_nan=False))
+
+
+def test_the_page_says_how_many_seeds_there_were():
+    rows = seeds_of("snug", "energy/strain", (1.0, 1.1, 1.2)) + seeds_of("pbns", "energy/strain", (2.0, 2.1))
+    run = run_of(rows + seeds_of("simulation", "energy/strain", (1.0,)))
+    (block,) = document(run, make_tables(run), [], [])["main"]
+    assert "±: standard deviation over 2 or 3 seeds. Without it: one seed" in block["note"]
+
+
+def test_methods_that_share_a_number_only_with_other_rows_are_their_own_family():
+    rows = [dataclasses.replace(row(), family="")]
+    assert run_of(rows).methods["snug"].family == "snug"
