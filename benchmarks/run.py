@@ -95,7 +95,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--fresh", action="store_true", help="reuse nothing from the folder")
     add("--workers", type=int, metavar="N",
         help="processes side by side for ground truth, training, metrics and cases (default 2, or the "
-        "cores there are); cells always run alone")  # fmt: skip
+        "cores there are); cells that are timed run alone")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
     add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
     return parser

@@ -90,7 +90,8 @@ def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, 
             for method in methods:
                 if not (named(scene, request.scenes) and named(method, request.methods)):
                     continue
-                if not (plain and find_method(method).trained):
+                entry = find_method(method)
+                if entry.meant_for(declared[scene]) and not (plain and entry.trained):
                     yield suite.name, scene, method
 
 
