@@ -17,7 +17,7 @@ from . import provenance
 from .metrics import names_of
 from .plan import Network, Plan, network_of, runs
 from .scene import Scene
-from .scenes import find_scene, of_garment
+from .scenes import GARMENT_SCENES, find_scene, of_garment
 from .source import code_of, digest
 from .tasks.case import RunCase
 from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
@@ -25,6 +25,7 @@ from .tasks.ground_truth import SettleStart, SimulateMotion, SimulateQuasiStatic
 from .tasks.metrics import MeasureCell
 from .tasks.task import Task, TaskId
 from .tasks.training import TrainNetwork
+from .tasks.training_windows import SUITE, CompareWindows
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 TASKS, ASSETS = "benchmarks.tasks", "benchmarks.assets"
@@ -55,6 +56,9 @@ class Schedule:
         yield from (self.cell(cell) for cell in plan.cells if not cell.scene.timed)
         yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and self._has_reference(s))
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
+        for network in dict.fromkeys(network_of(c) for c in plan.cells if SUITE in c.suites):
+            if network and network.garment == GARMENT_SCENES[0].garment and network.name in TRAININGS:
+                yield self.windows(network)
         yield from map(self.case, plan.cases)
 
     # --- ground truth and training -------------------------------------------------------------------------
@@ -131,7 +135,7 @@ class Schedule:
         kind, process = (RunCell, cell.name) if cell.scene.timed else (RunUntimedCell, "")
         return kind(
             name=cell.name, label=cell.label, cell=cell, needs=needs, process=process,
-            deadline=self.preset.cell_seconds, **of_scene | {"inputs": inputs},
+            batch="" if process else cell.scene.name, deadline=self.preset.cell_seconds, **of_scene | {"inputs": inputs},
         )  # fmt: skip
 
     def _after(self, kind: Any, cell: Cell, name: str, **fields: Any) -> Task:
@@ -180,6 +184,13 @@ class Schedule:
             compared=compared, gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
             counterpart=counterpart, needs=(("cell", cell.name),), reads=reads, batch=scene.name,
             **of_scene | {"inputs": of_scene["inputs"] | inputs},
+        )  # fmt: skip
+
+    def windows(self, network: Network) -> CompareWindows:
+        training = self.network(network)
+        return CompareWindows(
+            name=training.name, label=training.label, training=training, inputs=training.inputs,
+            modules=(f"{TASKS}.training_windows", *training.modules), needs=(training.id,),
         )  # fmt: skip
 
     def case(self, case: Any) -> RunCase:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .methods import METHODS
-from .methods.learned import LEARNED
+from .methods.learned import LEARNED, RECIPE_DEVIATIONS
 from .plan import Motions
 from .presets import Preset
 from .scenes import GARMENT_SCENES
@@ -29,7 +29,7 @@ class Suite:
     """A question put to many cells, or to cases of benchmarks.validation.
 
     scenes, methods: names of those that meet. more_methods: those that take part only where methods are
-    named, or at a preset that holds all.
+    named, or at a preset that holds all; named_methods: those that have to be named.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Suite:
     scenes: Callable[[Extent], list[str]] = lambda extent: []
     methods: Callable[[Extent], list[str]] = lambda extent: []
     more_methods: tuple[str, ...] = ()
+    named_methods: tuple[str, ...] = ()
 
 
 # --- garments ----------------------------------------------------------------------------------------------
@@ -119,6 +120,7 @@ SUITES = (
         more_methods=(
             *(entry.name for entry in LEARNED), "simulation-perturbed", "lbfgs-5", "lbfgs-10",
         ),
+        named_methods=tuple(entry.name for entry in RECIPE_DEVIATIONS),
     ),
     Suite(
         name="speed",
