@@ -289,6 +289,20 @@ def test_other_suites_stand_scene_by_scene_in_their_sections():
     ]  # the walk stands in its own suite
 
 
+def test_the_page_lists_the_stress_tests_that_did_not_converge_and_the_table_all():
+    run = run_of(all_rows())
+    made = make_tables(run)
+    assert [line[:3] for line in made["extremes"].rows] == [
+        ("stiff", "simulation", "converged"), ("teleport", "simulation", "timeout"),
+    ]  # fmt: skip
+    sections = {s["title"]: s["blocks"] for s in document(run, made, [], [])["sections"]}
+    (block,) = sections["Extremes: where it breaks"]
+    assert [[cell["text"] for cell in line[:3]] for line in block["groups"][0]["rows"]] == [
+        ["teleport", "Simulation", "timeout"]
+    ]
+    assert dict(summary(run))["Known answers"].endswith("1 of 2 stress tests converged; 1 timeout.")
+
+
 def test_no_number_of_the_report_is_infinite_or_nan():
     run = run_of(all_rows())
     content = document(run, make_tables(run), [], [])

@@ -80,7 +80,7 @@ def test_every_file_of_the_report_is_there(made):
     pictures = {path.name for path in made.figures.iterdir()}
     for stem in ("energy_series_tshirt-walk", "error_against_time_tshirt-walk", "training"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
-    assert {"frames_tshirt-walk.png", "frames_tshirt-jump.png", "extremes_1.png"} <= pictures
+    assert {"frames_tshirt-walk.png", "frames_tshirt-jump.png"} <= pictures
     assert made.report_path.read_bytes().startswith(b"%PDF")
 
 
