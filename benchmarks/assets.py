@@ -61,13 +61,13 @@ def open_assets(
     length.
     """
     from snug.body import Body
-    from snug.garments import find_pattern
+    from snug.garments import find_template
 
     from .clips import clip
 
     wearer = Body.from_file(body) if body else Body.load()
     tailored = {
-        name: find_pattern(name).tailor(wearer, vertices=preset.garment_vertices) for name in garments
+        name: find_template(name).tailor(wearer, vertices=preset.garment_vertices) for name in garments
     }
     whole = [motion.cut(0, preset.frames) for motion in motions]
     clips = {motion.name: clip(wearer, motion, preset.clip_frames) for motion in whole}
@@ -76,6 +76,6 @@ def open_assets(
 
 def embedded_motions(names: Iterable[str]) -> list[Motion]:
     """Motions of the embedded library."""
-    from snug.motion import make_motion
+    from snug.motion_library import make_motion
 
     return [make_motion(name) for name in names]

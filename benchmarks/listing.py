@@ -15,12 +15,12 @@ from .validation.registry import CASES
 
 def listing() -> str:
     """Suites, scenes, methods, motions and presets, one line each."""
-    from snug.motion import SWING_TEST, SWING_TRAIN, TEST, TRAIN
+    from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, TEST, TRAIN
 
     dressed = [
         (scene.name, f"{scene.description}; unseen in training")
         for scenes in GARMENT_SCENES
-        for scene in map(scenes.scene, SWING_TEST if scenes.dynamic else (*TEST, *SWING_TEST))
+        for scene in map(scenes.scene, DYNAMIC_TEST if scenes.dynamic else (*TEST, *DYNAMIC_TEST))
     ]
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),
@@ -33,7 +33,7 @@ def listing() -> str:
             ((m.name, f"{m.description} {_where(m)}") for m in METHODS),
         ),
         ("training motions", ((name, "") for name in TRAIN)),
-        ("training motions of garments with dynamics", ((name, "") for name in SWING_TRAIN)),
+        ("training motions of garments with dynamics", ((name, "") for name in DYNAMIC_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
         *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
     )

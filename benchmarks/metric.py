@@ -151,7 +151,7 @@ def skinned(group: SceneRollOuts) -> np.ndarray | None:
     """(T,V,3) [m] the garment skinned to the poses, as the default recipe does; None without a body."""
     if group.scene.dressed is None:
         return None
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.recipe import DEFAULT
 
     dressed = group.scene.dressed

@@ -119,7 +119,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace, asked: Sequence[tuple[Recipe, int]]) -> int:
-    from snug.motion import TRAIN
+    from snug.motion_library import TRAIN
 
     from .presets import find_preset
     from .wardrobe import embedded_motions, open_wardrobe

@@ -13,7 +13,7 @@ from .results import Row, row_to_cells
 from .wardrobe import Wardrobe
 
 if TYPE_CHECKING:
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.trained_model import TrainedModel
 
     from .presets import Preset
@@ -41,8 +41,8 @@ def tried(wardrobe: Wardrobe, tell: Tell, preset: Preset, recipe: Recipe, seed: 
     """Train for about that time, roll out, measure. A training that diverges is a row with its reason."""
     import torch
 
-    from snug.dresser import DressedBody
-    from snug.motion import TRAIN
+    from snug.dressed_body import DressedBody
+    from snug.motion_library import TRAIN
     from snug.train import train
     from snug.training_set import TrainingError
 

@@ -175,7 +175,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
 
 
 def choose_body(path: str | None) -> OwnBody | None:
-    """An own body, once it has been read. Raises snug.body.BodyError for a file that holds none."""
+    """An own body, once it has been read. Raises snug.skeleton.BodyError for a file that holds none."""
     if path is None:
         return None
     from snug.body import Body

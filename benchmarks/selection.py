@@ -155,7 +155,8 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     motions of the library test, and of files alone the first in order of names. A single file tests, and the
     library trains.
     """
-    from snug.motion import LIBRARY, SWING_TEST, SWING_TRAIN, TEST, TRAIN, load_motions
+    from snug.motion_files import load_motions
+    from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, LIBRARY, TEST, TRAIN
 
     files: dict[str, Motion] = {}
     for path in paths:
@@ -179,7 +180,7 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     # Whoever names the test motions means all of them, whatever the size of the preset.
     few, fewer = preset.train_motions, preset.test_motions
     test = test if test_names else test[:fewer]
-    return Motions(train[:few], test, files, SWING_TRAIN[:few], SWING_TEST[:fewer])
+    return Motions(train[:few], test, files, DYNAMIC_TRAIN[:few], DYNAMIC_TEST[:fewer])
 
 
 def names_no_motion(scenes: Sequence[str]) -> bool:

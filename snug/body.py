@@ -13,18 +13,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-JOINT_NAMES = (
-    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle",
-    "right_ankle", "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head",
-    "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hand",
-    "right_hand",
-)  # fmt: skip
+from snug.formats.smpl_body import read_smpl
+from snug.skeleton import JOINT_NAMES, BodyError
+
 BAKED = Path(__file__).parent / "data" / "body.npz"
 _CHUNK = 64  # frames skinned in one matrix product, to bound memory
-
-
-class BodyError(ValueError):
-    """A body file, or an argument for a body, that cannot be used; the message names what and the remedy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +53,6 @@ class Body:
 
         Needs v_template, shapedirs, weights, kintree_table, f; J_regressor, or J_template with J_shapedirs.
         """
-        from snug.formats.smpl_body import read_smpl
-
         return Body(**read_smpl(Path(path)))
 
     @property

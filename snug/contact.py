@@ -1,12 +1,12 @@
-"""Contact planes for training: where each point of a garment may touch the body, remembered and renewed.
+"""Contact planes for training: where each point of a garment may touch the body, cached and queried anew.
 
 The loss needs, for each contact sample x of each frame, a plane (closest body point c, outward normal n), so
 that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So an
-anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the
-frame carry it to a plane in no time. Near the skin it slides to where its sample is now, whenever the energy
-is taken (snug.sliding), and a few frames of each batch search anew from the current prediction, with the
+anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the frame
+carry it to a plane in no time. Near the skin it walks to where its sample is now, whenever the energy is
+taken (snug.surface_walk), and a few frames of each batch search anew from the current prediction, with the
 simulator's own search and its rule of regions. All positions are float32, relative to the pelvis.
-With thousands of frames remembered, an anchor has four bytes, two of them for its face: barycentric
+With thousands of frames cached, an anchor has four bytes, two of them for its face: barycentric
 coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
 """
 
@@ -19,11 +19,10 @@ import numpy as np
 
 from reference_sim.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
-from reference_sim.kernel_cache import njit
-from reference_sim.obstacle import DEFAULT_REGION, vertex_normals
-from snug.sliding import SLACK, beyond_sides, slid
+from reference_sim.obstacle import DEFAULT_REGION
+from snug.contact_kernels import PARTS, byte_normals, contact_energy, interpolated_planes
+from snug.surface_walk import SLACK, triangle_adjacency
 
-PARTS = 255.0  # of a barycentric coordinate
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
 
@@ -32,8 +31,8 @@ class Patch:
     """The part of a body that one garment may touch.
 
     body_vertices (P,) into the whole body; faces (Q, 3) into the patch; rest (P, 3) and centroids (Q, 3) [m]
-    in the T-pose; sample_rest (S, 3) [m] of the garment; beyond (Q, 3), see sliding.beyond_sides; a tree to
-    search the faces with.
+    in the T-pose; sample_rest (S, 3) [m] of the garment; adjacency (Q, 3), see
+    surface_walk.triangle_adjacency; a tree to search the faces with.
     """
 
     body_vertices: np.ndarray
@@ -42,7 +41,7 @@ class Patch:
     centroids: np.ndarray
     sample_rest: np.ndarray
     region: float
-    beyond: np.ndarray
+    adjacency: np.ndarray
     tree: FaceTree
 
     @classmethod
@@ -74,7 +73,7 @@ class Patch:
             centroids=centroids,
             sample_rest=samples.astype(np.float32),
             region=region,
-            beyond=beyond_sides(faces),
+            adjacency=triangle_adjacency(faces),
             tree=FaceTree(faces, centroids),
         )
 
@@ -102,13 +101,13 @@ class Patch:
         """Area-weighted vertex normals: positions (N, P, 3) float32 -> (N, P, 3) int8, 127 times unit length.
 
         A byte is enough (0.3 degrees): planes interpolate them and make the result unit length again. With
-        thousands of frames remembered, memory counts.
+        thousands of frames cached, memory counts.
         """
-        return _byte_normals(positions, self.faces)
+        return byte_normals(positions, self.faces)
 
 
-def kept(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Anchors on a body of so many faces as they are remembered: faces (S,) in as few bytes as hold them,
+def quantised(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Anchors on a body of so many faces as they are cached: faces (S,) in as few bytes as hold them,
     barycentric (S, 2) as uint8 in 1 / PARTS, the two together never more than one.
     """
     parts = np.rint(PARTS * barycentric)
@@ -116,11 +115,13 @@ def kept(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[n
     return faces.astype(np.int16 if body_faces < 2**15 else np.int32), parts.astype(np.uint8)
 
 
-class Anchors:
-    """One anchor per frame and sample, and when each frame's were last searched, or lent."""
+class ContactCache:
+    """One anchor per frame and sample, and the steps since each frame's were last searched or propagated."""
 
     def __init__(self, patch: Patch, frames: int) -> None:
-        faces, barycentric = kept(*patch.search(patch.sample_rest, patch.rest, exact=True), len(patch.faces))
+        faces, barycentric = quantised(
+            *patch.search(patch.sample_rest, patch.rest, exact=True), len(patch.faces)
+        )
         self.patch = patch
         self.faces = np.repeat(faces[None], frames, axis=0)
         self.barycentric = np.repeat(barycentric[None], frames, axis=0)
@@ -135,7 +136,7 @@ class Anchors:
         """
         shape = (len(frames), self.faces.shape[1], 3)
         points, directions = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        _planes(
+        interpolated_planes(
             frames,
             rows,
             positions,
@@ -157,16 +158,16 @@ class Anchors:
         positions: np.ndarray,
         normals: np.ndarray,
         *,
-        slide: bool = False,
+        walk: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Contact energy of garments x (N, V, 3) float32 [m] in frames (N,), with the planes of `planes`.
 
-        -> values (N,) [J], gradients (N, V, 3) [N], float32. slide: anchors near the skin first slide to
+        -> values (N,) [J], gradients (N, V, 3) [N], float32. walk: anchors near the skin first walk to
         where their samples are, and are remembered there. A sample that is out of reach costs no more than
         the look at its anchor, and no plane is stored.
         """
         values, gradients = np.empty(len(x), np.float32), np.zeros_like(x)
-        _energy(
+        contact_energy(
             x,
             *_samples(contact),
             contact.power,
@@ -175,12 +176,12 @@ class Anchors:
             positions,
             normals,
             self.patch.faces.view(np.uint32),
-            self.patch.beyond,
+            self.patch.adjacency,
             self.patch.centroids,
             self.patch.sample_rest,
             np.float32(self.patch.region**2),
             np.float32(SLACK),
-            slide,
+            walk,
             self.faces,
             self.barycentric,
             values,
@@ -188,13 +189,13 @@ class Anchors:
         )
         return values, gradients
 
-    def renew(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:
+    def requery(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame.
 
         exact: no old anchor stands for being roughly right.
         """
         found = self.patch.search(points, positions, self.faces[frame], exact=exact)
-        self.faces[frame], self.barycentric[frame] = kept(*found, len(self.patch.faces))
+        self.faces[frame], self.barycentric[frame] = quantised(*found, len(self.patch.faces))
         self.age[frame] = 0
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
@@ -208,102 +209,3 @@ def _samples(contact: ContactPenalty) -> tuple[np.ndarray, np.ndarray, np.ndarra
     """Stencils, weights, stiffness and margin in the types of the kernel."""
     weights, stiffness = contact.weights.astype(np.float32), contact.stiffness.astype(np.float32)
     return contact.stencils.astype(np.uint32), weights, stiffness, np.float32(contact.margin)
-
-
-@njit(cache=True, error_model="numpy")
-def _byte_normals(positions, faces):
-    normals = np.empty(positions.shape, np.int8)
-    for frame in range(len(positions)):
-        normals[frame] = np.rint(np.float32(127.0) * vertex_normals(positions[frame], faces))
-    return normals
-
-
-@njit(cache=True, inline="always", error_model="numpy")
-def _carried(faces, face, parts, vectors, c):
-    """Component c of what vectors (P, 3) of the body's vertices are at an anchor."""
-    v, w = np.float32(parts[0]) / np.float32(PARTS), np.float32(parts[1]) / np.float32(PARTS)
-    u = np.float32(1.0) - v - w
-    return u * vectors[faces[face, 0], c] + v * vectors[faces[face, 1], c] + w * vectors[faces[face, 2], c]
-
-
-@njit(cache=True, error_model="numpy")
-def _planes(frames, rows, positions, normals, faces, anchor_faces, barycentric, out_points, out_normals):
-    for n in range(len(frames)):
-        x, m = positions[rows[n]], normals[rows[n]]
-        anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
-        for s in range(anchors.shape[0]):
-            length = np.float32(0.0)
-            for c in range(3):
-                out_points[n, s, c] = _carried(faces, anchors[s], parts[s], x, c)
-                direction = _carried(faces, anchors[s], parts[s], m, c)
-                out_normals[n, s, c] = direction
-                length += direction * direction
-            length = np.sqrt(length) + np.float32(1e-30)
-            for c in range(3):
-                out_normals[n, s, c] /= length
-
-
-@njit(cache=True, inline="always", error_model="numpy")
-def _above(x0, x1, x2, skin, m, faces, face, parts):
-    """Height of a sample above its anchor's plane, times the length of the normal; and that normal."""
-    i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-    whole = np.float32(1.0) / np.float32(PARTS)
-    v, w = whole * np.float32(parts[0]), whole * np.float32(parts[1])
-    u = np.float32(1.0) - v - w
-    x0 -= u * skin[i, 0] + v * skin[j, 0] + w * skin[k, 0]
-    x1 -= u * skin[i, 1] + v * skin[j, 1] + w * skin[k, 1]
-    x2 -= u * skin[i, 2] + v * skin[j, 2] + w * skin[k, 2]
-    n0 = u * m[i, 0] + v * m[j, 0] + w * m[k, 0]
-    n1 = u * m[i, 1] + v * m[j, 1] + w * m[k, 1]
-    n2 = u * m[i, 2] + v * m[j, 2] + w * m[k, 2]
-    return n0 * x0 + n1 * x1 + n2 * x2, n0, n1, n2
-
-
-# No assumption on NaN or infinity: the guard of training must see them.
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
-def _energy(
-    x, stencils, weights, stiffness, margin, power, frames, rows, positions, normals, faces, beyond,
-    centroids, homes, region, slack, slide, anchor_faces, barycentric, values, gradients,
-):  # fmt: skip
-    """k max(margin - d, 0)^power of each sample, summed: values (N,), and added up: gradients (N, V, 3).
-
-    stencils, faces: uint32, for a signed index is first asked whether it counts from the end.
-    """
-    # Normals have 127 times unit length, within 0.9 by rounding.
-    reach = np.float32(128.0) * (margin + slack if slide else margin)
-    zero, corners = np.float32(0.0), np.empty((1, 3, 3), np.float32)
-    for n in range(len(x)):
-        garment, gradient, skin, m = x[n], gradients[n], positions[rows[n]], normals[rows[n]]
-        anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
-        total = 0.0
-        for s in range(len(stencils)):
-            face = np.uint32(anchors[s])
-            a, b, c = stencils[s, 0], stencils[s, 1], stencils[s, 2]
-            p, q, r = weights[s, 0], weights[s, 1], weights[s, 2]
-            x0 = p * garment[a, 0] + q * garment[b, 0] + r * garment[c, 0]
-            x1 = p * garment[a, 1] + q * garment[b, 1] + r * garment[c, 1]
-            x2 = p * garment[a, 2] + q * garment[b, 2] + r * garment[c, 2]
-            along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, face, parts[s])
-            if along >= reach:
-                continue
-            if slide and along < reach:  # not a sample that is no number
-                face, v, w = slid(x0, x1, x2, face, skin, faces, beyond, centroids, homes[s], region, corners)
-                anchors[s] = face
-                parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))
-                third = np.rint(np.float32(PARTS) * w)
-                parts[s, 1] = np.uint8(min(third, np.float32(PARTS) - np.float32(parts[s, 0])))
-                along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, np.uint32(anchors[s]), parts[s])
-            length = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + np.float32(1e-30)
-            depth = margin - along / length
-            if depth <= zero:
-                continue
-            force = stiffness[s]
-            for _ in range(power - 1):
-                force *= depth
-            total += force * depth
-            force *= -np.float32(power) / length
-            for corner, share in ((a, p), (b, q), (c, r)):
-                gradient[corner, 0] += share * force * n0
-                gradient[corner, 1] += share * force * n1
-                gradient[corner, 2] += share * force * n2
-        values[n] = total

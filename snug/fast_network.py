@@ -101,7 +101,14 @@ def _back_in_time(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tupl
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _cell_back(back, y, gates, before, to_inputs, to_recurrent):
+def _cell_back(
+    back: np.ndarray,
+    y: np.ndarray,
+    gates: np.ndarray,
+    before: np.ndarray,
+    to_inputs: np.ndarray,
+    to_recurrent: np.ndarray,
+) -> None:
     """One frame of a layer: back (N, H), the gradient of h' that comes from later frames, becomes what passes
     to h through z alone.
     """

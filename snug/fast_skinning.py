@@ -43,7 +43,7 @@ def _frames(x: Tensor) -> np.ndarray:
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _posed(points, blended, out):
+def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
     for n in range(len(points)):
         p, b, q = points[n], blended[n], out[n]
         for v in range(len(p)):
@@ -53,7 +53,7 @@ def _posed(points, blended, out):
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _turned_back(above, blended, out):
+def _turned_back(above: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
     """Gradients by the points: the transpose of each rotation part."""
     for n in range(len(above)):
         g, b, q = above[n], blended[n], out[n]

@@ -11,12 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
+from snug.body import Body
+from snug.garment_mesh import mesh_garment
 from snug.remeshing import boundary_loops
-from snug.sewing import sew
-from snug.tailoring import TORSO_BONES, Cut, Form, build_form, dominated_by, joint
+from snug.tailoring import TORSO_BONES, CutPlane, ImplicitSurface, build_surface, dominated_by, joint
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+TSHIRT = "tshirt"  # the garment that a command takes where none is named
 
 # What a shirt may borrow weights from: never hands, head or shins, even where they come near.
 SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
@@ -56,7 +59,7 @@ class Garment:
         """Vertices (n,) of the hem, in order."""
         return self.loops["hem"]
 
-    def carried(self, body, poses: Array, translations: Array) -> Array:
+    def body_transported(self, body: Body, poses: Array, translations: Array) -> Array:
         """Where the pins are (T,P,3) [m] on the body in poses (T,24,3) [rad] at translations (T,3) [m]."""
         if not len(self.pins):
             return np.empty((len(poses), 0, 3))  # and torch, which poses the joints, is not loaded
@@ -65,7 +68,7 @@ class Garment:
         turned = np.einsum("tpab,pb->tpa", blended[..., :3], self.rest_positions[self.pins])
         return turned + blended[..., 3]
 
-    def rest_for(self, body, betas: ArrayLike | None) -> Array:
+    def rest_for(self, body: Body, betas: ArrayLike | None) -> Array:
         """Rest positions (V,3) [m] on the body of shape `betas`: each vertex moves as the skin below it does.
 
         The displacement of the nearest body vertex, smoothed over the garment.
@@ -100,14 +103,14 @@ def _adjacency(faces: Index, count: int) -> csr_array:
     return coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count)).tocsr()
 
 
-def nearest_body_vertices(body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
+def nearest_body_vertices(body: Body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
     """Nearest template vertex (V,), of those that follow one of `bones`, to each position (V,3) [m]."""
     allowed = np.flatnonzero(dominated_by(body, bones))
     return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
 
 
 def tailor_tshirt(
-    body,
+    body: Body,
     *,
     vertices: int = 1000,
     ease: float = 0.06,
@@ -123,11 +126,11 @@ def tailor_tshirt(
     Raises GarmentError for a parameter out of range, or a body on which no sound mesh comes out.
     """
     cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length}
-    return _shirt("tshirt", body, vertices, cut)
+    return _shirt(TSHIRT, body, vertices, cut)
 
 
 def tailor_tunic(
-    body,
+    body: Body,
     *,
     vertices: int = 1000,
     ease: float = 0.06,
@@ -145,7 +148,7 @@ def tailor_tunic(
 
 
 def tailor_skirt(
-    body,
+    body: Body,
     *,
     vertices: int = 1000,
     ease: float = 0.04,
@@ -165,17 +168,17 @@ def tailor_skirt(
     hip = joint(body, "left_hip")[1]
     hem, top = hip - length, hip + rise
     cuts = [
-        Cut("seam", (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-        Cut("hem", (0.0, -1.0, 0.0), (0.0, hem, 0.0)),
-        Cut("waist", (0.0, 1.0, 0.0), (0.0, top, 0.0)),
+        CutPlane("seam", (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        CutPlane("hem", (0.0, -1.0, 0.0), (0.0, hem, 0.0)),
+        CutPlane("waist", (0.0, 1.0, 0.0), (0.0, top, 0.0)),
     ]
-    form = build_form(body, hem=hem, top=top, ease=ease, clearance=clearance, flare=flare)
+    surface = build_surface(body, hem=hem, top=top, ease=ease, clearance=clearance, flare=flare)
     smoothing = round(SKIRT_SMOOTHING * vertices / 1000)
-    return _tailored("skirt", body, vertices, cut, form, cuts, SKIRT_BONES, smoothing)
+    return _tailored("skirt", body, vertices, cut, surface, cuts, SKIRT_BONES, smoothing)
 
 
 @dataclass(frozen=True)
-class Pattern:
+class GarmentTemplate:
     """A sort of garment: its name, what it is in words, and who tailors it for (body, vertices=...)."""
 
     name: str
@@ -183,19 +186,19 @@ class Pattern:
     tailor: Callable[..., Garment]
 
 
-PATTERNS = (
-    Pattern("tshirt", "T-shirt", tailor_tshirt),
-    Pattern("tunic", "flared tunic", tailor_tunic),
-    Pattern("skirt", "flared skirt", tailor_skirt),
+GARMENT_TEMPLATES = (
+    GarmentTemplate(TSHIRT, "T-shirt", tailor_tshirt),
+    GarmentTemplate("tunic", "flared tunic", tailor_tunic),
+    GarmentTemplate("skirt", "flared skirt", tailor_skirt),
 )
 
 
-def find_pattern(name: str) -> Pattern:
-    """The pattern of that name. Raises GarmentError naming the known ones."""
-    for pattern in PATTERNS:
-        if pattern.name == name:
-            return pattern
-    raise GarmentError(f"unknown garment {name!r}: use one of {', '.join(p.name for p in PATTERNS)}")
+def find_template(name: str) -> GarmentTemplate:
+    """The template of that name. Raises GarmentError naming the known ones."""
+    for template in GARMENT_TEMPLATES:
+        if template.name == name:
+            return template
+    raise GarmentError(f"unknown garment {name!r}: use one of {', '.join(p.name for p in GARMENT_TEMPLATES)}")
 
 
 # Parameter: least and largest value, unit.
@@ -220,7 +223,7 @@ def _demand_in_range(name: str, parameters: Mapping[str, float]) -> None:
             )
 
 
-def _shirt(name: str, body, vertices: int, cut: Mapping[str, float]) -> Garment:
+def _shirt(name: str, body: Body, vertices: int, cut: Mapping[str, float]) -> Garment:
     """A garment with two sleeves, a neck and a hem."""
     _demand_in_range(name, {"vertices": vertices, **cut})
     shoulder, elbow = joint(body, "left_shoulder"), joint(body, "left_elbow")
@@ -229,25 +232,25 @@ def _shirt(name: str, body, vertices: int, cut: Mapping[str, float]) -> Garment:
     neck = joint(body, "neck")
     # A crew neck: at the neck's joint on the shoulders, bent down in front and a little behind.
     cuts = [
-        Cut("seam", (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-        Cut("hem", (0.0, -1.0, 0.0), (0.0, hem, 0.0)),
-        Cut("left_sleeve", (1.0, 0.0, 0.0), (cuff, 0.0, 0.0)),
-        Cut("neck", (0.0, 1.0, 0.3), (0.0, neck[1], neck[2]), reach=0.85 * shoulder[0], bend=3.0),
+        CutPlane("seam", (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        CutPlane("hem", (0.0, -1.0, 0.0), (0.0, hem, 0.0)),
+        CutPlane("left_sleeve", (1.0, 0.0, 0.0), (cuff, 0.0, 0.0)),
+        CutPlane("neck", (0.0, 1.0, 0.3), (0.0, neck[1], neck[2]), reach=0.85 * shoulder[0], bend=3.0),
     ]
-    form = build_form(
+    surface = build_surface(
         body, hem=hem, cuff=cuff, top=neck[1] + 0.04, ease=cut["ease"], clearance=cut["clearance"],
         flare=cut.get("flare", 0.0),
     )  # fmt: skip
-    return _tailored(name, body, vertices, cut, form, cuts, SHIRT_BONES)
+    return _tailored(name, body, vertices, cut, surface, cuts, SHIRT_BONES)
 
 
 def _tailored(
-    name: str, body, vertices: int, cut: Mapping[str, float], form: Form, cuts: list[Cut],
-    bones: Sequence[str], smoothing: int = 0,
+    name: str, body: Body, vertices: int, cut: Mapping[str, float], surface: ImplicitSurface,
+    cuts: list[CutPlane], bones: Sequence[str], smoothing: int = 0,
 ) -> Garment:  # fmt: skip
-    """The garment sewn from a form and its cuts, whose weights come from those bones, smoothed."""
+    """The garment sewn from a surface and its cuts, whose weights come from those bones, smoothed."""
     try:
-        positions, faces = sew(body, form, cuts, vertices, cut["clearance"])
+        positions, faces = mesh_garment(body, surface, cuts, vertices, cut["clearance"])
     except ValueError as error:
         raise GarmentError(f"{name}: {error}") from error
     loops = _named_loops(positions, faces)

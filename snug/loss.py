@@ -9,9 +9,10 @@ three holds three static terms and one inertia. Its gradient reaches all three f
 `detached`, the last alone.
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
-kernels (snug.lanes, or those beside the definition) give the same values and gradients in a small part of
-the time, so autograd is told to use those. On a GPU the definitions run as they are.
-The contact planes are the one difference: training keeps an anchor for each sample, which slides along, and
+kernels (snug.batched_kernels, or those beside the definition) give the same values and gradients in a small
+part of the time, so autograd uses those. On a GPU the definitions run as they are, and on a CPU that of an
+energy that has no kernel. A recipe may name any energy of the simulator (snug.trainable_energies).
+The contact planes are the one difference: training keeps an anchor for each sample, which walks along, and
 takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the
 closest point.
 """
@@ -19,7 +20,7 @@ closest point.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,23 +38,29 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from snug.baselines.springs import SquaredContact, spring_terms
+from snug.batched_kernels import KERNELS, batched_kernel
 from snug.device import CPU
-from snug.lanes import lane_kernel
-from snug.recipe import Recipe
+from snug.recipe import TERMS, Recipe
+from snug.trainable_energies import find_energy
 
 STATIC = ("strain", "bending", "gravity")
 Planes = tuple[Any, Any] | Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
+# What the terms STATIC are of each material.
+MATERIALS: dict[str, Callable[[Cloth], Sequence[Energy]]] = {
+    "stvk": lambda cloth: (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
+    "springs": lambda cloth: (StretchSpring(cloth), BendHinge(cloth), Gravity(cloth)),
+    "pbns": spring_terms,
+}
+
 
 def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
-    """The recipe's terms of single frames without contact, by place in the loss; others are not made."""
-    terms: tuple[Energy, Energy, Energy]
-    if recipe.material == "pbns":
-        terms = spring_terms(cloth)
-    else:
-        membrane = StretchSpring(cloth) if recipe.material == "springs" else StretchStVK(cloth)
-        terms = (membrane, BendHinge(cloth), Gravity(cloth))
-    return {name: term for name, term in zip(STATIC, terms) if name in recipe.terms}
+    """The recipe's terms of single frames without contact, by name: those of its material, then any other
+    energy of the simulator that it names.
+    """
+    of_material = dict(zip(STATIC, MATERIALS[recipe.material](cloth)))
+    terms = {name: of_material[name] for name in STATIC if name in recipe.terms}
+    return terms | {name: find_energy(name)(cloth) for name in recipe.terms if name not in TERMS}
 
 
 def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
@@ -80,7 +87,7 @@ class ClosedForm(torch.autograd.Function):
         flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
         together = energy if callable(energy) else None
         if together is None and flat.dtype == np.float32 and not frame_data:
-            together = lane_kernel(energy)
+            together = batched_kernel(energy)
         if together is not None:
             values, gradients = together(flat)
         else:
@@ -130,7 +137,12 @@ def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Te
     return energy.energy(x, *frame_data).sum(-1)
 
 
-def held_on(energy: Any, device: torch.device) -> Any:
+def has_kernel(energy: Energy) -> bool:
+    """Whether its gradient is known in closed form; automatic differentiation gives that of the others."""
+    return type(energy) in KERNELS or type(energy).value_and_gradient is not Energy.value_and_gradient
+
+
+def on_device(energy: Any, device: torch.device) -> Any:
     """The same energy with its arrays as tensors on a device: evaluating its definition copies nothing."""
     twin = copy.copy(energy)
     for name, value in vars(energy).items():
@@ -143,7 +155,8 @@ def held_on(energy: Any, device: torch.device) -> Any:
 class PhysicsLoss:
     """Energies of sub-sequences, by term. dt: seconds between frames [s].
 
-    kernels: by closed forms on a CPU (in numpy and numba), else by the definitions on `device`.
+    kernels: by closed forms on a CPU (in numpy and numba) where there are any, else by the definitions on
+    `device`.
     """
 
     def __init__(
@@ -155,8 +168,11 @@ class PhysicsLoss:
         self.static = static_terms(cloth, recipe)
         self._contact = self.contact
         if not kernels:
-            self.inertia, self._contact = held_on(self.inertia, device), held_on(self.contact, device)
-            self.static = {name: held_on(term, device) for name, term in self.static.items()}
+            self.inertia, self._contact = on_device(self.inertia, device), on_device(self.contact, device)
+        self.static = {
+            name: term if kernels and has_kernel(term) else on_device(term, device)
+            for name, term in self.static.items()
+        }
 
     def __call__(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Tensor]:
         """Joules of each window and frame, term -> (N, T).
@@ -166,7 +182,10 @@ class PhysicsLoss:
         planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors; or a
         kernel that knows its planes: x (N T, V, 3) -> values (N T,) [J], gradients (N T, V, 3) [N].
         """
-        terms = {name: summed(energy, x, kernels=self.kernels) for name, energy in self.static.items()}
+        terms = {
+            name: summed(energy, x, kernels=self.kernels and has_kernel(energy))
+            for name, energy in self.static.items()
+        }
         if "inertia" in self.terms and x.shape[1] >= 3:
             terms["inertia"] = self._inertia(x, ahead)
         if "collision" in self.terms and planes is not None:

@@ -1,32 +1,17 @@
-"""Motions: joint rotations and root translations over time, from the embedded library or from a file.
+"""Motions: joint rotations and root translations over time, and what is done to one.
 
 A motion follows the convention of `snug.body.Body`: rotation of each joint relative to its parent as
 axis-angle, joint 0 at its rest position plus the translation, y up, facing +z at first, standing at
-translation zero. Only numpy is loaded here, so that names can be listed quickly.
+translation zero. They come from `snug.motion_library` or `snug.motion_files`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices, sole_points
-
-TRAIN: tuple[str, ...] = (
-    "walk", "brisk_walk", "run", "jump", "jumping_jack", "squat", "arm_raise", "arm_circle", "torso_twist",
-    "side_bend", "turn", "sidestep", "bow", "lunge",
-)  # fmt: skip
-# None of these kinds of motion occurs in TRAIN.
-TEST: tuple[str, ...] = ("sudden_stop", "kick", "punch", "spin_jump")
-# Motions that stop within one frame, for garments that swing; SWING_TEST is seen by no training.
-SWING_TRAIN: tuple[str, ...] = (
-    "twist_1", "twist_2", "twist_3", "twist_4", "twist_5", "twist_6", "turntable_1", "turntable_2",
-    "turntable_3", "turning_walk_1", "turning_walk_2", "turning_walk_3", "turning_walk_4",
-)  # fmt: skip
-SWING_TEST: tuple[str, ...] = ("twist_stop", "turning_stop")
-LIBRARY = TRAIN + TEST + SWING_TRAIN + SWING_TEST
 
 # Upper arm to the spine's direction: on the default body this leaves about 2 cm between arm and chest.
 ARMS_CLEAR = np.deg2rad(25.0)
@@ -79,52 +64,6 @@ class Motion:
     def cut(self, start: int, stop: int) -> Motion:
         """Frames start to stop - 1. Raises MotionError when nothing is left."""
         return replace(self, poses=self.poses[start:stop], translations=self.translations[start:stop])
-
-
-def make_motion(name: str) -> Motion:
-    """A motion of the embedded library at 30 fps, arms already spread clear of the torso.
-
-    Deterministic. Raises MotionError for a name that is not in LIBRARY.
-    """
-    if name not in LIBRARY:
-        raise MotionError(f"unknown motion '{name}'; the library has: {', '.join(LIBRARY)}")
-    from snug.motions import build
-
-    return build(name)
-
-
-def load_motions(path: str | Path, *, spread_degrees: float | None = None, fps: float = 30.0) -> list[Motion]:
-    """Motions from a .amc or .npz file, or from every such file of a folder, in the order of their names.
-
-    Each comes back whole, at `fps`, placed on the floor at the origin facing +z, with the arms spread by
-    `spread_degrees` (0: as recorded; None: as far as clear_arms finds needed). CMU files (.amc) need their
-    skeleton (.asf) beside them.
-    Raises MotionError, one line with file, line and remedy, for anything that cannot be read.
-    """
-    path = Path(path)
-    if not path.exists():
-        raise MotionError(f"{path}: no such file or folder; give an .amc or .npz file, or a folder of them")
-    files = [path]
-    if path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.suffix.lower() in (".amc", ".npz"))
-    if not files:
-        raise MotionError(f"{path}: holds no .amc and no .npz file; give a folder of motion capture clips")
-    clips = [resample(place(_read(file)), fps) for file in files]
-    if spread_degrees is None:
-        return [clear_arms(clip) for clip in clips]
-    return [spread_arms(clip, spread_degrees) for clip in clips]
-
-
-def _read(file: Path) -> Motion:
-    from snug.formats import READERS
-
-    reader = READERS.get(file.suffix.lower())
-    if reader is None:
-        remedy = " Give the .amc clips that belong to it." if file.suffix.lower() == ".asf" else ""
-        raise MotionError(
-            f"{file}: unknown kind of file; motions are read from {', '.join(READERS)}.{remedy}"
-        )
-    return reader(file)
 
 
 def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:

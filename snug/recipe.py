@@ -2,12 +2,13 @@
 
 Recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text but for its
 contact (below), the ablations are the default with one thing changed. None holds a balancing weight between
-the energies: there is none (`swing` of `dynamic` weighs what a simulation tells). Imports nothing heavy, so
-that a command can list recipes without loading torch.
+the energies: there is none (`pca_dynamics` of `dynamic` weighs what a simulation teaches). Imports nothing
+heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
@@ -35,7 +36,7 @@ class Recipe:
     weight_decay: share, times the rate, taken off each weight in a step (AdamW, Loshchilov and Hutter 2019).
     h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
     remembered: that noise is added to the state which the network last had after the frame before (see
-        snug.state_memory), instead of to nothing. Not for what learns simulated vertices, nor where
+        snug.hidden_state_cache), instead of to nothing. Not for what learns simulated vertices, nor where
         `shape_range` gives a sub-sequence another body each time; of little use where `window_stride` is no
         divisor of `window`, for then few frames before a window ever end one.
     window, batch: frames of a sub-sequence, sub-sequences of a step.
@@ -46,18 +47,20 @@ class Recipe:
     contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
     contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most one
-        of each window; in between anchors slide with the cloth.
-    mixed: frames of mixed motions (snug.mixing) for each frame of a training motion, up to 20,000; not for
-        what learns simulated vertices. mixed_turn [rad], mixed_lift: see there.
-    terms: energies in the loss; leaving one out is an ablation, and it is then never evaluated.
+        of each window; in between anchors walk with the cloth.
+    mixed: frames of mixed motions (snug.motion_augmentation) for each frame of a training motion, up to
+        20,000; not for what learns simulated vertices. mixed_turn [rad], mixed_lift: see there.
+    terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
+        snug.trainable_energies. Leaving one out is an ablation, and it is then never evaluated.
     material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
         (edges, hinges, uniform mass and squared contact of PBNS, see snug.baselines.springs; it has its own
         stiffness and margin of contact).
     detached: previous frames are given to inertia, not moved by it: without it a network makes its past agree
         with a still present instead of learning to move.
-    swing, swing_components, rehearsal: see snug.swing; of no account where no simulation teaches.
+    pca_dynamics, pca_components, pretraining: weight, number of components and updates, see
+        snug.pca_dynamics; of no account where no simulation teaches.
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped; what
-        else the guard does about such batches: see snug.guard.
+        else is done about such batches: see snug.divergence_guard.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
     """
 
@@ -88,9 +91,9 @@ class Recipe:
     terms: tuple[str, ...] = TERMS
     material: str = "stvk"
     detached: bool = False
-    swing: float = 0.0
-    swing_components: int = 16
-    rehearsal: int = 300
+    pca_dynamics: float = 0.0
+    pca_components: int = 16
+    pretraining: int = 300
     spike: float = 2.0
     gradient_limit: float = 1.0
 
@@ -104,18 +107,16 @@ class Recipe:
         ):
             if getattr(self, option) not in allowed:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
-        unknown = [term for term in self.terms if term not in TERMS]
-        if unknown:
-            raise RecipeError(f"recipe option terms: unknown energy {unknown[0]!r}; known are {TERMS}")
+        self._demand_known(term for term in self.terms if term not in TERMS)
         if min(self.window, self.batch, self.window_stride, self.even) < 1:
             raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
         if "inertia" in self.terms and self.window < 3:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
-        if self.swing_components < 1:
-            raise RecipeError(f"recipe option swing_components={self.swing_components}: use at least 1")
-        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "swing", "rehearsal")
+        if self.pca_components < 1:
+            raise RecipeError(f"recipe option pca_components={self.pca_components}: use at least 1")
+        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pca_dynamics", "pretraining")
         for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
@@ -124,6 +125,18 @@ class Recipe:
         for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
+
+    @staticmethod
+    def _demand_known(terms: Iterable[str]) -> None:
+        """Raises RecipeError for what is no energy of the simulator that can be trained on."""
+        for term in terms:
+            from snug.trainable_energies import find_energy
+
+            try:
+                find_energy(term)
+            except ValueError as error:
+                here = ", ".join(TERMS)
+                raise RecipeError(f"recipe option terms: {error}; the recipes here have {here}") from error
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for a model file or run.json."""
@@ -140,7 +153,7 @@ class Recipe:
 
 
 DEFAULT = Recipe()
-# Three things are not the text's: d(x) is taken to remembered points of the skin, which slide with the cloth
+# Three things are not the text's: d(x) is taken to cached points of the skin, which walk with the cloth
 # and of which `contact_refresh` searches a few anew in a step (the text computes it anew; searching all 48
 # frames would take several times as long as the rest of a step); only to skin that the rule of regions
 # allows; and the garment that the offsets are added to follows the shape of the body.
@@ -194,7 +207,7 @@ TAILORNET = replace(
 )
 PBNS_SPRINGS = replace(DEFAULT, name="pbns-springs", material="pbns", contact_samples="vertices")
 
-# Mixed motions cost it swing. The swing begins at joules, so the guard is told to expect them.
+# Mixed motions cost it dynamics. The energy of the components begins at joules, which are no divergence.
 DYNAMIC = replace(
     DEFAULT,
     name="dynamic",
@@ -204,7 +217,7 @@ DYNAMIC = replace(
     remembered=False,
     mixed=0.0,
     detached=True,
-    swing=0.3,
+    pca_dynamics=0.3,
     spike=20.0,
 )
 

@@ -2,10 +2,11 @@
 
 pyacvd's clusters give the number of vertices that was asked for, but a ragged rim. So rim vertices are spread
 evenly along the cut lines of the dense sheet, and the inner ones move towards a weighted mean of the
-triangles around them, kept on the form, between Delaunay flips.
+triangles around them, kept on the surface, between Delaunay flips.
 """
 
 import warnings
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Projection = Callable[[Array], Array]  # points (N,3) [m] onto a surface
 
 # Triangles pull with their area to this power. Power 1 (Lloyd's iteration) left areas of 0.45 to 2.0 of the
 # mean at 2000 to 8000 vertices, power 3 leaves 0.52 to 1.9; it needs the short step, a full one oscillates.
@@ -121,7 +123,7 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
 
 
 def relax(
-    points: Array, faces: Index, held: NDArray[np.bool_], project, *, rounds: int = 40
+    points: Array, faces: Index, held: NDArray[np.bool_], project: Projection, *, rounds: int = 40
 ) -> tuple[Array, Index]:
     """Even triangles by moving vertices towards larger triangles and by flips; `held` (V,) vertices stay.
 
@@ -193,7 +195,7 @@ def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
 
 
 def remesh(
-    points: Array, faces: Index, outlines: list[list[Array]], count: int, project
+    points: Array, faces: Index, outlines: list[list[Array]], count: int, project: Projection
 ) -> tuple[Array, Index]:
     """Even mesh of about `count` vertices of a sheet whose boundary loops are the `outlines`.
 

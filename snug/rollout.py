@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -11,12 +10,12 @@ import torch
 from torch import Tensor
 
 from reference_sim.trajectory import Trajectory
-from snug.dresser import DressedBody
+from snug.dressed_body import DressedBody
 from snug.skinning import skin
 from snug.trained_model import TrainedModel, find_kind
 
-WARM_UP = 10  # frames run and thrown away before the clock starts
-HELD_FRAMES = 30  # frames for which a pose is held before its output counts as static
+WARM_UP = 10  # frames run and thrown away, before whoever times the rest starts a clock
+QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
 
 
 class RollOutError(ValueError):
@@ -29,22 +28,21 @@ def roll_out(
     motion: Any,
     betas: np.ndarray | None = None,
     *,
-    held_pose: bool = False,
+    quasi_static: bool = False,
 ) -> Trajectory:
     """Positions (T, V, 3) [m], world, float64; the state starts at zero and is carried from frame to frame.
 
-    frame_seconds holds the wall time of each frame: network and skinning, nothing else (inputs and joint
-    transforms are ready before; every method needs those). held_pose gives instead, for each frame, the
-    output after that pose was held still for a second: what the network thinks is static. It is not timed
-    (NaN). Raises RollOutError.
+    Inputs and joint transforms are ready before the first frame; every method needs those. quasi_static gives
+    instead, for each frame, the output after that pose was held still for a second: what the network thinks
+    is static. Nothing is timed here (frame_seconds is NaN): see `predictions`. Raises RollOutError.
     """
-    if not held_pose:
+    if not quasi_static:
         return ready_to_roll_out(model, dressed, motion, betas)()
     features = _features(model, dressed, motion, betas, still=True)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
-    posed = _held(model, features, rest, weights, dressed.transforms(motion.poses, betas))
+    posed = _quasi_static(model, features, rest, weights, dressed.transforms(motion.poses, betas))
     origins = dressed.pelvis(motion, betas)
-    return _trajectory(model, dressed, motion, posed, origins, np.full(len(posed), np.nan))
+    return _trajectory(model, dressed, motion, posed, origins)
 
 
 def ready_to_roll_out(
@@ -60,13 +58,10 @@ def ready_to_roll_out(
     frames = _one_by_one(model, features, rest, weights, transforms)
 
     def run() -> Trajectory:
-        posed, seconds = np.empty((len(features), *rest.shape), np.float32), np.empty(len(features))
-        for frame in range(len(features)):
-            start = time.perf_counter()
-            vertices = next(frames)
-            seconds[frame] = time.perf_counter() - start
+        posed = np.empty((len(features), *rest.shape), np.float32)
+        for frame, vertices in enumerate(frames):
             posed[frame] = vertices.numpy()
-        return _trajectory(model, dressed, motion, posed, origins, seconds)
+        return _trajectory(model, dressed, motion, posed, origins)
 
     return run
 
@@ -95,9 +90,8 @@ def ready_for_many(
 
 
 def _trajectory(
-    model: TrainedModel, dressed: DressedBody, motion: Any, posed: np.ndarray, origins: np.ndarray,
-    seconds: np.ndarray,
-) -> Trajectory:  # fmt: skip
+    model: TrainedModel, dressed: DressedBody, motion: Any, posed: np.ndarray, origins: np.ndarray
+) -> Trajectory:
     """Vertices posed about the pelvis (T, V, 3), brought to where it is in each frame (T, 3)."""
     positions = posed.astype(np.float64) + origins[:, None]
     finite = bool(np.isfinite(positions).all())
@@ -105,7 +99,7 @@ def _trajectory(
         positions=positions,
         faces=np.asarray(dressed.garment.faces),
         times=np.arange(len(positions)) / motion.fps,
-        frame_seconds=seconds,
+        frame_seconds=np.full(len(positions), np.nan),
         status="ok" if finite else "diverged",
         reason="" if finite else "the network gave a position that is not finite",
         provenance={
@@ -188,11 +182,11 @@ def _one_by_one(
 
 
 @torch.inference_mode()
-def _held(
+def _quasi_static(
     model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
 ) -> np.ndarray:
     """All frames as a batch, each pose repeated."""
     state = None
-    for _ in range(HELD_FRAMES if find_kind(model.kind).sequences else 1):
+    for _ in range(QUASI_STATIC_FRAMES if find_kind(model.kind).sequences else 1):
         offsets, state = model.network(features[:, None], state)
     return skin(rest + offsets[:, 0], weights, transforms).numpy()

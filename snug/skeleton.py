@@ -9,8 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from snug.body import JOINT_NAMES
-
+JOINT_NAMES = (
+    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle",
+    "right_ankle", "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head",
+    "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hand",
+    "right_hand",
+)  # fmt: skip
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21)
 JOINT = {name: index for index, name in enumerate(JOINT_NAMES)}
 
@@ -36,6 +40,10 @@ _SOLE = (
     ("left_foot", (0.17, 0.0, 0.19)),
 )
 LEG_LENGTH = 0.81  # [m] thigh plus shank of REST_JOINTS
+
+
+class BodyError(ValueError):
+    """A body file, or an argument for a body, that cannot be used; the message names what and the remedy."""
 
 
 def rotation_matrices(axis_angles: np.ndarray) -> np.ndarray:

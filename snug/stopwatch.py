@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import torch
 
-PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "optimiser", "renewal")
+PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "optimiser", "requery")
 
 WATCHED = 10
 

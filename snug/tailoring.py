@@ -1,7 +1,7 @@
-"""The form a garment is cut from: a smooth solid around the body, as a signed field on a grid.
+"""The implicit surface a garment is cut from: a smooth solid around the body, as a signed field on a grid.
 
 A shirt that followed the skin would be pressed into the waist and between the legs, where cloth never goes.
-So the form is a union of three solids, each grown by its own distance:
+So the solid is a union of three solids, each grown by its own distance:
 
 - the body itself, by `clearance` (this shapes shoulders and neck);
 - the torso, one convex section per height, which below the armpits never narrows again on the way down:
@@ -15,6 +15,7 @@ e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. On
 the other half is its mirror image, so the garment is exactly symmetric.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,30 +23,32 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from snug.body import Body
 from snug.remeshing import boundary_loops
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
-SPACING = 0.012  # [m] grid of the form: finer than any cloth edge that the tests ask for
+SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
 DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
 TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
 ARM_BONES = ("left_shoulder", "left_elbow")
 
 
-def dominated_by(body, names) -> NDArray[np.bool_]:
+def dominated_by(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
     """Which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
     wanted = [body.joint_names.index(name) for name in names]
     return np.isin(np.argmax(body.skinning_weights, axis=1), wanted)
 
 
-def joint(body, name) -> Array:
+def joint(body: Body, name: str) -> Array:
     """Rest position (3,) [m] of the joint called `name`."""
     return np.asarray(body.joint_template, dtype=np.float64)[body.joint_names.index(name)]
 
 
 @dataclass(frozen=True)
-class Form:
+class ImplicitSurface:
     """Signed field, negative inside, on a grid over x >= 0 (three more planes beyond, mirrored).
 
     origin: (3,) [m] of the first node; spacing [m]; values: (nx, ny, nz) [m], close to a distance near zero.
@@ -83,9 +86,7 @@ def _smooth_minimum(a: Array, b: Array, reach: float) -> Array:
     return np.minimum(a, b) - overlap * overlap / (4.0 * reach)
 
 
-def _section_support(
-    points: Array, edges: NDArray[np.int64], levels: Array, axis: int, normals: Array
-) -> Array:
+def _section_support(points: Array, edges: Index, levels: Array, axis: int, normals: Array) -> Array:
     """Support function (L,K) of the body's sections at `levels` along `axis`; -inf where there is none."""
     others = [i for i in range(3) if i != axis]
     start, end = points[edges[:, 0]], points[edges[:, 1]]
@@ -120,7 +121,10 @@ def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
     return np.stack([(height - row).max(axis=1) - grown for row, grown in zip(support, growth, strict=True)])
 
 
-def _torso(body, edges, points, nodes, levels, ease, flare, clearance, normals) -> Array:
+def _torso(
+    body: Body, edges: Index, points: Array, nodes: Sequence[Array], levels: tuple[float, float, float],
+    ease: float, flare: float, clearance: float, normals: Array,
+) -> Array:  # fmt: skip
     """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m]."""
     x, y, z = nodes
     support = _filled(_section_support(points, edges, y, 1, normals))
@@ -140,7 +144,10 @@ def _torso(body, edges, points, nodes, levels, ease, flare, clearance, normals) 
     return np.maximum(field, (y - joint(body, "left_shoulder")[1])[None, :, None])
 
 
-def _sleeve(body, edges, points, nodes, cuff, ease, clearance, normals) -> Array:
+def _sleeve(
+    body: Body, edges: Index, points: Array, nodes: Sequence[Array], cuff: float, ease: float,
+    clearance: float, normals: Array,
+) -> Array:  # fmt: skip
     """Field (nx,ny,nz) of the left sleeve."""
     x, y, z = nodes
     shoulder = joint(body, "left_shoulder")[0]
@@ -152,11 +159,11 @@ def _sleeve(body, edges, points, nodes, cuff, ease, clearance, normals) -> Array
     return np.maximum(field, (shoulder - x)[:, None, None])
 
 
-def build_form(
-    body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
+def build_surface(
+    body: Body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
     flare: float = 0.0,
-) -> Form:  # fmt: skip
-    """The form between the heights `hem` and `top`, of a shirt out to x = `cuff`, else of a skirt (all [m]).
+) -> ImplicitSurface:  # fmt: skip
+    """The surface between heights `hem` and `top`, of a shirt out to x = `cuff`, else of a skirt (all [m]).
 
     `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin, or
     to the hips of a skirt; `flare` [m] is how much further the hem stands off than that place, all around.
@@ -184,12 +191,12 @@ def build_form(
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
-    # The fast sign is a quarter of the time; it moves the distance by under a millimetre, and what the form
-    # promises about clearance is enforced on the finished mesh.
+    # The fast sign is a quarter of the time; it moves the distance by under a millimetre, and what is
+    # promised about clearance is enforced on the finished mesh.
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
     hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals)
-    if not skirt:
+    if cuff is not None:
         sleeve = _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals)
         hanging = _smooth_minimum(hanging, sleeve, ARMPIT_FILLET)
     values = np.minimum(hanging, distance - clearance)  # a blend would add girth wherever both agree
@@ -200,11 +207,11 @@ def build_form(
     soft = ndimage.gaussian_filter(values, 1.0)
     values = 2 * soft - ndimage.gaussian_filter(soft, 1.0)
     origin = low - [ghost * SPACING, 0, 0]
-    return Form(origin, SPACING, values, ndimage.spline_filter(values, order=3))
+    return ImplicitSurface(origin, SPACING, values, ndimage.spline_filter(values, order=3))
 
 
 @dataclass(frozen=True)
-class Cut:
+class CutPlane:
     """A plane through `point` (3,) [m]: on the side of its `normal` (3,), what has |x| < reach [m] is cut.
 
     bend [1/m] curves it in z: bend (z - z0)^2 [m] beyond the plane.
@@ -235,14 +242,16 @@ class Cut:
         return slope
 
 
-def cut_sheet(form: Form, cuts: list[Cut]) -> tuple[Array, NDArray[np.int64]]:
-    """The form's surface as a dense mesh between the cuts: points (N,3) [m], faces (M,3), wound outward."""
+def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, Index]:
+    """The surface as a dense mesh between the cuts: points (N,3) [m], faces (M,3), wound outward."""
     import pyvista
 
     grid = pyvista.ImageData(
-        dimensions=form.values.shape, spacing=(form.spacing,) * 3, origin=tuple(map(float, form.origin))
+        dimensions=surface.values.shape,
+        spacing=(surface.spacing,) * 3,
+        origin=tuple(map(float, surface.origin)),
     )
-    grid["field"] = form.values.ravel(order="F")
+    grid["field"] = surface.values.ravel(order="F")
     sheet = grid.contour([0.0], scalars="field")
     for cut in cuts:
         sheet["cut"] = cut.beyond(np.asarray(sheet.points, dtype=np.float64))
@@ -257,15 +266,15 @@ def cut_sheet(form: Form, cuts: list[Cut]) -> tuple[Array, NDArray[np.int64]]:
     points = np.asarray(sheet.points, dtype=np.float64)
     faces = np.asarray(sheet.regular_faces, dtype=np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
-    if np.sum(np.cross(b - a, c - a) * form.gradient((a + b + c) / 3)) < 0:
+    if np.sum(np.cross(b - a, c - a) * surface.gradient((a + b + c) / 3)) < 0:
         faces = faces[:, ::-1]
     return points, faces
 
 
-def outlines(points: Array, faces: NDArray[np.int64], cuts: list[Cut]) -> list[list[tuple[str, Array]]]:
+def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tuple[str, Array]]]:
     """Per boundary loop of a cut sheet its named curves (P,3) [m], end to end along the winding.
 
-    Errors: ValueError where the form is open but no cut was made.
+    Errors: ValueError where the surface is open but no cut was made.
     """
     found = []
     for loop in boundary_loops(faces):
@@ -282,7 +291,7 @@ def outlines(points: Array, faces: NDArray[np.int64], cuts: list[Cut]) -> list[l
         for begin, end in pairwise(stops):
             middle = np.flatnonzero(on[:, begin + 1 : end].all(axis=1))
             if len(middle) != 1 or end - begin < 2:
-                raise ValueError("the form has an opening that no cut made")
+                raise ValueError("the surface has an opening that no cut made")
             curves.append((cuts[int(middle[0])].name, points[ring[begin : end + 1]]))
         found.append(curves)
     return found

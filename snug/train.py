@@ -17,7 +17,7 @@ from snug.recipe import DEFAULT, TRAININGS, Recipe, find_recipe
 from snug.train_options import check, parse
 
 if TYPE_CHECKING:
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.parallel import Group
     from snug.trained_model import TrainedModel
     from snug.training_run import Saving
@@ -115,13 +115,13 @@ def _run(options: argparse.Namespace) -> int:
 
     from snug.body import Body
     from snug.device import find_device
-    from snug.garments import find_pattern
+    from snug.garments import TSHIRT, find_template
     from snug.parallel import join_group, leave_group
     from snug.training_run import Interrupted
 
     check(options)
-    patterns = [find_pattern(name) for name in dict.fromkeys(options.garment or ["tshirt"])]
-    outs = _outs(Path(options.out), patterns)
+    templates = [find_template(name) for name in dict.fromkeys(options.garment or [TSHIRT])]
+    outs = _outs(Path(options.out), templates)
     device = find_device(options.device)
     torch.set_num_threads(options.threads)
     motions, held_out = _motions(options)
@@ -129,8 +129,8 @@ def _run(options: argparse.Namespace) -> int:
     group, device = join_group(device)
     try:
         body = Body.from_file(options.body) if options.body else Body.load()
-        for pattern, out in zip(patterns, outs):
-            garment = (body, pattern)
+        for template, out in zip(templates, outs):
+            garment = (body, template)
             _train_one(options, garment, motions, held_out, out, str(device), group, stop)
     except Interrupted as interrupted:
         if group.writes:
@@ -141,11 +141,11 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _outs(out: Path, patterns: Sequence[Any]) -> list[Path]:
+def _outs(out: Path, templates: Sequence[Any]) -> list[Path]:
     """The file of each garment. What cannot be written is refused now rather than after the training."""
     outs = [out]
-    if len(patterns) > 1:
-        outs = [out.with_name(f"{out.stem}-{pattern.name}{out.suffix}") for pattern in patterns]
+    if len(templates) > 1:
+        outs = [out.with_name(f"{out.stem}-{template.name}{out.suffix}") for template in templates]
     out.parent.mkdir(parents=True, exist_ok=True)
     for path in outs:
         if path.is_dir():
@@ -157,7 +157,8 @@ def _outs(out: Path, patterns: Sequence[Any]) -> list[Path]:
 
 def _motions(options: argparse.Namespace) -> tuple[list[Any], list[Any]]:
     """Motions to train on and to validate with. Raises ValueError for a name that is not there."""
-    from snug.motion import TRAIN, load_motions, make_motion
+    from snug.motion_files import load_motions
+    from snug.motion_library import TRAIN, make_motion
 
     motions = load_motions(options.motions) if options.motions else [make_motion(name) for name in TRAIN]
     names = [motion.name for motion in motions]
@@ -198,8 +199,8 @@ def _train_one(
     group: Group,
     stop: Callable[[], bool],
 ) -> None:
-    from snug.dresser import DressedBody
-    from snug.logbook import Logbook
+    from snug.dressed_body import DressedBody
+    from snug.tensorboard_log import TensorBoardLog
     from snug.training_run import Saving
     from snug.validation import Validation
 
@@ -210,8 +211,8 @@ def _train_one(
     say = print if group.writes else lambda *_: None
     if saving.path.is_file() and not options.resume:
         say(f"note: {saving.path} of a stopped run will be replaced; --resume would go on with it")
-    body, pattern = garment
-    dressed = DressedBody(body, pattern.tailor(body, vertices=options.vertices))
+    body, template = garment
+    dressed = DressedBody(body, template.tailor(body, vertices=options.vertices))
     if options.resume and out.is_file() and not saving.path.is_file():
         _check_ended(out, options, dressed.vertices)
         say(f"{out}: is there, and no checkpoint beside it; nothing to resume")
@@ -219,23 +220,23 @@ def _train_one(
     if out.is_file():
         say(f"note: {out} will be replaced when this training has ended")
     frames = sum(motion.frames for motion in motions)
-    say(f"{pattern.description}: {dressed.vertices} vertices, {len(motions)} motions, {frames} frames, "
+    say(f"{template.description}: {dressed.vertices} vertices, {len(motions)} motions, {frames} frames, "
         f"recipe {options.recipe}")  # fmt: skip
     validation = None
     if held_out:
         validation = Validation(motions=held_out, every=options.validate_every, patience=options.patience)
-    logbook = None
+    curves = None
     if options.tensorboard and group.writes:
-        logbook = Logbook(Path(options.tensorboard) / out.stem)
+        curves = TensorBoardLog(Path(options.tensorboard) / out.stem)
     try:
         model = train(
             options.model, dressed, motions, steps=options.steps, seed=options.seed,
-            recipe=find_recipe(options.recipe), log=logbook.write if logbook else None, device=device,
+            recipe=find_recipe(options.recipe), log=curves.write if curves else None, device=device,
             saving=saving, validation=validation, group=group, stop=stop,
         )  # fmt: skip
     finally:
-        if logbook:
-            logbook.close()
+        if curves:
+            curves.close()
     if group.writes:
         _tell(model)
         print(model.save(out))

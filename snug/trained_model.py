@@ -16,13 +16,13 @@ from snug.baselines.pbns import PoseSpaceDeformation
 from snug.baselines.santesteban2019 import FitAndWrinkles
 from snug.baselines.supervised import VertexTargets
 from snug.baselines.tailornet import BandTargets, FrequencyMixture
+from snug.pca_dynamics import DynamicsSupervision
 from snug.recipe import Recipe
 from snug.regressor import Regressor, parameter_megabytes
-from snug.swing import SwingTeacher
-from snug.swinging_regressor import SwingingRegressor
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
+from snug.two_stage_regressor import TwoStageRegressor
 
-FORMAT = "snug-model-5"
+FORMAT = "snug-model-6"
 KEPT = ("seed", "steps", "seconds", "setup_seconds", "history", "summary")  # in the file as in the model
 
 
@@ -30,7 +30,7 @@ KEPT = ("seed", "steps", "seconds", "setup_seconds", "history", "summary")  # in
 class Kind:
     """A sort of model: its network, the inputs it reads, whether it sees sequences, and what teaches it.
 
-    targets: what simulated vertices become for it; None where the energies teach it. teacher: what a
+    targets: what simulated vertices become for it; None where the energies teach it. supervision: what a
     simulation teaches beside the energies.
     """
 
@@ -38,7 +38,7 @@ class Kind:
     features: str
     sequences: bool
     targets: type[VertexTargets] | None = None
-    teacher: type[SwingTeacher] | None = None
+    supervision: type[DynamicsSupervision] | None = None
 
     @property
     def physics(self) -> bool:
@@ -47,7 +47,7 @@ class Kind:
 
 KINDS = {
     "snug": Kind(Regressor, "motion", sequences=True),
-    "dynamic": Kind(SwingingRegressor, "rates", sequences=True, teacher=SwingTeacher),
+    "dynamic": Kind(TwoStageRegressor, "rates", sequences=True, supervision=DynamicsSupervision),
     "supervised": Kind(Regressor, "motion", sequences=True, targets=VertexTargets),
     "pbns": Kind(PoseSpaceDeformation, "pose", sequences=False),
     "santesteban2019": Kind(FitAndWrinkles, "pose_shape", sequences=True, targets=VertexTargets),
@@ -66,8 +66,8 @@ class TrainedModel:
     history: one dict for every few steps: step, seconds, loss and each energy [J per frame], and as
         `seconds/<part>` what the parts of a step took on the mean (snug.stopwatch).
     summary: windows above the spike limit, updates left out, returns to good weights, with names.
-    seconds: wall time of the steps, contact search included, and of a rehearsal before them; setup_seconds:
-        of making ready the motions and the first anchors.
+    seconds: wall time of the steps, contact search included, and of a pretraining before them;
+        setup_seconds: of making ready the motions and the first anchors.
     """
 
     kind: str
@@ -117,7 +117,8 @@ class TrainedModel:
             raise ModelFileError(str(error)) from error
         try:
             if data["format"] != FORMAT:
-                raise ModelFileError(f"{path}: format {data['format']!r}, this version reads {FORMAT!r}")
+                known = f"this version reads {FORMAT!r}: train again"
+                raise ModelFileError(f"{path}: format {data['format']!r}, {known}")
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(
                 data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=data["pins"]
@@ -147,8 +148,8 @@ def make_network(
     """
     how = find_kind(kind)
     options: dict[str, Any] = {"output_scale": recipe.output_scale, "zero_last_layer": recipe.zero_last_layer}
-    if how.teacher:
-        options["components"] = recipe.swing_components
+    if how.supervision:
+        options["components"] = recipe.pca_components
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         network: Any = how.network(inputs, vertices, **options)

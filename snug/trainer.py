@@ -1,4 +1,4 @@
-"""One step of training: draw sub-sequences, predict, sum energies, update, renew contact anchors.
+"""One step of training: draw sub-sequences, predict, sum energies, update, requery contact anchors.
 
 `snug.training_run` repeats it, and writes down what happens between steps.
 """
@@ -16,18 +16,18 @@ from torch import Tensor, nn
 
 from snug.baselines.supervised import VertexTargets
 from snug.device import CPU
-from snug.dresser import DressedBody
+from snug.divergence_guard import SETTLING, DivergenceGuard, live_tensors
+from snug.dressed_body import DressedBody
 from snug.fast_skinning import FastSkin
-from snug.guard import SETTLING, Guard, live_tensors
+from snug.hidden_state_cache import HiddenStateCache
 from snug.loss import PhysicsLoss
-from snug.mixing import mixed_for
+from snug.motion_augmentation import mixed_for
 from snug.parallel import ALONE, Group, GroupError
+from snug.pca_dynamics import DynamicsSupervision
 from snug.recipe import Recipe
 from snug.regressor import Regressor
 from snug.skinning import skin
-from snug.state_memory import StateMemory
 from snug.stopwatch import Stopwatch
-from snug.swing import SwingTeacher
 from snug.trained_model import find_kind, make_network
 from snug.training_contact import Posed, TrainingContact
 from snug.training_set import Batch, TrainingError, TrainingSet
@@ -90,15 +90,17 @@ class Trainer:
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
         self.targets: VertexTargets | None = None
-        self.teacher: SwingTeacher | None = None
-        self.rehearsed = 0.0  # s
-        self._be_taught(motions, trajectories)
-        self.memory = self._state_memory()
-        self.guard = Guard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
+        self.supervision: DynamicsSupervision | None = None
+        self.pretraining_seconds = 0.0  # s
+        self._set_up_supervision(motions, trajectories)
+        self.hidden_states = self._hidden_state_cache()
+        self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
 
-    def _be_taught(self, motions: Sequence[Any], trajectories: Mapping[str, np.ndarray] | None) -> None:
-        """By simulated vertices, or by the energies, and then perhaps by a simulated swing too."""
+    def _set_up_supervision(
+        self, motions: Sequence[Any], trajectories: Mapping[str, np.ndarray] | None
+    ) -> None:
+        """By simulated vertices, or by the energies, and then perhaps by simulated dynamics too."""
         how, recipe, data = self.how, self.recipe, self.data
         if how.targets:
             if self.group.size > 1:
@@ -114,18 +116,20 @@ class Trainer:
         self.contact = self.contact_of(data)
         if self.contact:
             self.contact.search_first(self.weights)
-        if how.teacher:
-            self.teacher = how.teacher(data, motions, trajectories, self.weights, recipe)
+        if how.supervision:
+            self.supervision = how.supervision(data, motions, trajectories, self.weights, recipe)
             begun = time.perf_counter()
-            self.teacher.start(self.network, steps=recipe.rehearsal, sigma=recipe.h0_sigma, seed=self.seed)
-            self.rehearsed = time.perf_counter() - begun
+            self.supervision.pretrain(
+                self.network, steps=recipe.pretraining, sigma=recipe.h0_sigma, seed=self.seed
+            )
+            self.pretraining_seconds = time.perf_counter() - begun
 
-    def _state_memory(self) -> StateMemory | None:
+    def _hidden_state_cache(self) -> HiddenStateCache | None:
         start = self.network.random_state(1, 0.0, torch.Generator())
         remembered = self.recipe.remembered and not self.shaped  # a state belongs to one body
         if not (self.loss and remembered and isinstance(start, Tensor)):
             return None
-        return StateMemory(self.data.first, (start.shape[0], start.shape[-1]), self.device)
+        return HiddenStateCache(self.data.first, (start.shape[0], start.shape[-1]), self.device)
 
     def contact_of(self, data: TrainingSet) -> TrainingContact | None:
         """Anchors for the frames of a set; None where the recipe has no collision."""
@@ -191,16 +195,16 @@ class Trainer:
             terms = self.loss(x, batch.ahead, planes)
             if self.contact and posed and self._searched_for_high(number, frames, posed, x, terms):
                 terms = self.loss(x, batch.ahead, self.contact.planes(batch, posed))
-            if self.teacher:
-                terms["swing"] = self.teacher.swing(offsets, batch)
+            if self.supervision:
+                terms["pca_dynamics"] = self.supervision.energy(offsets, batch)
         means, trusted = self._update(number, windows, terms)
-        if trusted and self.memory:
-            self.memory.keep(batch.frames[:, -1], after, self.group)
+        if trusted and self.hidden_states:
+            self.hidden_states.keep(batch.frames[:, -1], after, self.group)
         if self.contact and posed:
-            with self.clock.part("renewal"):
+            with self.clock.part("requery"):
                 self.contact.settle(frames, trusted=trusted)
                 if trusted:
-                    self.contact.renew(frames, posed, x)
+                    self.contact.requery(frames, posed, x)
         return means
 
     def _searched_for_high(
@@ -224,7 +228,7 @@ class Trainer:
         return True
 
     def start_state(self, count: int, mine: slice, batch: Batch) -> Any:
-        """What the windows of a batch start from: noise of the recipe's sigma, added to what is remembered,
+        """What the windows of a batch start from: noise of the recipe's sigma, added to the cached state,
         or a network's own masks.
 
         Noise is drawn for all `count` windows of the step; only that of this process is kept.
@@ -233,7 +237,7 @@ class Trainer:
         if state is None:
             return None
         state = state[:, mine].contiguous()  # as cuDNN wants it
-        return state + self.memory.at(batch.frames[:, 0]) if self.memory else state
+        return state + self.hidden_states.at(batch.frames[:, 0]) if self.hidden_states else state
 
     def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Tensor, Any]:
         """Vertices relative to the pelvis and offsets of the unposed garment, both (N, T, V, 3) [m], and the
@@ -257,7 +261,7 @@ class Trainer:
     def _update(
         self, number: int, windows: np.ndarray, terms: dict[str, Tensor]
     ) -> tuple[dict[str, float], bool]:
-        """Descend by the mean joules a frame, unless the guard objects.
+        """Descend by the mean joules a frame, unless the guard leaves it out.
 
         Means by term; whether the prediction is good enough to search contact anchors with.
         """
@@ -289,10 +293,10 @@ class Trainer:
         """Everything that the next step depends on: tensors, and plain facts for a JSON header."""
         tensors = {name: tensor.detach() for name, tensor in live_tensors(self.network, self.optimiser)}
         tensors["order"], tensors["noise"] = torch.as_tensor(self.order.copy()), self.noise.get_state()
-        if self.memory:
-            tensors["memory"] = self.memory.states
-        if self.teacher:
-            tensors |= {f"teacher.{key}": tensor for key, tensor in self.teacher.state().items()}
+        if self.hidden_states:
+            tensors["hidden_states"] = self.hidden_states.states
+        if self.supervision:
+            tensors |= {f"supervision.{key}": tensor for key, tensor in self.supervision.state().items()}
         facts: dict[str, Any] = {"epoch": self.epoch, "random": self.random.bit_generator.state}
         for name, part in (("guard", self.guard), ("contact", self.contact)):
             if part is not None:
@@ -310,10 +314,10 @@ class Trainer:
             found = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
             self.optimiser.state[parameter] = {key: tensor.to(self.device) for key, tensor in found.items()}
         self.network.load_state_dict(part_of(tensors, "network"))
-        if self.memory:
-            self.memory.states.copy_(tensors["memory"])
-        if self.teacher:
-            self.teacher.resume(part_of(tensors, "teacher"))
+        if self.hidden_states:
+            self.hidden_states.states.copy_(tensors["hidden_states"])
+        if self.supervision:
+            self.supervision.resume(part_of(tensors, "supervision"))
         self.guard.resume(part_of(tensors, "guard"), facts["guard"])
         if self.contact is not None:
             self.contact.resume(part_of(tensors, "contact"), facts["contact"])

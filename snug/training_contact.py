@@ -1,9 +1,9 @@
-"""Contact planes of batches of a training set, from anchors that are renewed as the network learns.
+"""Contact planes of batches of a training set, from cached anchors, queried anew as the network learns.
 
-Anchors slide with their samples in every step (snug.sliding). Searched, for skin that no slide would find,
-are the middle frames of a few windows in a step, and what is found there is lent to the frames around it that
-show almost the same pose. Lent farther, an anchor from where the thigh was elsewhere claims a contact that is
-none, or misses a thigh that stands in the hem.
+Anchors walk with their samples in every step (snug.surface_walk). Searched, for skin that no walk would find,
+are the middle frames of a few windows in a step. What is found there is propagated to the frames around it
+that show almost the same pose. Propagated farther, an anchor from where the thigh was elsewhere
+claims a contact that is none, or misses a thigh that stands in the hem.
 """
 
 from __future__ import annotations
@@ -16,19 +16,21 @@ import torch
 from torch import Tensor
 
 from reference_sim.energies import ContactPenalty
-from snug.contact import Anchors, Patch
+from snug.contact import ContactCache, Patch
 from snug.loss import Planes
 from snug.parallel import ALONE, Group
 from snug.skinning import skin
-from snug.tensor_anchors import TensorAnchors
+from snug.tensor_contact_cache import TensorContactCache
 from snug.training_set import Batch, TrainingSet
 
 # rows (N T,) into the positions and normals (R, P, 3) that follow: the body's patch in the frames of a batch.
 Posed = tuple[np.ndarray, Any, Any]
 TOGETHER = 64  # frames whose bodies are posed by one matrix product
-LENT, FIRST_LENT = 3, 7  # frames before and after a searched one that may take over its anchors; at the start
-# m: how far a mark of the body may have moved from a frame to one that it lends to. At the start a frame lies
-# within FIRST_NEAR of the first and of the last that it lends to; from those between it may be twice as far.
+# Frames before and after a searched one that may take over its anchors; at the start.
+PROPAGATED, FIRST_PROPAGATED = 3, 7
+# m: how far a mark of the body may have moved from a frame to one that takes over its anchors. At the start a
+# frame lies within FIRST_NEAR of the first and of the last of those; from those between it may be twice as
+# far.
 NEAR, FIRST_NEAR = 0.03, 0.07
 MARKED = 25  # every so many vertices of the patch there is a mark
 
@@ -55,8 +57,10 @@ class TrainingContact:
         self.kernels, self.group = kernels, group
         self.patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
         frames = data.frames
-        self.anchors: Anchors | TensorAnchors
-        self.anchors = Anchors(self.patch, frames) if kernels else TensorAnchors(self.patch, frames, device)
+        self.cache: ContactCache | TensorContactCache
+        self.cache = (
+            ContactCache(self.patch, frames) if kernels else TensorContactCache(self.patch, frames, device)
+        )
         vertices = self.patch.body_vertices
         self.weights, self.template, self.directions = (
             torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
@@ -87,8 +91,8 @@ class TrainingContact:
 
     @cached_property
     def _marks(self) -> np.ndarray:
-        """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]; only for who lends."""
-        # On the CPU whatever the device, so that processes that share a run lend alike.
+        """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]; to propagate by."""
+        # On the CPU whatever the device, so that processes that share a run propagate alike.
         rest, weights = self.template[::MARKED].cpu(), self.weights[::MARKED].cpu()
         parts = self.data.transforms.split(TOGETHER)
         return np.concatenate([skin(rest, weights, part.cpu()).numpy() for part in parts])
@@ -102,53 +106,53 @@ class TrainingContact:
             rest = (rest + torch.einsum("vis,ns->nvi", self.directions, batch.betas))[:, None]
         positions = skin(rest, self.weights, batch.transforms).flatten(0, 1)
         rows = np.arange(len(positions))
-        if isinstance(self.anchors, TensorAnchors):
-            return rows, positions, self.anchors.normals(positions)
+        if isinstance(self.cache, TensorContactCache):
+            return rows, positions, self.cache.normals(positions)
         return rows, positions.numpy(), self.patch.normals(positions.numpy())
 
     def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
-        """What the loss takes: of the remembered anchors, points and normals (N, T, S, 3), or, with kernels,
+        """What the loss takes: of the cached anchors, points and normals (N, T, S, 3), or, with kernels,
         the energy itself.
 
-        x (N, T, V, 3): vertices that the anchors first slide to, until `settle` says whether for good; None
+        x (N, T, V, 3): vertices that the anchors first walk to, until `settle` says whether for good; None
         where they have just been searched.
         """
-        flat, slide = batch.frames.ravel(), x is not None
-        if slide:
+        flat, walk = batch.frames.ravel(), x is not None
+        if walk:
             rows = np.unique(flat)
             self._before = rows, *(table[rows] for table in self._tables())
-        if isinstance(self.anchors, Anchors):
-            anchors = self.anchors
-            return lambda vertices: anchors.energy(self.contact, vertices, flat, *posed, slide=slide)
+        if isinstance(self.cache, ContactCache):
+            cache = self.cache
+            return lambda vertices: cache.energy(self.contact, vertices, flat, *posed, walk=walk)
         if x is not None:
             samples = self._samples(x.detach().flatten(0, 1))
-            self.anchors.slide(samples, flat, *posed, reach=self.contact.margin)
-        points, normals = self.anchors.planes(flat, *posed)
+            self.cache.walk(samples, flat, *posed, reach=self.contact.margin)
+        points, normals = self.cache.planes(flat, *posed)
         shape = (*batch.frames.shape, *points.shape[1:])
         return points.reshape(shape), normals.reshape(shape)
 
     def search_first(self, weights: Tensor) -> None:
-        """Search where the skinned template touches, in as many frames as lend to all others.
+        """Search where the skinned template touches, in as many frames as give to all others.
 
         weights (V, 24): skinning weights of the garment. Now, for a thigh that is found in the hem only later
         meets, with joules, a network that has long since settled.
         """
-        data, frame, lent = self.data, 0, 0
-        while lent < data.frames:
-            last, frame = frame, self._near(lent, FIRST_LENT, FIRST_NEAR).stop - 1
+        data, frame, done = self.data, 0, 0
+        while done < data.frames:
+            last, frame = frame, self._near(done, FIRST_PROPAGATED, FIRST_NEAR).stop - 1
             place = torch.as_tensor([[frame]], device=data.device)
             tensors = (data.features[place], data.rest, data.transforms[place], data.ahead[place])
             batch = Batch(np.array([[frame]]), *tensors)
             x = skin(data.rest, weights, batch.transforms)
             rows, positions, _ = self.posed(batch)
-            self.anchors.faces[frame] = self.anchors.faces[last]  # a good place to begin
-            self.anchors.renew(frame, self._samples(x[0, 0]), positions[rows[0]])
-            end = self._near(frame, FIRST_LENT, FIRST_NEAR).stop
-            self._lend(frame, np.arange(lent, end))
-            lent = end
+            self.cache.faces[frame] = self.cache.faces[last]  # a good place to begin
+            self.cache.requery(frame, self._samples(x[0, 0]), positions[rows[0]])
+            end = self._near(frame, FIRST_PROPAGATED, FIRST_NEAR).stop
+            self._propagate(frame, np.arange(done, end))
+            done = end
         self._changed[:] = False  # a resumed run makes these anchors again
 
-    def renew(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
+    def requery(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
         """Search a few windows of a batch anew, those that were left alone for longest.
 
         frames (N, T): of the whole batch. posed and the predicted vertices x (n, T, V, 3): of the windows
@@ -159,12 +163,12 @@ class TrainingContact:
         self._credit -= count
         window = frames.shape[1]
         middle = frames[:, window // 2]
-        oldest = self.anchors.oldest(middle, count)
+        oldest = self.cache.oldest(middle, count)
         self.search(oldest * window + window // 2, frames, posed, x)
         searched = np.unique(middle[oldest])
         for frame in searched:
-            around = self._near(int(frame), LENT, NEAR)
-            self._lend(int(frame), np.setdiff1d(np.arange(around.start, around.stop), searched))
+            around = self._near(int(frame), PROPAGATED, NEAR)
+            self._propagate(int(frame), np.setdiff1d(np.arange(around.start, around.stop), searched))
 
     def _near(self, frame: int, reach: int, near: float) -> slice:
         """The frames around it, of the same motion and at most `reach` off, up to where a mark has moved by
@@ -178,15 +182,15 @@ class TrainingContact:
         before, after = (f + 1 for f in far if f < frame), (f for f in far if f > frame)
         return slice(max([start, *before]), min([stop, *after]))
 
-    def _lend(self, frame: int, others: np.ndarray) -> None:
+    def _propagate(self, frame: int, others: np.ndarray) -> None:
         """The anchors of a frame to others (n,), as if they had been searched."""
         for table in self._tables():
             table[others] = table[[frame]]  # a copy: torch writes no tensor onto itself
-        self.anchors.age[others], self._changed[others] = 0, True
+        self.cache.age[others], self._changed[others] = 0, True
 
     def settle(self, frames: np.ndarray, *, trusted: bool) -> None:
-        """Keep where anchors slid to since `planes`, or, where a prediction is no guide, put them back; then
-        every process gives its own to the others. frames: see `renew`.
+        """Keep where anchors walked to since `planes`, or put them back where it is no guide. Then
+        every process gives its own to the others. frames: see `requery`.
         """
         if self._before and not trusted:
             rows, *before = self._before
@@ -207,9 +211,9 @@ class TrainingContact:
     def search(
         self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor, *, exact: bool = False
     ) -> None:
-        """Search the anchors of some places (n,) among the frames (N T,) of a batch; else as `renew`.
+        """Search the anchors of some places (n,) among the frames (N T,) of a batch; else as `requery`.
 
-        exact: see Anchors.renew.
+        exact: see ContactCache.requery.
         """
         flat, (rows, positions, _) = frames.ravel(), posed
         vertices = x.detach().flatten(0, 1)
@@ -218,8 +222,8 @@ class TrainingContact:
             owner, mine = divmod(int(place), share)
             if owner == self.group.rank:
                 samples = self._samples(vertices[mine])
-                self.anchors.renew(int(flat[place]), samples, positions[rows[mine]], exact=exact)
-            self.anchors.age[flat[place]] = 0
+                self.cache.requery(int(flat[place]), samples, positions[rows[mine]], exact=exact)
+            self.cache.age[flat[place]] = 0
             self._send(int(flat[place]), owner)
 
     def _samples(self, vertices: Tensor) -> Any:
@@ -230,7 +234,7 @@ class TrainingContact:
 
     def _tables(self) -> tuple[Any, Any]:
         """Faces (F, S) and barycentric coordinates (F, S, 2) of all anchors."""
-        return self.anchors.faces, self.anchors.barycentric
+        return self.cache.faces, self.cache.barycentric
 
     def _send(self, frame: int, owner: int) -> None:
         for table in self._tables():
@@ -244,7 +248,7 @@ class TrainingContact:
         there = changed.to(faces.device)
         return {
             "changed": changed, "faces": faces[there], "barycentric": barycentric[there],
-            "age": torch.as_tensor(self.anchors.age.copy()),
+            "age": torch.as_tensor(self.cache.age.copy()),
         }, {"credit": self._credit}  # fmt: skip
 
     def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
@@ -254,5 +258,5 @@ class TrainingContact:
         for table, name in zip(self._tables(), ("faces", "barycentric")):
             held = torch.as_tensor(table)  # shares memory
             held[torch.as_tensor(changed, device=held.device)] = tensors[name].to(held.device)
-        self.anchors.age[:] = tensors["age"].numpy()
+        self.cache.age[:] = tensors["age"].numpy()
         self._credit = facts["credit"]

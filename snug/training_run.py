@@ -18,7 +18,7 @@ from snug.trained_model import TrainedModel
 from snug.trainer import Trainer, part_of
 from snug.validation import Validation, Validator
 
-FORMAT = "snug-checkpoint-6"
+FORMAT = "snug-checkpoint-7"
 Log = Callable[[dict[str, float]], None]
 
 
@@ -49,7 +49,7 @@ class TrainingRun:
     """One trainer taken through all its steps by `go`.
 
     log gets each row of the history, every `every` steps; progress: a bar on standard error; stop: asked
-    after each step. setup_seconds: what making the trainer took; of that, a rehearsal counts as training.
+    after each step. setup_seconds: what making the trainer took; of that, the pretraining counts as training.
     """
 
     def __init__(
@@ -69,8 +69,8 @@ class TrainingRun:
         self.patience = validation.patience if validation else 0
         self.validator = Validator(trainer, validation) if validation else None
         self.validated_every = validation.every if validation else 0
-        self.setup_seconds = setup_seconds - trainer.rehearsed
-        self.done, self.seconds = 0, trainer.rehearsed
+        self.setup_seconds = setup_seconds - trainer.pretraining_seconds
+        self.done, self.seconds = 0, trainer.pretraining_seconds
         self.history: list[dict[str, float]] = []
         self.recent: list[dict[str, float]] = []
         self.best: dict[str, Tensor] = {}
@@ -169,12 +169,12 @@ class TrainingRun:
         """What must be the same for a run to be the same run."""
         trainer, digest = self.trainer, hashlib.sha256()
         taught = trainer.targets.vertices if trainer.targets else trainer.data.ahead
-        # Coordinates that a teacher told are round-off's too, and in the checkpoint.
+        # Coordinates that were predicted are round-off's too, and in the checkpoint.
         features = trainer.data.features[:, : len(trainer.network.input_mean)]
         for tensor in (features, trainer.data.rest, taught):
             digest.update(tensor.cpu().numpy().tobytes())
-        if trainer.teacher:
-            digest.update(np.round(trainer.teacher.mean.cpu().numpy(), 4).tobytes())
+        if trainer.supervision:
+            digest.update(np.round(trainer.supervision.mean.cpu().numpy(), 4).tobytes())
         return {
             "kind": trainer.kind,
             "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from snug.device import CPU
-from snug.dresser import DressedBody
+from snug.dressed_body import DressedBody
 from snug.recipe import Recipe
 from snug.skinning import joint_transforms
 

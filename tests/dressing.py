@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from snug.body import Body
-from snug.dresser import DressedBody
+from snug.dressed_body import DressedBody
 from snug.garments import Garment, nearest_body_vertices
 from snug.motion import Motion
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from snug.motion import load_motions
+from snug.motion_files import load_motions
 from snug.skeleton import JOINT
 
 

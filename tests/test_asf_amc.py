@@ -5,9 +5,10 @@ import pytest
 from cmu_clips import CHAIN, METRES, amc_frame, cmu_like, write_clip
 from scipy.spatial.transform import Rotation
 
-from snug.formats.asf_amc import read_amc, read_asf, read_asf_amc
-from snug.formats.retarget import local_turns, world_turns
-from snug.motion import MotionError, load_motions
+from snug.formats.asf_amc import read_amc, read_asf
+from snug.formats.retarget import local_turns, read_asf_amc, world_turns
+from snug.motion import MotionError
+from snug.motion_files import load_motions
 
 
 class TestParser:

@@ -50,7 +50,7 @@ def test_a_taught_baseline_learns_its_targets_and_survives_its_file(kind, tmp_pa
     assert np.array_equal(run.positions, roll_out(model, tube_dress(), motion).positions)
     skinned = tube_dress().skinned(motion, smoothing=20)
     error, start = (np.linalg.norm(x - target, axis=2).mean() for x in (run.positions, skinned))
-    assert error < 0.5 * start and run.frame_seconds.min() > 0
+    assert error < 0.5 * start
 
 
 @pytest.mark.parametrize("kind", TAUGHT)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from snug.body import JOINT_NAMES, Body, BodyError
+from snug.body import Body
 from snug.data.bake_body import merge_weights, to_t_pose
+from snug.skeleton import JOINT_NAMES, BodyError
 
 
 @pytest.fixture(scope="module")

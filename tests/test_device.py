@@ -11,13 +11,13 @@ from dressing import swaying, tube_dress
 from torch.overrides import TorchFunctionMode
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
-from snug.contact import PARTS, Anchors, Patch
+from snug.batched_kernels import batched_kernel
+from snug.contact import PARTS, ContactCache, Patch
 from snug.device import CPU, DeviceError, find_device
-from snug.lanes import lane_kernel
-from snug.loss import STATIC, held_on
+from snug.loss import STATIC, on_device
 from snug.recipe import DEFAULT, PAPER
 from snug.skinning import skin
-from snug.tensor_anchors import TensorAnchors
+from snug.tensor_contact_cache import TensorContactCache
 from snug.trainer import Trainer
 from snug.training_set import TrainingSet
 
@@ -40,13 +40,13 @@ def made(recipe, *, kernels, kind="snug"):
 )
 def test_definitions_train_as_the_kernels_do(kind, recipe):
     """Several steps: terms, and the gradient that the last of them left behind."""
-    # No frame twice in a step: there its anchors would slide once by torch, and twice by the kernels.
+    # No frame twice in a step: there its anchors would walk once by torch, and twice by the kernels.
     recipe = replace(recipe, contact_refresh=0.0, window_stride=3 if kind == "snug" else 1)
     fast, slow = (made(recipe, kernels=k, kind=kind) for k in (True, False))
     if fast.contact and slow.contact:  # the torch search finds the closest face where the walk may be rough
         tensors, facts = fast.contact.state()
         changed = torch.arange(fast.data.frames)
-        anchors = fast.contact.anchors
+        anchors = fast.contact.cache
         held = {"faces": anchors.faces, "barycentric": anchors.barycentric}
         tensors |= {"changed": changed} | {key: torch.as_tensor(array.copy()) for key, array in held.items()}
         slow.contact.resume(tensors, facts)
@@ -77,9 +77,9 @@ def test_torch_search_is_no_worse_than_the_walk():
     positions = skin(torch.as_tensor(patch.rest), weights, transforms)
     garment = skin(dressed.rest(), dressed.weights(5), transforms)[1].numpy()
     samples = (contact.sample_matrix @ garment + [0.0, 0.05, 0.0]).astype(np.float32)
-    walk, brute = Anchors(patch, 2), TensorAnchors(patch, 2, CPU)
-    walk.renew(1, samples, positions[1].numpy())
-    brute.renew(1, torch.as_tensor(samples), positions[1])
+    walk, brute = ContactCache(patch, 2), TensorContactCache(patch, 2, CPU)
+    walk.requery(1, samples, positions[1].numpy())
+    brute.requery(1, torch.as_tensor(samples), positions[1])
     found = []
     for anchors in (walk, brute):
         faces = patch.faces[np.asarray(anchors.faces[1])]
@@ -94,9 +94,9 @@ def test_torch_search_is_no_worse_than_the_walk():
 
 
 @pytest.mark.parametrize("region", [0.2, 0.06])
-def test_anchors_slide_to_the_closest_skin_by_torch_and_by_kernels(region):
-    """From the anchors of another pose: on one smooth sheet a slide ends where a search ends, unless the rule
-    of regions is so narrow that it stops the slide.
+def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
+    """From the anchors of another pose: on one smooth sheet a walk ends where a search ends, unless the rule
+    of regions is so narrow that it stops the walk.
     """
     dressed, motion = tube_dress(), swaying()
     contact, body = ContactPenalty(dressed.cloth), dressed.body
@@ -108,16 +108,19 @@ def test_anchors_slide_to_the_closest_skin_by_torch_and_by_kernels(region):
     x = skin(dressed.rest(), dressed.weights(5), transforms) + torch.tensor([0.0, 0.03, -0.05])
     samples = torch.stack([torch.as_tensor(contact.sample_matrix @ y).float() for y in x.numpy()])
     frames, rows = np.array([1, 0]), np.arange(2)
-    still, fast, searched, slow = (*(Anchors(patch, 2) for _ in range(3)), TensorAnchors(patch, 2, CPU))
+    still, fast, searched, slow = (
+        *(ContactCache(patch, 2) for _ in range(3)),
+        TensorContactCache(patch, 2, CPU),
+    )
     on = (contact, x.numpy(), frames, rows, positions.numpy(), normals)
     assert fast.energy(*on)[0].sum() > 0 and (fast.faces == still.faces).all()
-    fast.energy(*on, slide=True)
-    slow.slide(samples, frames, rows, positions, torch.as_tensor(normals).float(), reach=contact.margin)
+    fast.energy(*on, walk=True)
+    slow.walk(samples, frames, rows, positions, torch.as_tensor(normals).float(), reach=contact.margin)
     for row, frame in enumerate(frames):
-        searched.renew(int(frame), samples[row].numpy(), positions[row].numpy(), exact=True)
+        searched.requery(int(frame), samples[row].numpy(), positions[row].numpy(), exact=True)
 
     def distance(anchors):
-        points, _ = Anchors.planes(anchors, frames, rows, positions.numpy(), normals)
+        points, _ = ContactCache.planes(anchors, frames, rows, positions.numpy(), normals)
         return np.linalg.norm(points - samples.numpy(), axis=-1)
 
     moved = fast.faces[frames] != still.faces[frames]
@@ -139,7 +142,7 @@ def test_torch_planes_are_the_kernels_planes():
     patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
     weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
     positions = skin(torch.as_tensor(patch.rest), weights, dressed.transforms(motion.poses[:3]))
-    numbers, torches = Anchors(patch, 3), TensorAnchors(patch, 3, CPU)
+    numbers, torches = ContactCache(patch, 3), TensorContactCache(patch, 3, CPU)
     frames = np.array([2, 0])
     points, normals = numbers.planes(frames, frames, positions.numpy(), patch.normals(positions.numpy()))
     theirs = torches.planes(frames, frames, positions, torches.normals(positions))
@@ -195,20 +198,20 @@ def test_lanes_agree_with_the_definition(E, count):
     crumpled = np.where(np.arange(count) % 3, 0.004, 0.05)[:, None, None]
     x = dressed.cloth.rest_positions + crumpled * random.normal(size=(count, dressed.vertices, 3))
     x = x.astype(np.float32)
-    values, gradients = lane_kernel(energy)(x)
+    values, gradients = batched_kernel(energy)(x)
     for n in range(count):
         exact, slope = energy.value_and_gradient(x[n].astype(float))
         assert values[n] == pytest.approx(exact, rel=2e-5)
         assert np.linalg.norm(gradients[n] - slope) < 2e-4 * np.linalg.norm(slope)
-    assert lane_kernel(ContactPenalty(dressed.cloth)) is None
+    assert batched_kernel(ContactPenalty(dressed.cloth)) is None
     x[-1, 3] = np.nan
-    values, _ = lane_kernel(energy)(x)
+    values, _ = batched_kernel(energy)(x)
     assert np.isnan(values[-1]) and np.isfinite(values[:-1]).all()
 
 
 def test_held_energies_have_all_their_arrays_on_the_device():
     meta = torch.device("meta")
-    twin = held_on(StretchStVK(tube_dress().cloth), meta)
+    twin = on_device(StretchStVK(tube_dress().cloth), meta)
     tensors = [value for value in vars(twin).values() if isinstance(value, torch.Tensor)]
     assert len(tensors) == 3 and {tensor.device for tensor in tensors} == {meta}
     assert {tensor.dtype for tensor in tensors} == {torch.float32, torch.int64}
@@ -232,14 +235,13 @@ def test_absent_devices_are_one_line(capsys, tmp_path):
 @pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")
 def test_the_harness_hands_the_device_on(tmp_path):
     """An absent device is refused where the plan is made, and would be refused where training starts."""
-    from benchmarks.plan import Network
+    from tasks_by_hand import assets_of, context, training
+
     from benchmarks.run import check_device
-    from benchmarks.training import train_network
-    from benchmarks.wardrobe import Wardrobe
 
     dressed, motion = tube_dress(), swaying(12)
-    wardrobe = Wardrobe(dressed.body, {"tshirt": dressed.garment}, {"sway": motion})
+    task = training("snug", motion.name, steps=2, device="cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
         check_device("cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
-        train_network(wardrobe, print, Network("snug", 0), 2, {"sway": None}, tmp_path, "cuda", "0")
+        task.run(context(tmp_path, assets_of(dressed, motion)), {})

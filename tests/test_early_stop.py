@@ -10,10 +10,10 @@ from dressing import swaying, tube_dress
 
 from reference_sim import Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
-from snug.logbook import Logbook, LogbookError
 from snug.recipe import DEFAULT
 from snug.rollout import roll_out
 from snug.stopwatch import PARTS
+from snug.tensorboard_log import TensorBoardError, TensorBoardLog
 from snug.train import train
 from snug.trainer import Trainer
 from snug.training_run import TrainingRun
@@ -154,7 +154,7 @@ def test_curves_are_written(tmp_path):
     pytest.importorskip("tensorboard")
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    logbook = Logbook(tmp_path / "run")
+    logbook = TensorBoardLog(tmp_path / "run")
     model = train(
         "snug", tube_dress(), [swaying(30)], steps=6, seed=0, recipe=PLAIN, progress=False, every=2,
         log=logbook.write,
@@ -182,5 +182,5 @@ def test_the_command_writes_curves_of_every_garment(tmp_path, monkeypatch):
 
 def test_missing_tensorboard_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
-    with pytest.raises(LogbookError, match=r"pip install 'neural-garment-benchmark\[tensorboard\]'"):
-        Logbook(tmp_path)
+    with pytest.raises(TensorBoardError, match=r"pip install 'neural-garment-benchmark\[tensorboard\]'"):
+        TensorBoardLog(tmp_path)

@@ -7,9 +7,9 @@ from meshes import edge_counts, girth
 
 from snug.body import Body
 from snug.garments import (
-    PATTERNS,
+    GARMENT_TEMPLATES,
     GarmentError,
-    find_pattern,
+    find_template,
     smooth_weights,
     tailor_tshirt,
     tailor_tunic,
@@ -31,11 +31,11 @@ def shirts(body):
 @pytest.fixture(scope="session")
 def wardrobe(body, shirts):
     """Every sort of garment, at 1000 vertices."""
-    others = {p.name: p.tailor(body, vertices=1000) for p in PATTERNS if p.name != "tshirt"}
+    others = {p.name: p.tailor(body, vertices=1000) for p in GARMENT_TEMPLATES if p.name != "tshirt"}
     return {"tshirt": shirts[1000], **others}
 
 
-@pytest.fixture(params=[pattern.name for pattern in PATTERNS])
+@pytest.fixture(params=[pattern.name for pattern in GARMENT_TEMPLATES])
 def garment(request, wardrobe):
     return wardrobe[request.param]
 
@@ -147,9 +147,9 @@ def test_the_tunic_is_longer_and_flares_by_what_is_asked(body, shirts):
 
 
 def test_patterns_are_found_by_name(body):
-    assert find_pattern("tunic").tailor is tailor_tunic
+    assert find_template("tunic").tailor is tailor_tunic
     with pytest.raises(GarmentError, match=r"'gown'.*tshirt, tunic, skirt"):
-        find_pattern("gown")
+        find_template("gown")
     with pytest.raises(GarmentError, match=r"flare=0\.5: a tunic"):
         tailor_tunic(body, flare=0.5)
 

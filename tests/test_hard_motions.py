@@ -6,20 +6,20 @@ import dataclasses
 
 import numpy as np
 import pytest
+from benchmarks.methods.networks import model_path
+from benchmarks.wardrobe import open_wardrobe
 from plans import SMOKE, plan_of
 
 from benchmarks import workers
-from benchmarks.methods.networks import model_path
 from benchmarks.plan import Cell
 from benchmarks.results import RunFolder
 from benchmarks.scenes import dressed_scene
 from benchmarks.studies import hard_motion_cases, hard_motion_stage, hard_motions
 from benchmarks.studies.hard_motion_cases import HARD_MOTIONS
 from benchmarks.studies.hard_motion_stage import HardStage, RollOut, Trained
-from benchmarks.wardrobe import open_wardrobe
 from reports import study_tables
-from snug.dresser import DressedBody
-from snug.motion import make_motion
+from snug.dressed_body import DressedBody
+from snug.motion_library import make_motion
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions, rotation_matrices
 from snug.train import untrained_model

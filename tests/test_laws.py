@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from benchmarks.metrics.laws import UNITS, law_series
 from plans import SMOKE, plan_of
 
-from benchmarks.metrics.laws import UNITS, law_series
 from benchmarks.results import Row, RunFolder
 from benchmarks.scene import Dressed
 from benchmarks.scenes import free_fall, hanging_sheet, sheet_on_sphere

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -139,3 +140,30 @@ def test_a_planted_import_is_found(path, source):
 )
 def test_an_allowed_import_passes(path, source):
     assert not complaints(path, source)
+
+
+def demand_no_circle(sources: Mapping[str, str]) -> None:
+    """Raises CycleError for modules, name to source, that import each other; inside functions counts too."""
+    graph: dict[str, set[str]] = {}
+    for module, source in sources.items():
+        named = [name for _, name in imports(ast.parse(source), module.rpartition(".")[0])]
+        found = {name if name in sources else name.rpartition(".")[0] for name in named}
+        graph[module] = found & set(sources) - {module}
+    TopologicalSorter(graph).prepare()
+
+
+def test_no_module_of_snug_imports_itself_by_a_circle():
+    sources = {}
+    for path in files_of("snug"):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        sources[module] = path.read_text(encoding="utf-8")
+    assert len(sources) > 50
+    demand_no_circle(sources)
+
+
+def test_a_planted_circle_is_found():
+    one, other = "from snug.b import f", "def f():\n    from snug import a"
+    with pytest.raises(CycleError):
+        demand_no_circle({"snug.a": one, "snug.b": other, "snug.c": one})
+    typed = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from snug.a import g"
+    demand_no_circle({"snug.a": one, "snug.b": typed, "snug.c": one})

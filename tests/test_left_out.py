@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from meshes import patch
 
 from benchmarks.presets import find_preset
 from benchmarks.scenes import SMALL_SCENES, dressed_scene
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Inertia, StretchStVK
 
@@ -58,7 +58,7 @@ assert result.status == "converged", result.reason
 print(*sys.modules)
 """
 BODY = (
-    "snug.body", "snug.dresser", "snug.regressor", "igl", "reference_sim.obstacle",
+    "snug.body", "snug.dressed_body", "snug.regressor", "igl", "reference_sim.obstacle",
     "reference_sim.closest_point", "reference_sim.collisions",
 )  # fmt: skip
 CONTACT = ("reference_sim.energies.contact_penalty", "reference_sim.energies.contact_barrier")
@@ -97,7 +97,7 @@ def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
     path.write_bytes(pickle.dumps(told))
     modules = loaded(DRESSED, str(path))
     assert {"reference_sim.obstacle", CONTACT[0], *MATERIAL} <= modules
-    assert not modules & {"torch", "snug.skinning", "snug.dresser", "snug.regressor"}
+    assert not modules & {"torch", "snug.skinning", "snug.dressed_body", "snug.regressor"}
 
 
 def test_a_static_problem_loads_no_time_step():

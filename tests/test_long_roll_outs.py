@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
+from benchmarks.methods.networks import model_path
 from dressing import swaying, tube_dress
 
-from benchmarks.methods.networks import model_path
 from benchmarks.results import RunFolder
 from benchmarks.studies.long_roll_outs import ENDS, FRAMES, cloth_energy, rows, there_and_back
 from snug.train import untrained_model

@@ -8,7 +8,7 @@ import torch
 from dressing import swaying, tube_dress
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
-from snug.contact import EXACT, PARTS, Anchors, Patch, kept
+from snug.contact import EXACT, PARTS, ContactCache, Patch, quantised
 from snug.loss import PhysicsLoss, make_contact, summed
 from snug.recipe import DEFAULT, PAPER, PBNS_SPRINGS, Recipe
 from snug.skinning import skin
@@ -155,11 +155,11 @@ def test_contact_search_finds_the_closest_allowed_point():
     assert np.abs(first - shortest)[near | far].max() < 1e-6
 
 
-def test_anchors_follow_the_body_and_forget_nothing_but_what_is_renewed():
+def test_anchors_follow_the_body_and_forget_nothing_but_what_is_searched():
     dressed, motion = tube_dress(), swaying()
     contact = ContactPenalty(dressed.cloth, samples="vertices")
     patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
-    anchors = Anchors(patch, 3)
+    anchors = ContactCache(patch, 3)
     weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
     positions = skin(torch.as_tensor(patch.rest), weights, dressed.transforms(motion.poses[:3])).numpy()
     normals = patch.normals(positions)
@@ -177,7 +177,7 @@ def test_anchors_follow_the_body_and_forget_nothing_but_what_is_renewed():
     assert height.min() > 0.01
     before = anchors.faces.copy()
     assert list(anchors.oldest(frames, 1)) == [0]
-    anchors.renew(2, points[0][::-1].copy(), positions[2])
+    anchors.requery(2, points[0][::-1].copy(), positions[2])
     assert (anchors.faces[:2] == before[:2]).all() and (anchors.faces[2] != before[2]).any()
     assert list(anchors.oldest(frames, 1)) == [1]  # frame 2 is young again
 
@@ -192,10 +192,10 @@ def test_energy_at_anchors_is_that_of_their_planes(recipe):
     skin_now = skin(torch.as_tensor(patch.rest), weights, transforms).numpy()
     garment = skin(dressed.rest(), dressed.weights(5), transforms)
     x = garment - torch.tensor([0.0, 0.0, 0.05])  # the back a little off the skin, the front deep under it
-    anchors, frames, normals = Anchors(patch, 3), np.array([2, 0]), patch.normals(skin_now)
+    anchors, frames, normals = ContactCache(patch, 3), np.array([2, 0]), patch.normals(skin_now)
     for row, frame in enumerate(frames):
         samples = (contact.sample_matrix @ x[row].numpy()).astype(np.float32)
-        anchors.renew(int(frame), samples, skin_now[row])
+        anchors.requery(int(frame), samples, skin_now[row])
     values, gradients = anchors.energy(contact, x.numpy(), frames, np.arange(2), skin_now, normals)
     points, directions = anchors.planes(frames, np.arange(2), skin_now, normals)
     for row in range(2):
@@ -213,7 +213,7 @@ def test_remembered_anchors_lie_in_their_faces():
     exact = random.dirichlet([0.3, 0.3, 0.3], 5000)[:, 1:]
     exact[:3] = (0.5, 0.5), (1.0, 0.0), (0.0, 1.0)
     for count, kind in ((2**15 - 1, np.int16), (2**15, np.int32)):
-        faces, parts = kept(np.full(5000, count - 1), exact, count)
+        faces, parts = quantised(np.full(5000, count - 1), exact, count)
         assert faces.dtype == kind and (faces == count - 1).all() and parts.dtype == np.uint8
     assert (parts.astype(int).sum(1) <= 255).all()
     assert np.abs(parts / PARTS - exact).max() <= 1.01 / 255

@@ -6,11 +6,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-
 from benchmarks.cell import Outcome, run_cell
 from benchmarks.curves import CURVES
 from benchmarks.evaluate import measure_scene
 from benchmarks.ground_truth import settle, simulate_motion
+from benchmarks.training import train_network
+from benchmarks.wardrobe import embedded_motions, open_wardrobe
+
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
 from benchmarks.plan import Cell, Network
@@ -18,8 +20,6 @@ from benchmarks.presets import find_preset
 from benchmarks.results import RunFolder
 from benchmarks.rows import clock_costs, model_costs, rows_of
 from benchmarks.scenes import SMALL_SCENES, dressed_scene
-from benchmarks.training import train_network
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from reference_sim import Trajectory
 
 TINY = dataclasses.replace(find_preset("smoke"), frames=16, settle_frames=4, sheet_cells=4, sheet_frames=5)

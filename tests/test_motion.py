@@ -3,27 +3,24 @@
 import numpy as np
 import pytest
 
-from snug.body import JOINT_NAMES, Body
+from snug.body import Body
 from snug.motion import (
     ARMS_CLEAR,
-    SWING_TEST,
-    SWING_TRAIN,
-    TEST,
-    TRAIN,
     Motion,
     MotionError,
     arm_clearance,
     clear_arms,
     joint_speeds,
-    make_motion,
     place,
     resample,
     spread_arms,
     transition,
 )
+from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, TEST, TRAIN, make_motion
 from snug.motions.posture import poses_from_angles
 from snug.skeleton import (
     JOINT,
+    JOINT_NAMES,
     PARENTS,
     REST_JOINTS,
     global_rotations,
@@ -50,7 +47,7 @@ def test_library_is_large_enough_and_test_kinds_are_unseen(library):
     assert all(motion.kind for motion in library.values())
 
 
-@pytest.mark.parametrize("name", SWING_TRAIN + SWING_TEST)
+@pytest.mark.parametrize("name", DYNAMIC_TRAIN + DYNAMIC_TEST)
 class TestStops:
     """What moves until one frame and not at all after it."""
 
@@ -72,9 +69,9 @@ class TestStops:
 
 
 def test_no_two_stops_are_alike():
-    library = [make_motion(name) for name in SWING_TRAIN + SWING_TEST]
+    library = [make_motion(name) for name in DYNAMIC_TRAIN + DYNAMIC_TEST]
     yaws = [motion.poses[:, 0, 1] + motion.poses[:, [3, 6, 9], 1].sum(axis=1) for motion in library]
-    twist = np.degrees(yaws[len(SWING_TRAIN)])
+    twist = np.degrees(yaws[len(DYNAMIC_TRAIN)])
     assert 40.0 < np.abs(twist).max() <= 45.0 + 1e-9
     for i, one in enumerate(yaws):
         for other in yaws[i + 1 :]:
@@ -169,7 +166,7 @@ def test_names_list_equals_the_tables():
     from snug.motions import ACTIONS, GAITS, STOPS
 
     assert set(TRAIN + TEST) == set(ACTIONS) | set(GAITS)
-    assert tuple(STOPS) == SWING_TRAIN + SWING_TEST
+    assert tuple(STOPS) == DYNAMIC_TRAIN + DYNAMIC_TEST
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ from cmu_clips import METRES, amc_frame, write_clip
 from scipy.spatial.transform import Rotation
 
 from snug.body import Body
-from snug.formats.asf_amc import CMU_RATE, read_amc, read_asf, read_asf_amc
-from snug.formats.retarget import GLITCH, JOINT_BONES, LIMBS, repair
-from snug.motion import load_motions
+from snug.formats.asf_amc import read_amc, read_asf
+from snug.formats.retarget import CMU_RATE, GLITCH, JOINT_BONES, LIMBS, read_asf_amc, repair
+from snug.motion_files import load_motions
 from snug.skeleton import JOINT, global_rotations, joint_positions, rotation_matrices, sole_points
 
 CLIPS = Path(os.environ.get("CMU_MOTIONS", Path(__file__).parents[2] / "shared/data/cmu"))

@@ -1,5 +1,6 @@
-"""A roll-out is the network one frame at a time: timed, in the world, and as long as the motion."""
+"""A roll-out is the network one frame at a time: in the world, and as long as the motion."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import torch
 from dressing import swaying, tube_dress
 
 from snug.recipe import DEFAULT, PAPER
-from snug.rollout import RollOutError, roll_out
+from snug.rollout import RollOutError, predictions, roll_out
 from snug.train import untrained_model
 from snug.trained_model import TrainedModel, make_network
 
@@ -36,19 +37,23 @@ def test_frame_by_frame_equals_the_whole_sequence(kind):
     assert offsets.abs().max() > 1e-3
 
 
-def test_every_frame_is_timed():
-    dressed, motion = tube_dress(), swaying()
-    run = roll_out(untrained_model("snug", dressed, [motion], seed=0), dressed, motion)
-    assert run.frame_seconds.shape == (motion.frames,)
-    assert (run.frame_seconds > 0).all() and np.median(run.frame_seconds) < 0.05
-
-
-def test_held_pose_forgets_the_past_and_the_velocity():
+def test_predictions_are_the_roll_out_a_frame_when_it_is_asked_for():
     dressed, motion = tube_dress(), swaying()
     model = untrained_model("snug", dressed, [motion], seed=0)
-    held = roll_out(model, dressed, motion, held_pose=True)
+    run, frames = roll_out(model, dressed, motion), predictions(model, dressed, motion)
+    assert run.frame_seconds.shape == (motion.frames,) and np.isnan(run.frame_seconds).all()
+    start = time.perf_counter()
+    first = next(frames)
+    assert time.perf_counter() - start < 0.05
+    assert np.array_equal([first, *frames], run.positions)
+
+
+def test_a_quasi_static_frame_forgets_the_past_and_the_velocity():
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    held = roll_out(model, dressed, motion, quasi_static=True)
     reordered = type(motion)("back", motion.poses[::-1], motion.translations[::-1] * 2.0)
-    back = roll_out(model, dressed, reordered, held_pose=True)
+    back = roll_out(model, dressed, reordered, quasi_static=True)
     pelvis, other = dressed.pelvis(motion)[:, None], dressed.pelvis(reordered)[:, None]
     assert np.abs((held.positions - pelvis) - (back.positions - other)[::-1]).max() < 1e-5
     assert np.isnan(held.frame_seconds).all()

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from misbehaving import interrupt_at
-from test_cell_tasks import TINY, NoLog, finish, found_of, of_session, outcome_of, plan_of
+from test_cell_tasks import TINY, NoLog, found_of, of_session, outcome_of, plan_of
 
 from benchmarks import execution, run
 from benchmarks.cache import Cache

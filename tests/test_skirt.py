@@ -6,16 +6,18 @@ import igl
 import numpy as np
 import pytest
 from meshes import edge_counts, girth
+from tasks_by_hand import context, dressed_scene
 
-from benchmarks.hem_dynamics import held_simulation
+from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
-from benchmarks.scenes import dressed_scene
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
+from benchmarks.results import RunFolder
+from benchmarks.tasks.ground_truth import SimulateQuasiStatic
+from reference_sim import Trajectory
 from snug.body import Body
-from snug.dresser import DressedBody
+from snug.dressed_body import DressedBody
 from snug.garments import GarmentError, tailor_skirt, tailor_tshirt
-from snug.motion import make_motion
+from snug.motion_library import make_motion
 from snug.recipe import DEFAULT
 from snug.rollout import roll_out
 from snug.train import train, untrained_model
@@ -36,12 +38,12 @@ def skirt(body):
 
 @pytest.fixture(scope="module")
 def small():
-    return open_wardrobe(TINY, embedded_motions(["turning_stop"]), ["skirt"])
+    return open_assets(TINY, embedded_motions(["turning_stop"]), ["skirt"])
 
 
 @pytest.fixture(scope="module")
 def scene(small):
-    return dressed_scene("turning_stop@clip", "skirt").build(TINY, small)
+    return dressed_scene("turning_stop", "skirt", part="clip").build(small)
 
 
 def test_a_skirt_fits_waist_and_hips_and_has_two_even_rims(body, skirt):
@@ -78,11 +80,11 @@ def test_the_body_carries_the_waistband_close_and_nothing_of_a_shirt(body, skirt
     motion = make_motion("turning_stop")
     frames = slice(20, 60, 10)
     poses, translations = motion.poses[frames], motion.translations[frames]
-    carried, skins = skirt.carried(body, poses, translations), body.vertices(poses, translations)
-    assert carried.shape == (4, len(skirt.pins), 3)
-    for band, skin in zip(carried, skins, strict=True):
+    transported, skins = skirt.body_transported(body, poses, translations), body.vertices(poses, translations)
+    assert transported.shape == (4, len(skirt.pins), 3)
+    for band, skin in zip(transported, skins, strict=True):
         assert np.abs(igl.signed_distance(band, skin, body.faces)[0]).max() < 0.02
-    still = skirt.carried(body, np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
+    still = skirt.body_transported(body, np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
     assert still == pytest.approx(skirt.rest_positions[skirt.pins], abs=1e-12)
     assert len(tailor_tshirt(body, vertices=300).pins) == 0
 
@@ -96,11 +98,15 @@ def handles(scene):
     return np.stack([scene.pin_positions(frame) for frame in range(scene.frames)])
 
 
-def test_simulated_and_held_still_the_waistband_goes_with_the_body(scene, tmp_path):
+def test_simulated_and_held_still_the_waistband_goes_with_the_body(scene, small, tmp_path):
     method = find_method("simulation").make(models=tmp_path, seed=0)
     method.prepare(scene)
     moving = method.run().positions
-    still = held_simulation(scene, tmp_path / "held.vtkhdf").positions
+    declared = dressed_scene("turning_stop", "skirt", part="clip")
+    task = SimulateQuasiStatic(name="skirt", label="", inputs={}, modules=(), scene=declared)
+    task.run(context(tmp_path, small), {})
+    path = RunFolder(tmp_path).quasi_static_path(scene.name, "simulation")
+    still = Trajectory.load(path).positions
     pins = scene.cloth.pins
     for positions in (moving, still):
         assert positions[:, pins] == pytest.approx(handles(scene), abs=1e-9)

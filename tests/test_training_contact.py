@@ -1,4 +1,4 @@
-"""Contact anchors of a training set: first searches, lending, and sliding in between."""
+"""Contact anchors of a training set: first searches, propagation, and walks in between."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pytest
 import torch
 from dressing import swaying, tube_dress
 
-from snug.contact import Anchors
+from snug.contact import ContactCache
 from snug.recipe import DEFAULT
 from snug.skeleton import JOINT
 from snug.skinning import skin
-from snug.sliding import beyond_sides
+from snug.surface_walk import triangle_adjacency
 from snug.trainer import Trainer
-from snug.training_contact import FIRST_LENT, FIRST_NEAR, LENT, NEAR
+from snug.training_contact import FIRST_NEAR, FIRST_PROPAGATED, NEAR, PROPAGATED
 
 MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
 PLAIN = replace(DEFAULT, mixed=0.0)
@@ -27,26 +27,28 @@ def made(motions=MOTIONS, **options):
 
 def test_across_a_side_lies_the_face_that_shares_it():
     faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]])
-    assert beyond_sides(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
+    assert triangle_adjacency(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
 
 
 def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
     searched = []
-    renew = Anchors.renew
+    requery = ContactCache.requery
     monkeypatch.setattr(
-        Anchors, "renew", lambda self, frame, *rest: (searched.append(frame), renew(self, frame, *rest))
+        ContactCache,
+        "requery",
+        lambda self, frame, *rest: (searched.append(frame), requery(self, frame, *rest)),
     )
     trainer = made()
     monkeypatch.undo()
     assert trainer.contact is not None and trainer.contact._mean_shape is not None
-    anchors, patch = trainer.contact.anchors, trainer.contact.patch
-    at_rest = Anchors(patch, 1).faces[0]
+    anchors, patch = trainer.contact.cache, trainer.contact.patch
+    at_rest = ContactCache(patch, 1).faces[0]
     body = trainer.contact._mean_shape[0]
     for frame in range(41):  # marks are not all vertices: some move a little more than twice FIRST_NEAR
         near = [
             other
             for other in searched
-            if (other < 30) == (frame < 30) and abs(other - frame) <= FIRST_LENT
+            if (other < 30) == (frame < 30) and abs(other - frame) <= FIRST_PROPAGATED
             and np.linalg.norm(body[other] - body[frame], axis=1).max() < 2.6 * FIRST_NEAR
         ]  # fmt: skip
         assert any((anchors.faces[frame] == anchors.faces[other]).all() for other in near), frame
@@ -67,12 +69,10 @@ def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
     trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=PLAIN, kernels=kernels)
     contact = trainer.contact
     assert contact is not None
-    before = [
-        torch.as_tensor(table).clone() for table in (contact.anchors.faces, contact.anchors.barycentric)
-    ]
+    before = [torch.as_tensor(table).clone() for table in (contact.cache.faces, contact.cache.barycentric)]
 
     def kept():
-        now = (contact.anchors.faces, contact.anchors.barycentric)
+        now = (contact.cache.faces, contact.cache.barycentric)
         return [torch.equal(torch.as_tensor(table), held) for table, held in zip(now, before)]
 
     batch = trainer.data.batch(np.arange(4), None)
@@ -107,76 +107,76 @@ def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
         assert np.allclose(np.asarray(positions)[row], expected, atol=1e-4)
 
 
-def lent(motions, frame, monkeypatch):
+def propagated(motions, frame, monkeypatch):
     """The frames that have the anchors of `frame`, of 41, once it alone has been searched in a step."""
     trainer = made(motions, contact_refresh=1 / 48)  # one frame a step
     contact = trainer.contact
     assert contact is not None
-    renewed = []
-    renew = contact.anchors.renew
+    searched = []
+    requery = contact.cache.requery
 
     def marked(number, *rest, **how):
-        renew(number, *rest, **how)
-        renewed.append(number)
-        contact.anchors.faces[number] = 7
+        requery(number, *rest, **how)
+        searched.append(number)
+        contact.cache.faces[number] = 7
 
-    monkeypatch.setattr(contact.anchors, "renew", marked)
+    monkeypatch.setattr(contact.cache, "requery", marked)
     trainer.order = np.array([frame - 1, *[0] * 15])
     trainer.step(0)
-    assert renewed == [frame]
-    return np.flatnonzero((contact.anchors.faces == 7).all(1)).tolist()
+    assert searched == [frame]
+    return np.flatnonzero((contact.cache.faces == 7).all(1)).tolist()
 
 
-def test_what_is_searched_is_lent_around_it_but_to_no_other_motion(monkeypatch):
+def test_what_is_searched_is_propagated_around_it_but_to_no_other_motion(monkeypatch):
     slow = [swaying(30, degrees=1.0), swaying(11, name="slow", degrees=1.0)]
-    assert LENT == 3
-    assert lent(slow, 28, monkeypatch) == [25, 26, 27, 28, 29]
-    assert lent(slow, 20, monkeypatch) == [17, 18, 19, 20, 21, 22, 23]
+    assert PROPAGATED == 3
+    assert propagated(slow, 28, monkeypatch) == [25, 26, 27, 28, 29]
+    assert propagated(slow, 20, monkeypatch) == [17, 18, 19, 20, 21, 22, 23]
 
 
 def test_what_has_just_been_searched_borrows_nothing(monkeypatch):
     trainer = made([swaying(41, degrees=1.0)], contact_refresh=2 / 48)
     contact = trainer.contact
     assert contact is not None
-    renew = contact.anchors.renew
+    requery = contact.cache.requery
 
     def marked(number, *rest, **how):
-        renew(number, *rest, **how)
-        contact.anchors.faces[number] = number
+        requery(number, *rest, **how)
+        contact.cache.faces[number] = number
 
-    monkeypatch.setattr(contact.anchors, "renew", marked)
+    monkeypatch.setattr(contact.cache, "requery", marked)
     trainer.order = np.array([19, 21, *[0] * 14])  # middle frames 20 and 22
-    contact.anchors.age[[20, 22]] = 5
+    contact.cache.age[[20, 22]] = 5
     trainer.step(0)
-    assert (contact.anchors.faces[[20, 22]] == [[20], [22]]).all()
-    assert (contact.anchors.faces[[18, 24]] == [[20], [22]]).all()
+    assert (contact.cache.faces[[20, 22]] == [[20], [22]]).all()
+    assert (contact.cache.faces[[18, 24]] == [[20], [22]]).all()
 
 
-def test_nothing_is_lent_to_a_frame_in_which_the_body_is_elsewhere(monkeypatch):
+def test_nothing_is_propagated_to_a_frame_in_which_the_body_is_elsewhere(monkeypatch):
     motion = swaying(41, degrees=1.0)
     motion.poses[19, JOINT["spine1"], 0] += 0.2
     motion.poses[22:, JOINT["left_shoulder"], 2] += 0.3
     height = 0.2  # m: of what the spine carries, far more than NEAR in radians of either turn
     assert 0.2 * height > NEAR
-    assert lent([motion], 20, monkeypatch) == [20, 21]
+    assert propagated([motion], 20, monkeypatch) == [20, 21]
 
 
-def test_anchors_slide_while_training_and_are_in_its_state():
+def test_anchors_walk_while_training_and_are_in_its_state():
     trainer, other = made(contact_refresh=0.0), made(contact_refresh=0.0)
     contact, twin = trainer.contact, other.contact
     assert contact is not None and twin is not None
     with torch.no_grad():  # into the skin
         trainer.network.offsets.bias.view(-1, 3)[:, 2] = -0.8
     trainer.step(0)
-    moved = (contact.anchors.faces != twin.anchors.faces).any(1)
+    moved = (contact.cache.faces != twin.cache.faces).any(1)
     assert 0 < moved.sum() < len(moved)
     tensors, facts = contact.state()
     assert set(np.flatnonzero(moved)) <= set(tensors["changed"].tolist()) and len(tensors["changed"]) < len(
         moved
     )
     twin.resume(tensors, facts)
-    assert (twin.anchors.faces == contact.anchors.faces).all()
-    assert (twin.anchors.barycentric == contact.anchors.barycentric).all()
+    assert (twin.cache.faces == contact.cache.faces).all()
+    assert (twin.cache.barycentric == contact.cache.barycentric).all()
 
 
 def test_an_input_that_never_varied_is_not_read():

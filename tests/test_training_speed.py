@@ -19,7 +19,7 @@ from benchmarks.training_speed import convergence, inference, step
 from benchmarks.training_speed.__main__ import PARTS, main
 from benchmarks.training_speed.settings import VALIDATION, Settings
 from reports.convergence import main as draw
-from snug.motion import TEST, TRAIN
+from snug.motion_library import TEST, TRAIN
 from snug.trained_model import TrainedModel
 
 

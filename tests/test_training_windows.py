@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
+from benchmarks.methods.networks import model_path
 from dressing import swaying, tube_dress
 
-from benchmarks.methods.networks import model_path
 from benchmarks.results import RunFolder
 from benchmarks.studies.training_windows import _loss, both_losses, rows
 from snug.recipe import DEFAULT

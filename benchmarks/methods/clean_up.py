@@ -27,7 +27,7 @@ class CleanedNetwork(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         from snug.clean_up import CleanUp
-        from snug.dresser import DressedBody
+        from snug.dressed_body import DressedBody
         from snug.rollout import predictions
         from snug.trained_model import TrainedModel
 
@@ -64,7 +64,7 @@ class CleanedNetwork(Method):
         """What the network holds to be static, cleaned up as well. Never on the clock."""
         from snug.rollout import roll_out
 
-        still = roll_out(self.model, self.dressed, self.motion, held_pose=True)
+        still = roll_out(self.model, self.dressed, self.motion, quasi_static=True)
         cleaned = [self.clean(x, frame) for frame, x in enumerate(still.positions)]
         return replace(still, positions=np.stack(cleaned))
 

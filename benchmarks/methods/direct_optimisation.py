@@ -61,7 +61,7 @@ class DirectOptimisation(Method):
     """One clip. `sums` holds the minimised sum [J] at the end of each round, with that round's planes."""
 
     def prepare(self, scene: BuiltScene) -> None:
-        from snug.dresser import DressedBody
+        from snug.dressed_body import DressedBody
         from snug.recipe import DEFAULT
 
         assert scene.dressed is not None

@@ -26,7 +26,7 @@ class Network(Method):
     path: Path
 
     def prepare(self, scene: BuiltScene) -> None:
-        from snug.dresser import DressedBody
+        from snug.dressed_body import DressedBody
         from snug.rollout import ready_to_roll_out
         from snug.trained_model import TrainedModel
 
@@ -49,7 +49,7 @@ class Network(Method):
         """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""
         from snug.rollout import roll_out
 
-        return roll_out(self.model, self.dressed, self.motion, held_pose=True)
+        return roll_out(self.model, self.dressed, self.motion, quasi_static=True)
 
 
 def make(*, models: Path, seed: int, kind: str) -> Network:

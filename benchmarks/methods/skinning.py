@@ -22,7 +22,7 @@ class Skinning(Method):
     """One linear blend a frame; joint transforms are ready before, as for the networks."""
 
     def prepare(self, scene: BuiltScene) -> None:
-        from snug.dresser import DressedBody
+        from snug.dressed_body import DressedBody
         from snug.recipe import DEFAULT
         from snug.skinning import skin
 

@@ -67,7 +67,7 @@ class WarmStarted(Method):
 
     def _frames(self, scene: BuiltScene) -> Callable[[], Iterator[np.ndarray]]:
         """What gives world positions (V, 3) [m] frame after frame, from the first one on."""
-        from snug.dresser import DressedBody
+        from snug.dressed_body import DressedBody
         from snug.recipe import DEFAULT
         from snug.rollout import predictions, skinned_frames
         from snug.trained_model import TrainedModel

@@ -24,7 +24,7 @@ def build(scene: Scene, assets: Assets, *, settle_frames: int) -> BuiltScene:
     body, garment = assets.body, assets.garments[scene.garment]
     motion = assets.motion(scene.motion, scene.part)
     cloth = Cloth(garment.rest_positions, garment.faces, Material(), pins=garment.pins)
-    handles = garment.carried(body, motion.poses, motion.translations)
+    handles = garment.body_transported(body, motion.poses, motion.translations)
     energies = declared_energies(cloth)
     obstacle = Obstacle(assets.posed_body(motion), body.faces, rest_positions=body.shaped())
     return BuiltScene(
@@ -66,7 +66,7 @@ def settled(
     # The garment, still in its rest shape, goes where the root takes a body in T-pose: a rigid motion.
     root = body.transforms(t_pose[None], translations[:1])[0, 0]
     start = cloth.rest_positions @ root[:, :3].T + root[:, 3]
-    handles = garment.carried(body, poses, translations)
+    handles = garment.body_transported(body, poses, translations)
     trajectory: Trajectory = simulate(
         cloth, energies, dt=1.0 / motion.fps, frames=len(poses), obstacle=obstacle, start=start,
         pin_positions=handles.__getitem__ if len(garment.pins) else None,

@@ -55,7 +55,7 @@ def another_faster(name: str) -> Callable[[Motion], Motion]:
     """Into the first pose of another motion, then that at four times its speed."""
 
     def make(walk: Motion) -> Motion:
-        from snug.motion import make_motion
+        from snug.motion_library import make_motion
 
         other = faster(make_motion(name))
         return _approached(walk, other.poses, other.translations)

@@ -13,7 +13,7 @@ import numpy as np
 from .hard_motion_cases import MOTION, ORDINARY_CASE, HardMotion, looped
 
 if TYPE_CHECKING:
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.motion import Motion
 
     from ..presets import Preset
@@ -56,7 +56,7 @@ class HardStage:
 
     @cached_property
     def dressed(self) -> DressedBody:
-        from snug.dresser import DressedBody
+        from snug.dressed_body import DressedBody
 
         return DressedBody(self.wardrobe.body, self.wardrobe.garment)
 

@@ -119,7 +119,7 @@ _kept: dict[str, HardStage] = {}  # of this worker
 def _stage(wardrobe: Wardrobe, preset: Preset, networks: tuple[Trained, ...]) -> HardStage:
     """The one of this process: the shirt settles and the ordinary walk is done once."""
     if "stage" not in _kept:
-        from snug.motion import make_motion
+        from snug.motion_library import make_motion
 
         walk = make_motion(MOTION)
         _kept["stage"] = HardStage(

@@ -21,7 +21,7 @@ from ..methods.networks import model_path
 from ..results import Row, RunFolder
 
 if TYPE_CHECKING:
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.motion import Motion
 
     from ..plan import Plan
@@ -45,7 +45,7 @@ def there_and_back(motion: Motion) -> Motion:
 
 def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     """Those of every network that the run has trained."""
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.rollout import roll_out
     from snug.trained_model import TrainedModel
 

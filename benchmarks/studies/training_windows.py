@@ -27,7 +27,7 @@ from .long_roll_outs import SUITE
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.trained_model import TrainedModel
     from snug.training_set import Batch
 
@@ -40,7 +40,7 @@ STRIDE = 18  # frames from one window that is looked at to the next: the searche
 
 def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
     """Those of every network of the run that has a past and learned from the energies alone."""
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.trained_model import TrainedModel, find_kind
     from snug.training_set import TrainingError
 
@@ -54,7 +54,7 @@ def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
             continue  # its training has failed, and the run says so
         model = TrainedModel.load(path)
         how = find_kind(model.kind)
-        if model.steps and how.physics and how.sequences and how.teacher is None:
+        if model.steps and how.physics and how.sequences and how.supervision is None:
             try:
                 found += _judged(name, seed, model, dressed, motions)
             except TrainingError as error:  # no given motion has as many frames as a window of this one
@@ -115,8 +115,8 @@ def _offsets(trainer: Any, number: int) -> Tensor:
 
     batch = trainer.data.batch(np.array([number]), None)
     offsets, state = trainer.network(batch.features, trainer.start_state(1, slice(None), batch))
-    if trainer.memory:
-        trainer.memory.keep(batch.frames[:, -1], state)
+    if trainer.hidden_states:
+        trainer.hidden_states.keep(batch.frames[:, -1], state)
     return offsets
 
 

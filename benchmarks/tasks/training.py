@@ -55,7 +55,7 @@ class TrainNetwork(Task):
         import torch
 
         from reference_sim.trajectory import Trajectory
-        from snug.dresser import DressedBody
+        from snug.dressed_body import DressedBody
         from snug.recipe import TRAININGS
         from snug.train import train, untrained_model
         from snug.training_run import Saving

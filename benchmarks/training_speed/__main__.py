@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _configuration(parts: Sequence[str], settings: Settings) -> dict[str, object]:
-    from snug.motion import TRAIN
+    from snug.motion_library import TRAIN
     from snug.recipe import DEFAULT
 
     return {

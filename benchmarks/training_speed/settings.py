@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..wardrobe import embedded_motions
 
 if TYPE_CHECKING:
-    from snug.dresser import DressedBody
+    from snug.dressed_body import DressedBody
     from snug.motion import Motion
 
 VALIDATION = "lunge"  # the training motion that part convergence holds out
@@ -29,7 +29,7 @@ class Settings:
 
 def training_motions() -> list[Motion]:
     """All motions that networks may learn from, whole."""
-    from snug.motion import TRAIN
+    from snug.motion_library import TRAIN
 
     return embedded_motions(TRAIN)
 
@@ -43,8 +43,8 @@ def kind_and_vertices(case: str) -> tuple[str, int]:
 def dressed_body(vertices: int) -> DressedBody:
     """The body in a T-shirt of about so many vertices."""
     from snug.body import Body
-    from snug.dresser import DressedBody
-    from snug.garments import find_pattern
+    from snug.dressed_body import DressedBody
+    from snug.garments import find_template
 
     body = Body.load()
-    return DressedBody(body, find_pattern("tshirt").tailor(body, vertices=vertices))
+    return DressedBody(body, find_template("tshirt").tailor(body, vertices=vertices))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from snug.formats.amass import read_amass
-from snug.formats.asf_amc import read_asf_amc
+from snug.formats.retarget import read_asf_amc
 from snug.motion import Motion
 
 # Extension of a motion file: its reader. Each gives the clip as recorded, in Body's convention.

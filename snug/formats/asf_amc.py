@@ -14,10 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from snug.motion import Motion, MotionError
+from snug.motion import MotionError
 
 INCH = 0.0254  # [m]
-CMU_RATE = 120.0  # [1/s] the format has no field for it
 _ROTATIONS = ("rx", "ry", "rz")
 _TRANSLATIONS = ("tx", "ty", "tz")
 
@@ -65,26 +64,6 @@ class _Line:
         if not all(map(math.isfinite, values)) or (last is not None and len(values) != last - first):
             raise self.error(f"'{text}' has a missing or infinite number; fetch the file again")
         return values
-
-
-def read_asf_amc(path: Path, *, fps: float = CMU_RATE) -> Motion:
-    """One .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf) -> Motion, y up, in metres.
-
-    Glitches are repaired and named in the motion's source. Raises MotionError.
-    """
-    from snug.formats.retarget import retarget
-
-    stem = path.stem
-    names = (stem, stem.split("_")[0])
-    candidates = [path.with_name(name + end) for name in names for end in (".asf", ".ASF")]
-    skeleton_file = next((file for file in candidates if file.is_file()), None)
-    if skeleton_file is None:
-        raise MotionError(f"{path}: its skeleton {stem.split('_')[0]}.asf is missing; put it beside the clip")
-    skeleton = read_asf(skeleton_file)
-    channels = read_amc(path, skeleton)
-    poses, translations, repairs = retarget(skeleton, channels, skeleton_file, fps)
-    source = "; ".join([f"{path.name} with {skeleton_file.name}", *repairs])
-    return Motion(stem, poses, translations, fps, "recorded", source)
 
 
 def read_asf(path: Path) -> Skeleton:

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from snug.formats.asf_amc import Skeleton, turns
-from snug.motion import MotionError
+from snug.formats.asf_amc import Skeleton, read_amc, read_asf, turns
+from snug.motion import Motion, MotionError
 from snug.skeleton import JOINT, JOINT_NAMES, LEG_LENGTH, PARENTS, REST_JOINTS, axis_angles, rotation_matrices
 
+CMU_RATE = 120.0  # [1/s] the .amc format has no field for it
 # Our joint: the CMU bone whose turn it takes. Thumbs and the half bones inside hips and neck are not needed.
 JOINT_BONES = {
     "pelvis": "root", "spine1": "lowerback", "spine2": "upperback", "spine3": "thorax",
@@ -41,6 +42,24 @@ HAND_DAMPING = 0.1
 GLITCH = np.deg2rad(30.0) * 120.0  # [rad/s]
 GLITCH_SECONDS = 0.25  # two jumps closer than this bound one glitch
 GLITCH_MARGIN = 2  # frames on either side of a jump that are not trusted
+
+
+def read_asf_amc(path: Path, *, fps: float = CMU_RATE) -> Motion:
+    """One .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf) -> Motion, y up, in metres.
+
+    Glitches are repaired and named in the motion's source. Raises MotionError.
+    """
+    stem = path.stem
+    names = (stem, stem.split("_")[0])
+    candidates = [path.with_name(name + end) for name in names for end in (".asf", ".ASF")]
+    skeleton_file = next((file for file in candidates if file.is_file()), None)
+    if skeleton_file is None:
+        raise MotionError(f"{path}: its skeleton {stem.split('_')[0]}.asf is missing; put it beside the clip")
+    skeleton = read_asf(skeleton_file)
+    channels = read_amc(path, skeleton)
+    poses, translations, repairs = retarget(skeleton, channels, skeleton_file, fps)
+    source = "; ".join([f"{path.name} with {skeleton_file.name}", *repairs])
+    return Motion(stem, poses, translations, fps, "recorded", source)
 
 
 def retarget(

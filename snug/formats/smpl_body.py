@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snug.body import JOINT_NAMES, BodyError
+from snug.skeleton import JOINT_NAMES, BodyError
 
 REQUIRED = ("v_template", "shapedirs", "weights", "kintree_table", "f")
 SHAPES = 10  # coefficients kept when a file has more

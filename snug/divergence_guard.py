@@ -29,7 +29,7 @@ MEMORY = 0.98  # of the usual energy, per step
 SNAPSHOT_EVERY = 100  # steps between two copies of good weights
 
 
-class Guard:
+class DivergenceGuard:
     """Judges each batch before its update. spike [J]: see Recipe; None where the loss is no energy."""
 
     def __init__(self, network: nn.Module, optimiser: optim.Optimizer, *, spike: float | None) -> None:

@@ -14,17 +14,17 @@ from snug.baselines.supervised import TargetError
 from snug.loss import PhysicsLoss
 from snug.motion import Motion
 from snug.motion_inputs import RATED, motion_rates
+from snug.pca_dynamics import DynamicsSupervision
 from snug.recipe import DEFAULT, DYNAMIC, TRAININGS
 from snug.rollout import roll_out
 from snug.skeleton import axis_angles, rotation_matrices
 from snug.skinning import unposed
-from snug.swing import SwingTeacher
 from snug.train import train
 from snug.trained_model import TrainedModel, make_network
 from snug.trainer import Trainer
 from snug.training_set import TrainingSet
 
-SMALL = replace(DYNAMIC, swing_components=6, rehearsal=0)
+SMALL = replace(DYNAMIC, pca_components=6, pretraining=0)
 
 
 def swung(motion, seed=0):
@@ -39,24 +39,24 @@ def swung(motion, seed=0):
 
 @pytest.fixture(scope="module")
 def lesson():
-    """Two motions, what was simulated of them, and the teacher."""
+    """Two motions, what was simulated of them, and the supervision."""
     motions = [swaying(30), swaying(26, name="other", degrees=15.0)]
     made = [swung(motion) for motion in motions]
     dressed = tube_dress()
     data = TrainingSet(dressed, motions, SMALL, features="rates", sequences=True)
     trajectories = {motion.name: x for motion, (x, _) in zip(motions, made)}
-    teacher = SwingTeacher(data, motions, trajectories, dressed.weights(SMALL.smoothing), SMALL)
-    return data, teacher, torch.cat([offsets for _, offsets in made])
+    supervision = DynamicsSupervision(data, motions, trajectories, dressed.weights(SMALL.smoothing), SMALL)
+    return data, supervision, torch.cat([offsets for _, offsets in made])
 
 
-def rehearsed(lesson, steps):
-    """A network after that many updates of a rehearsal, its teacher, and the data with coordinates."""
-    data, teacher = copy.copy(lesson[0]), copy.copy(lesson[1])
-    teacher.data = data
+def pretrained(lesson, steps):
+    """A network after that many updates of a pretraining, its supervision, and the data with coordinates."""
+    data, supervision = copy.copy(lesson[0]), copy.copy(lesson[1])
+    supervision.data = data
     network = make_network("dynamic", data.features.shape[1], tube_dress().vertices, SMALL, seed=0)
     network.normalise_by(*data.input_statistics())
-    teacher.start(network, steps=steps, sigma=0.1, seed=3)
-    return network, teacher, data
+    supervision.pretrain(network, steps=steps, sigma=0.1, seed=3)
+    return network, supervision, data
 
 
 def test_unposing_is_the_inverse_of_skinning():
@@ -69,39 +69,41 @@ def test_unposing_is_the_inverse_of_skinning():
 
 
 def test_the_components_span_the_swing(lesson):
-    _, teacher, offsets = lesson
-    assert float(teacher.spread[2]) > 100 * float(teacher.spread[3])  # it swings in three ways
-    torch.testing.assert_close(teacher.directions @ teacher.directions.T, torch.eye(6), atol=1e-4, rtol=0)
-    sizes = teacher.coordinates * teacher.spread
-    back = teacher.mean + sizes[:, :3] @ teacher.directions[:3]
+    _, supervision, offsets = lesson
+    assert float(supervision.spread[2]) > 100 * float(supervision.spread[3])  # it swings in three ways
+    torch.testing.assert_close(
+        supervision.directions @ supervision.directions.T, torch.eye(6), atol=1e-4, rtol=0
+    )
+    sizes = supervision.coordinates * supervision.spread
+    back = supervision.mean + sizes[:, :3] @ supervision.directions[:3]
     torch.testing.assert_close(back, offsets.flatten(1), atol=1e-5, rtol=0)
 
 
-def test_the_told_swing_costs_nothing_and_another_as_inertia_would(lesson):
-    _, teacher, data = rehearsed(lesson, 0)
+def test_the_predicted_swing_costs_nothing_and_another_as_inertia_would(lesson):
+    _, supervision, data = pretrained(lesson, 0)
     batch = data.batch(np.array([4]), None)
-    told = data.features[torch.as_tensor(batch.frames), -6:] * teacher.spread
-    exact = (teacher.mean + told @ teacher.directions).unflatten(-1, (-1, 3))
-    assert float(teacher.swing(exact, batch).max()) < 1e-8
-    along = 0.004 * teacher.directions[1].view(1, 1, -1, 3)
+    predicted = data.features[torch.as_tensor(batch.frames), -6:] * supervision.spread
+    exact = (supervision.mean + predicted @ supervision.directions).unflatten(-1, (-1, 3))
+    assert float(supervision.energy(exact, batch).max()) < 1e-8
+    along = 0.004 * supervision.directions[1].view(1, 1, -1, 3)
     mass = float(tube_dress().cloth.masses.mean())
-    expected = 0.5 * SMALL.swing * mass * 30.0**2 * 0.004**2
+    expected = 0.5 * SMALL.pca_dynamics * mass * 30.0**2 * 0.004**2
     torch.testing.assert_close(
-        teacher.swing(exact + along, batch), torch.full((1, SMALL.window), expected), rtol=1e-3, atol=0
+        supervision.energy(exact + along, batch), torch.full((1, SMALL.window), expected), rtol=1e-3, atol=0
     )
 
 
-def test_a_rehearsal_brings_the_recurrent_units_to_the_coordinates(lesson):
+def test_pretraining_brings_the_recurrent_units_to_the_coordinates(lesson):
     apart = []
     for steps in (0, 60, 60):
-        _, teacher, data = rehearsed(lesson, steps)
-        wrong = (data.features[:, -6:] - teacher.coordinates) * teacher.spread
+        _, supervision, data = pretrained(lesson, steps)
+        wrong = (data.features[:, -6:] - supervision.coordinates) * supervision.spread
         apart.append(float(wrong.square().sum(-1).mean()))
     assert apart[1] < 0.3 * apart[0] and apart[2] == apart[1]  # and the same again
 
 
-def test_a_whole_motion_and_windows_with_known_coordinates_meet_the_same_dresser(lesson):
-    network, _, data = rehearsed(lesson, 5)
+def test_a_whole_motion_and_windows_with_known_coordinates_meet_the_same_decoder(lesson):
+    network, _, data = pretrained(lesson, 5)
     torch.nn.init.normal_(network.offsets.weight, generator=torch.Generator().manual_seed(0))
     whole = data.features[None, : data.first[1]]
     inputs = lesson[0].features.shape[1]
@@ -116,8 +118,8 @@ def test_a_whole_motion_and_windows_with_known_coordinates_meet_the_same_dresser
     torch.testing.assert_close(torch.cat([first, rest], 1), known, atol=1e-4, rtol=1e-4)
 
 
-def test_energies_leave_the_rehearsed_swing_alone(lesson):
-    network, _, data = rehearsed(lesson, 5)
+def test_energies_leave_the_pretrained_dynamics_alone(lesson):
+    network, _, data = pretrained(lesson, 5)
     offsets, _ = network(data.features[None, :4])
     offsets.sum().backward()
     moved = {name.partition(".")[0] for name, p in network.named_parameters() if p.grad is not None}
@@ -128,12 +130,12 @@ def test_too_few_frames_for_the_components_are_refused():
     motion = swaying(24)
     data = TrainingSet(tube_dress(), [motion], SMALL, features="rates", sequences=True)
     with pytest.raises(TargetError, match="24 simulated frames"):
-        SwingTeacher(
+        DynamicsSupervision(
             data, [motion], {motion.name: swung(motion)[0]}, tube_dress().weights(SMALL.smoothing),
-            replace(SMALL, swing_components=24),
+            replace(SMALL, pca_components=24),
         )  # fmt: skip
     with pytest.raises(TargetError, match="no simulated trajectory"):
-        SwingTeacher(data, [motion], {"else": swung(motion)[0]}, tube_dress().weights(0), SMALL)
+        DynamicsSupervision(data, [motion], {"else": swung(motion)[0]}, tube_dress().weights(0), SMALL)
 
 
 def turning(rate=1.5, frames=20, heading=0.0):
@@ -182,36 +184,36 @@ def test_training_learns_the_swing_and_the_file_brings_it_back(tmp_path):
     rows: list[dict[str, float]] = []
     assert TRAININGS["snug-dynamic"].simulated
     model = train(
-        "dynamic", tube_dress(), motions, steps=16, seed=1, recipe=replace(SMALL, rehearsal=30),
+        "dynamic", tube_dress(), motions, steps=16, seed=1, recipe=replace(SMALL, pretraining=30),
         trajectories=trajectories, log=rows.append, progress=False, every=4,
     )  # fmt: skip
-    assert rows[-1]["loss"] < rows[0]["loss"] and rows[0]["swing"] > 0
+    assert rows[-1]["loss"] < rows[0]["loss"] and rows[0]["pca_dynamics"] > 0
     again = TrainedModel.load(model.save(tmp_path / "dynamic.safetensors"))
     one, two = (roll_out(m, tube_dress(), motions[0]).positions for m in (model, again))
     np.testing.assert_array_equal(one, two)
     # Held still, a pose is answered as if nothing had moved before it.
-    held = roll_out(again, tube_dress(), motions[0], held_pose=True).positions
+    held = roll_out(again, tube_dress(), motions[0], quasi_static=True).positions
     resting = motions[0].cut(0, 1)
-    alone = roll_out(again, tube_dress(), resting, held_pose=True).positions
+    alone = roll_out(again, tube_dress(), resting, quasi_static=True).positions
     np.testing.assert_allclose(held[0], alone[0], atol=1e-5)
     assert np.abs(held - one).max() > 1e-3
 
 
-def test_mixed_frames_are_told_a_swing_that_only_simulated_ones_teach(monkeypatch):
-    rehearsed_on: list[int] = []
-    whole = SwingTeacher._apart
+def test_mixed_frames_get_a_swing_that_only_simulated_ones_teach(monkeypatch):
+    pretrained_on: list[int] = []
+    whole = DynamicsSupervision._apart
 
     def apart(self, network, chosen, *rest):
-        rehearsed_on.extend(chosen)
+        pretrained_on.extend(chosen)
         return whole(self, network, chosen, *rest)
 
-    monkeypatch.setattr(SwingTeacher, "_apart", apart)
+    monkeypatch.setattr(DynamicsSupervision, "_apart", apart)
     motion = swaying(30)
     trainer = Trainer(
-        "dynamic", tube_dress(), [motion], steps=2, seed=1, recipe=replace(SMALL, mixed=2.0, rehearsal=4),
+        "dynamic", tube_dress(), [motion], steps=2, seed=1, recipe=replace(SMALL, mixed=2.0, pretraining=4),
         trajectories={motion.name: swung(motion)[0]},
     )  # fmt: skip
-    assert trainer.data.frames == 30 + 60 and set(rehearsed_on) == {0}
-    assert trainer.teacher.coordinates.shape == (30, 6)
+    assert trainer.data.frames == 30 + 60 and set(pretrained_on) == {0}
+    assert trainer.supervision.coordinates.shape == (30, 6)
     assert trainer.data.features[30:, -6:].abs().sum(-1).min() > 0  # mixed frames have coordinates too
-    assert trainer.step(0)["swing"] > 0 and trainer.rehearsed > 0
+    assert trainer.step(0)["pca_dynamics"] > 0 and trainer.pretraining_seconds > 0

@@ -1,4 +1,4 @@
-"""How a remembered contact anchor follows its garment sample over the skin, without a search.
+"""How a cached contact anchor follows its garment sample over the skin, without a search.
 
 An anchor moves as a bead on the skin would: to the foot of its sample on the anchor's face and, where the
 foot is outside, over a side that it is outside of onto the next face, until a foot is inside or a side or a
@@ -17,20 +17,32 @@ SLACK = 0.001  # m: beyond the margin, and still followed
 CROSSINGS = 12  # sides that an anchor may cross at a time: some 15 cm
 
 
-def beyond_sides(faces: np.ndarray) -> np.ndarray:
+def triangle_adjacency(faces: np.ndarray) -> np.ndarray:
     """Faces (Q, 3) of a mesh -> (Q, 3) int32: the face across the side opposite to each corner, or -1."""
     sides = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
     _, number = np.unique(sides, axis=0, return_inverse=True)
     order = np.argsort(number.ravel(), kind="stable")
-    beyond = np.full(len(sides), -1, np.int32)
+    adjacency = np.full(len(sides), -1, np.int32)
     twins = np.flatnonzero(np.diff(number.ravel()[order]) == 0)
     first, second = order[twins], order[twins + 1]
-    beyond[first], beyond[second] = second // 3, first // 3
-    return beyond.reshape(-1, 3)
+    adjacency[first], adjacency[second] = second // 3, first // 3
+    return adjacency.reshape(-1, 3)
 
 
 @njit(cache=True, error_model="numpy")
-def slid(x0, x1, x2, face, skin, faces, beyond, centroids, home, reach, corners):
+def walk_to_foot(
+    x0: np.float32,
+    x1: np.float32,
+    x2: np.float32,
+    face: np.uint32,
+    skin: np.ndarray,
+    faces: np.ndarray,
+    adjacency: np.ndarray,
+    centroids: np.ndarray,
+    home: np.ndarray,
+    reach: np.float32,
+    corners: np.ndarray,
+) -> tuple[np.uint32, np.float32, np.float32]:
     """Face, and weights of its second and third corner, where an anchor comes to rest for a sample at x.
 
     centroids (Q, 3) and home (3,) [m] at rest, reach [m^2]: the rule of regions, squared. corners (1, 3, 3):
@@ -55,7 +67,7 @@ def slid(x0, x1, x2, face, skin, faces, beyond, centroids, home, reach, corners)
         if u >= zero and v >= zero and w >= zero:
             return face, v, w
         side = 0 if u <= v and u <= w else 1 if v <= w else 2
-        other = beyond[face, side]
+        other = adjacency[face, side]
         if other < 0 or np.uint32(other) == last:
             break
         d0, d1, d2 = (

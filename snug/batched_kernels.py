@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
 from reference_sim.kernel_cache import njit
 
 LANES = 16
@@ -34,23 +34,29 @@ _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
 )  # fmt: skip
 
 
+Kernel = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
 @lru_cache(maxsize=16)
-def lane_kernel(energy: Any) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] | None:
+def batched_kernel(energy: Energy) -> Kernel | None:
     """x (N, V, 3) float32 -> values (N,) [J], gradients (N, V, 3) [N] of this energy; None if it has none."""
-    if type(energy) is StretchStVK:
-        Dm_inverse = energy.Dm_inverse.reshape(-1, 4).astype(np.float32)
-        areas = energy.areas.astype(np.float32)
-        lame = (np.float32(energy.lam), np.float32(energy.mu))
-        return _runner(_strain, energy.stencils, (Dm_inverse, areas, *lame))
-    if type(energy) is BendHinge:
-        constants = (energy.stiffness.astype(np.float32), energy.rest_angles.astype(np.float32))
-        return _runner(_bending, energy.stencils, constants)
-    if type(energy) is Gravity:
-        return _weighed(energy)
-    return None
+    make = KERNELS.get(type(energy))
+    return make(energy) if make else None
 
 
-def _weighed(energy: Gravity) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+def _membrane(energy: Any) -> Kernel:
+    Dm_inverse = energy.Dm_inverse.reshape(-1, 4).astype(np.float32)
+    areas = energy.areas.astype(np.float32)
+    lame = (np.float32(energy.lam), np.float32(energy.mu))
+    return _runner(_strain, energy.stencils, (Dm_inverse, areas, *lame))
+
+
+def _hinges(energy: Any) -> Kernel:
+    constants = (energy.stiffness.astype(np.float32), energy.rest_angles.astype(np.float32))
+    return _runner(_bending, energy.stencils, constants)
+
+
+def _weight(energy: Any) -> Kernel:
     weights = energy.weights.astype(np.float32)
     zero = np.float32(energy.weights.sum() * energy.origin_height)
 
@@ -62,7 +68,7 @@ def _weighed(energy: Gravity) -> Callable[[np.ndarray], tuple[np.ndarray, np.nda
     return run
 
 
-def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Any:
+def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Kernel:
     stencils = stencils.astype(np.int32)
 
     def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -80,8 +86,16 @@ def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> An
     return run
 
 
+# Energies that have a kernel here, and what makes it. An energy without one is none the less trained.
+KERNELS: dict[type[Energy], Callable[[Any], Kernel]] = {
+    StretchStVK: _membrane,
+    BendHinge: _hinges,
+    Gravity: _weight,
+}
+
+
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
-def _arctan2(y, x):
+def _arctan2(y: np.float32, x: np.float32) -> np.float32:
     """In float32, without a branch; (0, 0) gives 0."""
     along, across = abs(x), abs(y)
     t = min(along, across) / (max(along, across) + np.float32(1e-37))
@@ -97,19 +111,26 @@ def _arctan2(y, x):
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _take(x, i, u, corner):
+def _take(x: np.ndarray, i: int, u: np.ndarray, corner: int) -> None:
     for j in range(3 * LANES):
         u[3 * LANES * corner + j] = x[i, j]
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _give(u, corner, gradient, i):
+def _give(u: np.ndarray, corner: int, gradient: np.ndarray, i: int) -> None:
     for j in range(3 * LANES):
         gradient[i, j] += u[3 * LANES * corner + j]
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _bending(x, hinges, stiffness, rest, values, gradients):
+def _bending(
+    x: np.ndarray,
+    hinges: np.ndarray,
+    stiffness: np.ndarray,
+    rest: np.ndarray,
+    values: np.ndarray,
+    gradients: np.ndarray,
+) -> None:
     """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, see bend_hinge._half."""
     L = LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
@@ -151,7 +172,16 @@ def _bending(x, hinges, stiffness, rest, values, gradients):
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
+def _strain(
+    x: np.ndarray,
+    faces: np.ndarray,
+    Dm_inverse: np.ndarray,
+    areas: np.ndarray,
+    lam: np.float32,
+    mu: np.float32,
+    values: np.ndarray,
+    gradients: np.ndarray,
+) -> None:
     """E = A (lambda/2 tr(G)^2 + mu tr(G^2)), dE/dx_a = A F S b_a, see stretch_stvk._gradient."""
     L = LANES
     u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)

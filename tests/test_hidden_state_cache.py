@@ -9,8 +9,8 @@ import pytest
 import torch
 from dressing import swaying, tube_dress
 
+from snug.hidden_state_cache import HiddenStateCache
 from snug.recipe import DEFAULT, SUPERVISED
-from snug.state_memory import StateMemory
 from snug.trainer import Trainer
 
 RECIPE = replace(DEFAULT, mixed=0.0, h0_sigma=0.0)
@@ -22,7 +22,7 @@ def made(recipe=RECIPE, kind="snug", steps=12):
 
 
 def test_a_frame_is_given_what_was_kept_after_the_one_before():
-    memory = StateMemory(np.array([0, 5, 8]), (2, 3), torch.device("cpu"))
+    memory = HiddenStateCache(np.array([0, 5, 8]), (2, 3), torch.device("cpu"))
     assert memory.at(np.array([0, 3, 5])).abs().max() == 0.0
     states = torch.arange(12.0).view(2, 2, 3) + 1.0
     memory.keep(np.array([3, 4]), states)
@@ -35,7 +35,7 @@ def test_with_weights_that_stand_still_what_is_remembered_becomes_a_roll_out():
     trainer = made(replace(RECIPE, learning_rate=1e-12, window=3), steps=400)
     for number in range(400):
         trainer.step(number)
-    assert trainer.memory is not None
+    assert trainer.hidden_states is not None
     data, network = trainer.data, trainer.network
     for first, end in zip(data.first[:-1], data.first[1:]):
         for begin in (first, first + 1, first + 2):  # of a roll-out whose frames 3, 6, 9 ... end windows
@@ -44,15 +44,15 @@ def test_with_weights_that_stand_still_what_is_remembered_becomes_a_roll_out():
                 for frame in range(begin, end):
                     _, state = network(data.features[None, frame : frame + 1], state)
                     if (frame - begin) % 3 == 2:
-                        kept = trainer.memory.states[:, frame]
+                        kept = trainer.hidden_states.states[:, frame]
                         assert (kept - state[:, 0]).abs().max() < 1e-5 * state.abs().max()
-        assert trainer.memory.states[:, first : first + 2].abs().max() == 0.0  # these end no window
+        assert trainer.hidden_states.states[:, first : first + 2].abs().max() == 0.0  # these end no window
 
 
 def test_windows_start_from_what_is_remembered(monkeypatch):
     trainer = made()
-    assert trainer.memory is not None
-    trainer.memory.states[:] = 0.5
+    assert trainer.hidden_states is not None
+    trainer.hidden_states.states[:] = 0.5
     seen = []
     predict = trainer.predict
     monkeypatch.setattr(trainer, "predict", lambda batch, state: seen.append(state) or predict(batch, state))
@@ -62,10 +62,10 @@ def test_windows_start_from_what_is_remembered(monkeypatch):
 
 def test_a_batch_that_is_left_out_is_not_remembered():
     trainer = made()
-    assert trainer.memory is not None
+    assert trainer.hidden_states is not None
     trainer.data.features[:] = float("nan")
     trainer.step(0)
-    assert trainer.guard.summary["skipped_updates"] == 1 and trainer.memory.states.abs().max() == 0.0
+    assert trainer.guard.summary["skipped_updates"] == 1 and trainer.hidden_states.states.abs().max() == 0.0
 
 
 @pytest.mark.parametrize(
@@ -82,8 +82,8 @@ def test_who_has_no_past_or_wants_none_remembers_nothing(kind, recipe):
         kind, tube_dress(), MOTIONS, steps=2, seed=0, recipe=recipe,
         trajectories=targets if kind == "supervised" else None,
     )  # fmt: skip
-    assert trainer.memory is None and np.isfinite(trainer.step(0)["loss"])
+    assert trainer.hidden_states is None and np.isfinite(trainer.step(0)["loss"])
 
 
 def test_nothing_is_remembered_where_each_window_has_another_body():
-    assert made(replace(RECIPE, shape_range=1.0)).memory is None and made().memory is not None
+    assert made(replace(RECIPE, shape_range=1.0)).hidden_states is None and made().hidden_states is not None

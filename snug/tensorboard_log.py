@@ -6,21 +6,21 @@ from collections.abc import Mapping
 from pathlib import Path
 
 
-class LogbookError(ValueError):
+class TensorBoardError(ValueError):
     """No curves can be written; the message says what to install."""
 
 
-class Logbook:
+class TensorBoardLog:
     """Writes into a folder; a resumed run adds a file, and TensorBoard joins them.
 
-    Raises LogbookError where TensorBoard is not installed.
+    Raises TensorBoardError where TensorBoard is not installed.
     """
 
     def __init__(self, folder: str | Path) -> None:
         try:
             from torch.utils.tensorboard import SummaryWriter
         except ImportError as error:
-            raise LogbookError(
+            raise TensorBoardError(
                 "--tensorboard: TensorBoard is missing; pip install 'neural-garment-benchmark[tensorboard]'"
             ) from error
         self._writer = SummaryWriter(str(folder))

@@ -1,4 +1,4 @@
-"""Contact anchors held and searched in torch: what `snug.contact.Anchors` does on a CPU, on any device.
+"""Contact anchors held and searched in torch: what `snug.contact.ContactCache` does on a CPU, on any device.
 
 Normals are rounded to the same 127 steps as there, so that both give the same planes. The search is by brute
 force: of all allowed body vertices the nearest few, and of the faces around those the one that comes closest.
@@ -12,8 +12,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from snug.contact import PARTS, Anchors, Patch
-from snug.sliding import CROSSINGS, SLACK
+from snug.contact import PARTS, ContactCache, Patch
+from snug.surface_walk import CROSSINGS, SLACK
 
 NEAREST = 3  # body vertices whose faces are tried for each sample
 CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances
@@ -22,11 +22,11 @@ FORBIDDEN = (
 )
 
 
-class TensorAnchors:
-    """One anchor per frame and sample, on `device`; on the CPU, when each was last searched or lent."""
+class TensorContactCache:
+    """One anchor per frame and sample, on `device`; on the CPU, when each was last searched or propagated."""
 
     def __init__(self, patch: Patch, frames: int, device: torch.device) -> None:
-        start = Anchors(patch, 1)
+        start = ContactCache(patch, 1)
         self.patch, self.age = patch, np.zeros(frames, np.int64)
         self.faces = torch.as_tensor(start.faces, device=device).repeat(frames, 1)
         self.barycentric = torch.as_tensor(start.barycentric, device=device).repeat(frames, 1, 1)
@@ -35,14 +35,14 @@ class TensorAnchors:
             torch.as_tensor(array, device=device)
             for array in (patch.rest, patch.centroids, patch.sample_rest)
         )
-        self.beyond = torch.as_tensor(patch.beyond, device=device).long()  # (Q, 3)
+        self.adjacency = torch.as_tensor(patch.adjacency, device=device).long()  # (Q, 3)
         self.around = torch.as_tensor(
             _incident(patch.faces), device=device
         )  # (P, K) faces, -1 beyond the last
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
-        """See Anchors.oldest."""
-        return Anchors.oldest(cast(Anchors, self), frames, count)
+        """See ContactCache.oldest."""
+        return ContactCache.oldest(cast(ContactCache, self), frames, count)
 
     def normals(self, positions: Tensor) -> Tensor:
         """Area-weighted vertex normals (N, P, 3) of positions (N, P, 3), rounded to 1/127."""
@@ -56,7 +56,7 @@ class TensorAnchors:
     def planes(
         self, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """See Anchors.planes; positions and normals (R, P, 3) and the result are tensors."""
+        """See ContactCache.planes; positions and normals (R, P, 3) and the result are tensors."""
         device = positions.device
         chosen = torch.as_tensor(frames, device=device)
         corners = self.corners[self.faces[chosen].long()]  # (N, S, 3)
@@ -67,14 +67,15 @@ class TensorAnchors:
         directions = (weights * normals[row, corners]).sum(-2)
         return points, directions / (torch.linalg.vector_norm(directions, dim=-1, keepdim=True) + 1e-30)
 
-    def slide(
+    def walk(
         self, samples: Tensor, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor, *,
         reach: float,
     ) -> None:  # fmt: skip
-        """Anchors of frames (N,) go to where snug.sliding.slid takes them for samples (N, S, 3): those of
-        samples less than `reach` and SLACK above their planes. positions, normals: see `planes`.
+        """Anchors of frames (N,) go to where snug.surface_walk.walk_to_foot takes them for samples
+        (N, S, 3): those of samples less than `reach` and SLACK above their planes. positions, normals: see
+        `planes`.
         """
-        # A frame that comes twice slides once: which of two writes lands last is not a GPU's to choose.
+        # A frame that comes twice walks once: which of two writes lands last is not a GPU's to choose.
         once = np.sort(np.unique(frames, return_index=True)[1])
         samples, frames, rows = (
             samples[torch.as_tensor(once, device=samples.device)],
@@ -94,7 +95,7 @@ class TensorAnchors:
             v, w, _ = foot(b - a, c - a, x - a)
             weights = torch.stack([1 - v - w, v, w], -1)
             side = weights.argmin(-1)
-            other = self.beyond[face, side]
+            other = self.adjacency[face, side]
             far = (self.centroids[other] - home).square().sum(-1) > self.patch.region**2
             moving = moving & (weights.amin(-1) < 0) & (other >= 0) & (other != last) & ~far
             last, face = torch.where(moving, face, last), torch.where(moving, other, face)
@@ -103,15 +104,15 @@ class TensorAnchors:
         faces, parts = in_parts(face, torch.stack([v, w], -1), self.faces.dtype)
         self.faces[chosen, sample], self.barycentric[chosen, sample] = faces, parts
 
-    def renew(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
+    def requery(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame. Brute force has no
         use for old anchors, so that `exact` changes nothing.
         """
         for start in range(0, len(points), CHUNK):
             part = slice(start, start + CHUNK)
             faces, barycentric = self._searched(points[part], self.sample_rest[part], positions)
-            kept = in_parts(faces, barycentric, self.faces.dtype)
-            self.faces[frame, part], self.barycentric[frame, part] = kept
+            found = in_parts(faces, barycentric, self.faces.dtype)
+            self.faces[frame, part], self.barycentric[frame, part] = found
         self.age[frame] = 0
 
     def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
@@ -132,7 +133,7 @@ class TensorAnchors:
 
 
 def in_parts(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:
-    """As snug.contact.kept: faces (S,) of a small type, barycentric (S, 2) as uint8."""
+    """As snug.contact.quantised: faces (S,) of a small type, barycentric (S, 2) as uint8."""
     second = (PARTS * barycentric[:, :1]).round()
     third = torch.minimum((PARTS * barycentric[:, 1:]).round(), PARTS - second)
     return faces.to(kind), torch.cat([second, third], 1).to(torch.uint8)

@@ -7,7 +7,7 @@ import pytest
 import torch
 from dressing import swaying, tube_dress
 
-from snug.guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
+from snug.divergence_guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
 from snug.recipe import DEFAULT, PAPER
 from snug.trainer import Trainer
 from snug.training_run import TrainingRun
@@ -157,15 +157,15 @@ def test_a_high_window_has_its_anchors_searched_before_it_is_judged(monkeypatch)
     trainer = made(recipe)
     row = trainer.step(SETTLING)
     usual = row["collision"]
-    anchors = trainer.contact.anchors
-    searched, whole = [], anchors.renew
+    anchors = trainer.contact.cache
+    searched, whole = [], anchors.requery
 
-    def renew(frame, *rest, **how):
+    def requery(frame, *rest, **how):
         assert how["exact"], "the anchors of a high window are no guide"
         searched.append(frame)
         whole(frame, *rest, **how)
 
-    monkeypatch.setattr(anchors, "renew", renew)
+    monkeypatch.setattr(anchors, "requery", requery)
     # Every anchor of the next batch's first window on the far side of the trunk.
     order = trainer.order.copy()
     frames = trainer.data.starts[order[0]] + np.arange(3)

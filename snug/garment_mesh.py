@@ -1,10 +1,11 @@
-"""From a form and its cuts to one sound mesh: half remeshed, kept off the body, mirrored at the seam."""
+"""From a surface and its cuts to one sound mesh: half remeshed, kept off the body, mirrored at the seam."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from snug.body import Body
 from snug.remeshing import boundary_loops, corner_angles, remesh, triangle_areas
-from snug.tailoring import Cut, Form, cut_sheet, outlines
+from snug.tailoring import CutPlane, ImplicitSurface, cut_sheet, outlines
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -13,19 +14,21 @@ AREA_BOUNDS = (0.5, 2.0)  # every triangle's area over the mean
 SMALLEST_ANGLE = 15.0  # [degrees]
 
 
-def sew(body, form: Form, cuts: list[Cut], vertices: int, clearance: float) -> tuple[Array, Index]:
+def mesh_garment(
+    body: Body, surface: ImplicitSurface, cuts: list[CutPlane], vertices: int, clearance: float
+) -> tuple[Array, Index]:
     """The whole garment, positions (V,3) [m] and faces (F,3), of `vertices` vertices within 1 %.
 
     clearance: least distance [m] from the skin. Raises ValueError where no sound mesh comes out.
     """
-    sheet, sheet_faces = cut_sheet(form, cuts)
+    sheet, sheet_faces = cut_sheet(surface, cuts)
     try:
         curves = outlines(sheet, sheet_faces, cuts)
     except ValueError as error:
         raise ValueError(f"nothing fits this body: {error}") from error
     found = sorted(name for loop in curves for name, _ in loop)
     if found != sorted(["seam", *(cut.name for cut in cuts)]):  # the seam runs down the front and the back
-        raise ValueError(f"nothing fits this body: the cuts of its form are {', '.join(found)}")
+        raise ValueError(f"nothing fits this body: the cuts of its surface are {', '.join(found)}")
     rims = [[curve for _, curve in loop] for loop in curves]
     # An opening that the seam does not meet has a twin on the other side.
     openings = sum(2 if len(loop) == 1 else sum(name != "seam" for name, _ in loop) for loop in curves)
@@ -36,7 +39,7 @@ def sew(body, form: Form, cuts: list[Cut], vertices: int, clearance: float) -> t
             half += 1
         tried.add(half)
         try:
-            points, faces = remesh(sheet, sheet_faces, rims, half, form.project)
+            points, faces = remesh(sheet, sheet_faces, rims, half, surface.project)
             count = 2 * len(points) - int(np.count_nonzero(np.abs(points[:, 0]) < 1e-6))
             if abs(count - vertices) > max(1, vertices // 100):
                 half += (vertices - count) // 2
@@ -57,7 +60,7 @@ def _mirrored(points: Array, faces: Index) -> tuple[Array, Index]:
     return whole, np.concatenate([faces, twin[faces][:, ::-1]])
 
 
-def _kept_off(body, points: Array, faces: Index, cuts: list[Cut], clearance: float) -> Array:
+def _kept_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], clearance: float) -> Array:
     """Points pushed outward, along their cuts, until no sample is nearer to the skin than `clearance`.
 
     Errors: ValueError if it cannot be met.

@@ -1,7 +1,7 @@
 """The state that a recurrent network last had after each training frame: what windows start from.
 
 A window of three frames says nothing of the state before it. Drawn from noise alone it is unlike any state of
-a roll-out, and the network learns to shake it off; remembered from when the frame before last ended a window,
+a roll-out, and the network learns to shake it off; cached when the frame before last ended a window,
 it is that of a roll-out, but for what the network has learned since. (With windows of three there are three
 such roll-outs of a motion, from its first, its second and its third frame.)
 """
@@ -15,7 +15,7 @@ from torch import Tensor
 from snug.parallel import ALONE, Group
 
 
-class StateMemory:
+class HiddenStateCache:
     """first: rows at which motions begin, and the number of all frames at the end (TrainingSet.first).
 
     states (L, F + 1, H): after each frame, zero where it never ended a window; the last row stands for the
@@ -34,7 +34,7 @@ class StateMemory:
         return self.states[:, self.before[torch.as_tensor(frames, device=self.before.device)]]
 
     def keep(self, frames: np.ndarray, states: Tensor, group: Group = ALONE) -> None:
-        """Remember states (L, N, H) after frames (N,); those of all processes of a group, each its own."""
+        """Cache states (L, N, H) after frames (N,); those of all processes of a group, each its own."""
         rows = group.gathered(torch.as_tensor(frames, device=self.before.device)).cpu().numpy()
         # Of a frame that comes twice the first: which of two writes lands last is not a GPU's to choose.
         once = torch.as_tensor(np.unique(rows, return_index=True)[1], device=states.device)

@@ -1,0 +1,45 @@
+"""Energies of the simulator as terms of the training loss, found by the name that each gives itself.
+
+Whatever stands in the registry `reference_sim.energies.MODULE_OF` can be named in `Recipe.terms`, if the rest
+state of the garment is all that it needs. No other list has to be edited: a term without a kernel is trained
+by its definition in torch and automatic gradients.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+
+from reference_sim import energies
+from reference_sim.energies import Energy
+
+
+def find_energy(name: str) -> Callable[..., Energy]:
+    """What makes the energy of that name from a Cloth, its options at their defaults.
+
+    Raises ValueError for an unknown name, and for what cannot be trained.
+    That is what is made of more than a cloth, what must be prepared for each step of a simulation (see
+    Energy.prepare), and what finds its stencils anew as vertices move (Energy.dynamic).
+    """
+    classes = [getattr(energies, class_name) for class_name in energies.MODULE_OF]
+    terms = [term for term in classes if issubclass(term, Energy) and term is not Energy]
+    named = [term for term in terms if term.name == name]
+    if not named:
+        known = sorted({term.name for term in terms if not _reason_against(term)})
+        raise ValueError(f"unknown energy {name!r}: use one of {', '.join(known)}")
+    for term in named:
+        if not _reason_against(term):
+            return term
+    raise ValueError(f"energy {name!r} cannot be trained: {_reason_against(named[0])}")
+
+
+def _reason_against(term: type[Energy]) -> str:
+    """Why a term cannot be part of a loss; empty if it can."""
+    parameters = inspect.signature(term).parameters.values()
+    variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    needed = [p.name for p in parameters if p.default is p.empty and p.kind not in variadic]
+    if needed != ["cloth"]:
+        return f"it is made of {', '.join(needed)}, a garment has its cloth alone"
+    if term.prepare is not Energy.prepare:
+        return "it must be prepared for each step of a simulation"
+    return "its stencils change as vertices move" if term.dynamic else ""
