@@ -19,6 +19,8 @@ from snug.tailoring import TORSO_BONES, CutPlane, ImplicitSurface, build_surface
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+TSHIRT = "tshirt"  # the garment that a command takes where none is named
+
 # What a shirt may borrow weights from: never hands, head or shins, even where they come near.
 SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
 SKIRT_BONES = ("pelvis", "spine1", "left_hip", "right_hip")
@@ -124,7 +126,7 @@ def tailor_tshirt(
     Raises GarmentError for a parameter out of range, or a body on which no sound mesh comes out.
     """
     cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length}
-    return _shirt("tshirt", body, vertices, cut)
+    return _shirt(TSHIRT, body, vertices, cut)
 
 
 def tailor_tunic(
@@ -185,7 +187,7 @@ class GarmentTemplate:
 
 
 GARMENT_TEMPLATES = (
-    GarmentTemplate("tshirt", "T-shirt", tailor_tshirt),
+    GarmentTemplate(TSHIRT, "T-shirt", tailor_tshirt),
     GarmentTemplate("tunic", "flared tunic", tailor_tunic),
     GarmentTemplate("skirt", "flared skirt", tailor_skirt),
 )

@@ -115,12 +115,12 @@ def _run(options: argparse.Namespace) -> int:
 
     from snug.body import Body
     from snug.device import find_device
-    from snug.garments import find_template
+    from snug.garments import TSHIRT, find_template
     from snug.parallel import join_group, leave_group
     from snug.training_run import Interrupted
 
     check(options)
-    templates = [find_template(name) for name in dict.fromkeys(options.garment or ["tshirt"])]
+    templates = [find_template(name) for name in dict.fromkeys(options.garment or [TSHIRT])]
     outs = _outs(Path(options.out), templates)
     device = find_device(options.device)
     torch.set_num_threads(options.threads)

@@ -117,7 +117,8 @@ class TrainedModel:
             raise ModelFileError(str(error)) from error
         try:
             if data["format"] != FORMAT:
-                raise ModelFileError(f"{path}: format {data['format']!r}, this version reads {FORMAT!r}")
+                known = f"this version reads {FORMAT!r}: train again"
+                raise ModelFileError(f"{path}: format {data['format']!r}, {known}")
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(
                 data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=data["pins"]

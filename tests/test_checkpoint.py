@@ -13,7 +13,7 @@ import torch
 from dressing import swaying, tube_dress
 
 from reference_sim import Material
-from snug import tensor_file
+from snug import tensor_file, training_run
 from snug.dressed_body import DressedBody
 from snug.recipe import DEFAULT, DYNAMIC, PAPER, SANTESTEBAN2019, SUPERVISED, TAILORNET
 from snug.tensor_file import TensorFileError, read_tensors
@@ -177,6 +177,16 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path):
         short(saving=again)
     path.unlink()
     same_model(short(), short(saving=again))  # killed before its first checkpoint: from the beginning
+
+
+def test_a_checkpoint_of_an_older_version_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "run.safetensors"
+    monkeypatch.setattr(training_run, "FORMAT", "snug-checkpoint-6")
+    with pytest.raises(Interrupted):
+        short(saving=Saving(path=path), stop=asked_after(2))
+    monkeypatch.undo()
+    with pytest.raises(TensorFileError, match=r"run\.safetensors: no checkpoint of this version"):
+        short(saving=Saving(path=path, resume=True))
 
 
 def test_a_checkpoint_of_other_targets_or_cloth_is_refused(tmp_path):

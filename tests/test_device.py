@@ -235,15 +235,13 @@ def test_absent_devices_are_one_line(capsys, tmp_path):
 @pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")
 def test_the_harness_hands_the_device_on(tmp_path):
     """An absent device is refused where the plan is made, and would be refused where training starts."""
-    from benchmarks.training import train_network
-    from benchmarks.wardrobe import Wardrobe
+    from tasks_by_hand import assets_of, context, training
 
-    from benchmarks.plan import Network
     from benchmarks.run import check_device
 
     dressed, motion = tube_dress(), swaying(12)
-    wardrobe = Wardrobe(dressed.body, {"tshirt": dressed.garment}, {"sway": motion})
+    task = training("snug", motion.name, steps=2, device="cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
         check_device("cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
-        train_network(wardrobe, print, Network("snug", 0), 2, {"sway": None}, tmp_path, "cuda", "0")
+        task.run(context(tmp_path, assets_of(dressed, motion)), {})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.metrics.dynamics import (
+from benchmarks.metrics.hem import (
     AFTER,
     HELD,
     HemMotion,

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import pytest
 import torch
-from benchmarks.methods.networks import model_path
-from benchmarks.training import train_network
-from benchmarks.wardrobe import Wardrobe
 from dressing import swaying, tube_dress
+from tasks_by_hand import assets_of, context, training
 
-from benchmarks import training
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
-from benchmarks.plan import Network
+from benchmarks.methods.network import model_path
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results import RunFolder
 from benchmarks.run import make_parser, make_plan
-from benchmarks.suites import garments
+from benchmarks.suites import SUITES
 from snug.recipe import ABLATIONS, RECIPES, TERMS, TRAININGS
 from snug.trained_model import TrainedModel
 
@@ -32,7 +29,7 @@ def methods(*words):
 def test_they_run_when_named_and_not_otherwise(tmp_path):
     further = {entry.name for entry in LEARNED}
     out = ("-o", str(tmp_path))
-    assert further <= set(garments.FURTHER) and not further & methods(*out)
+    assert further <= set(SUITES[0].more_methods) and not further & methods(*out)
     assert further < methods(*out, "--methods", "*")
     named = methods(*out, "--methods", "snug-no-*")
     assert named == {
@@ -47,30 +44,38 @@ def test_they_run_when_named_and_not_otherwise(tmp_path):
 
 @pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])
 def test_every_trained_method_has_a_training_and_steps_in_each_preset(entry):
-    assert entry.trained in TRAININGS and entry.seeded
-    assert all(preset.steps_of(entry.trained) > 0 for preset in PRESETS)
+    kind = TRAININGS[entry.trained].kind
+    assert entry.seeded and entry.pairing_group
+    assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
 
 
 def test_an_ablation_trains_as_long_as_the_whole():
     quick = find_preset("quick")
-    assert quick.steps_of("snug-no-bending") == quick.steps_of("snug-springs") == quick.steps["snug"]
-    assert quick.steps_of("pbns-springs") == quick.steps["pbns"] and quick.steps_of("untrained") == 0
+
+    def steps(name: str) -> int:
+        return quick.steps_of(name, TRAININGS[name].kind if name in TRAININGS else name)
+
+    assert steps("snug-no-bending") == steps("snug-springs") == quick.steps["snug"]
+    assert steps("snug-dynamic") == quick.steps["snug"]
+    assert steps("pbns-springs") == quick.steps["pbns"] and steps("untrained") == 0
 
 
 def test_what_is_cleaned_up_is_a_row_of_its_own_over_the_same_network(tmp_path):
     cleaned = find_method("snug+cleanup")
     assert cleaned.trained == find_method("snug").trained
     chosen = plan("-o", str(tmp_path), "--methods", "snug,snug+cleanup", "--seeds", "0,1")
-    assert chosen.models == (("snug", 0), ("snug", 1))
+    assert [(n.name, n.seed) for n in chosen.networks] == [("snug", 0), ("snug", 1)]
 
 
 def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr(training, "CHECKPOINT_MINUTES", 1e-9)
-    dressed = tube_dress()
-    wardrobe = Wardrobe(dressed.body, {"tshirt": dressed.garment}, {"sway": swaying(30)})
+    monkeypatch.setattr("benchmarks.tasks.training.CHECKPOINT_MINUTES", 1e-9)
+    dressed, motion = tube_dress(), swaying(30)
+    assets = assets_of(dressed, motion)
 
     def trained(folder, key, tell):
-        return train_network(wardrobe, tell, Network("snug", 0), 60, {"sway": None}, folder, "cpu", key)
+        task = training("snug", motion.name, steps=60, key=key)
+        task.clear(RunFolder(folder))
+        return task.run(context(folder, assets, tell=tell), {})
 
     def killed(steps):
         told.append(steps)
@@ -84,8 +89,8 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             trained(tmp_path, key, killed)
         assert [path.name for path in models.iterdir()] == [f".snug-seed0.{key}.checkpoint.safetensors"]
-    result = trained(tmp_path, "now", went_on.append)
-    assert sum(went_on) == result.steps == 60 and len(went_on) < 3  # of three reports
+    result = trained(tmp_path, "now", went_on.append).result
+    assert sum(went_on) == result["steps"] == 60 and len(went_on) < 3  # of three reports
     trained(tmp_path / "unbroken", "now", print)
     one, other = (
         TrainedModel.load(model_path(RunFolder(folder).models, "snug", 0)).network.state_dict()
@@ -96,14 +101,13 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
 
 
 def test_a_training_that_fails_leaves_no_earlier_model_behind(tmp_path):
-    folder = RunFolder(tmp_path)
-    folder.models.mkdir()
-    path = model_path(folder.models, "snug", 0)
+    path = model_path(RunFolder(tmp_path).models, "snug", 0)
+    path.parent.mkdir()
     path.touch()
-    with pytest.raises(AttributeError):
-        train_network(
-            None, print, Network("snug", 0), 2, {}, tmp_path, "cpu", "0"
-        )  # there is no body to dress
+    task = training("snug", "sway", steps=2)
+    task.clear(RunFolder(tmp_path))  # as the runner does before it runs a task
+    with pytest.raises(AssertionError):
+        task.run(context(tmp_path), {})  # there is no body to dress
     assert not path.exists()
 
 

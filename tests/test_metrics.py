@@ -8,9 +8,10 @@ import time
 
 import numpy as np
 import pytest
-from benchmarks.curves import CURVES, remarked
+from tasks_by_hand import small_scene
 
-from benchmarks.methods import METHODS
+from benchmarks.methods import METHODS, find_method
+from benchmarks.metrics import declared, find_metric
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
     boundary_mask,
@@ -24,10 +25,9 @@ from benchmarks.metrics.geometry import distance_rms, hem_drift, own_part_depth,
 from benchmarks.metrics.intersections import intersecting, intersecting_share
 from benchmarks.metrics.optimality import FINDERS, first_guess, optimality
 from benchmarks.metrics.shape import area_change, dihedral_angle, edge_change
-from benchmarks.metrics.time_error import LADDER, time_errors
-from benchmarks.presets import find_preset
+from benchmarks.metrics.time_error import time_errors
 from benchmarks.results import Row
-from benchmarks.scenes import hanging_sheet, sheet_on_sphere
+from benchmarks.rows import remarked
 from benchmarks.validation.meshes import cylinder_patch, icosphere, right_grid, torus
 from reference_sim import Obstacle, Potential, minimise, simulate
 from reference_sim.energies import Inertia, Step
@@ -127,7 +127,7 @@ def test_penetration_counts_every_vertex_and_measures_depth():
 
 
 def test_energies_of_a_rigid_acceleration_are_known_by_hand():
-    scene = dataclasses.replace(hanging_sheet.build("hanging_sheet", find_preset("smoke")))
+    scene = small_scene("hanging_sheet")
     heights = np.array([0.5, 0.6, 0.7, 0.8, 0.9])
     scene = dataclasses.replace(scene, origin_heights=heights)
     rest, acceleration = scene.cloth.rest_positions, np.array([3.0, 0.0, -4.0])
@@ -146,7 +146,7 @@ def test_energies_of_a_rigid_acceleration_are_known_by_hand():
 
 
 def test_energies_are_those_that_the_simulator_minimised():
-    scene = sheet_on_sphere.build("sheet_on_sphere", find_preset("smoke"))
+    scene = small_scene("sheet_on_sphere")
     trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=10, obstacle=scene.obstacle, start=scene.start
     )
@@ -159,9 +159,9 @@ def test_energies_are_those_that_the_simulator_minimised():
     assert series["collision"][-1] > 0.0
 
 
-@pytest.mark.parametrize("module", [hanging_sheet, sheet_on_sphere], ids=lambda m: m.__name__.split(".")[-1])
-def test_the_gap_is_zero_for_the_reference_one_for_the_guess_and_falls_between(module):
-    scene = module.build(module.__name__.split(".")[-1], find_preset("smoke"))
+@pytest.mark.parametrize("name", ["hanging_sheet", "sheet_on_sphere"])
+def test_the_gap_is_zero_for_the_reference_one_for_the_guess_and_falls_between(name):
+    scene = small_scene(name)
 
     def judged(**options):
         given = {"obstacle": scene.obstacle, "start": scene.start} | options
@@ -202,7 +202,7 @@ def test_hem_drift_follows_the_hem_against_the_pelvis():
 
 
 def test_a_gap_is_the_same_however_slow_the_machine_is(monkeypatch):
-    scene = hanging_sheet.build("hanging_sheet", dataclasses.replace(find_preset("smoke"), sheet_cells=4))
+    scene = small_scene("hanging_sheet", cells=4)
     x = np.array([scene.start + 0.02 * k**2 for k in range(4)])
     quick = optimality(scene, x, samples=1).metrics()
     clock = itertools.count(0.0, 60.0)
@@ -211,7 +211,7 @@ def test_a_gap_is_the_same_however_slow_the_machine_is(monkeypatch):
 
 
 def test_the_gap_is_taken_to_the_lowest_minimum_found():
-    scene = hanging_sheet.build("hanging_sheet", dataclasses.replace(find_preset("smoke"), sheet_cells=12))
+    scene = small_scene("hanging_sheet", cells=12)
     crumpled = np.random.default_rng(0).uniform(-0.3, 0.3, scene.start.shape)
     crumpled[scene.cloth.pins] = scene.start[scene.cloth.pins]
     still = np.zeros_like(crumpled)
@@ -244,7 +244,7 @@ def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypat
     """Its first guess has no energy; the minimum found from its frame has one."""
     from benchmarks.metrics import optimality as module
 
-    scene = hanging_sheet.build("hanging_sheet", dataclasses.replace(find_preset("smoke"), sheet_cells=6))
+    scene = small_scene("hanging_sheet")
     still = np.repeat(scene.start[None], 3, axis=0)
     monkeypatch.setattr(module, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
     found = module.optimality(scene, still, samples=1)
@@ -301,20 +301,23 @@ def test_intersections_are_those_of_two_crossing_strips():
 
 
 def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():
-    found = {
-        name: {"energy/total": 5.0 + 3.0 / n, "energy/strain": 1.0 - 2.0 / n, "curvature/mean": 7.0 + 1.0 / n}
-        for name, n in zip(LADDER, (1, 2, 4, 8))
-    }
+    found = [
+        {"energy/total": 5.0 + 3.0 / n, "energy/strain": 1.0 - 2.0 / n, "curvature/mean": 7.0 + 1.0 / n}
+        for n in (1, 2, 4, 8)
+    ]
     expected = {"total": 3.0, "strain": -2.0, "curvature": 1.0, "order": 1.0}
     assert time_errors(found) == pytest.approx(
         {f"time_error/{name}": value for name, value in expected.items()}
     )
-    assert time_errors({name: found[name] for name in LADDER[:3]}) == {}
 
 
 def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
     def row(method: str, gap: float, metric: str = "gap/relative", scene: str = "flag", seed: int = 0) -> Row:
-        return Row("speed", scene, method, seed, metric, "1", gap)
+        entry = find_method(method)
+        return Row(
+            "speed", scene, method, seed, metric, "1", gap, role=entry.role, family=entry.family or method,
+            level=entry.level,
+        )  # fmt: skip
 
     falling = [row("newton-1", 0.5), row("newton-4", 0.1), row("newton-8", 0.1), row("simulation", 0.0)]
     assert remarked(falling) == falling
@@ -327,9 +330,21 @@ def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
     assert remarked([dataclasses.replace(rising[0], reason="kept"), *falling])[0].reason == "kept"
 
 
-def test_curves_hold_every_cut_from_coarse_to_fine():
-    assert CURVES["lbfgs"] == ("lbfgs-5", "lbfgs-10", "lbfgs-20", "lbfgs-40")
-    assert CURVES["snug+newton"] == tuple(f"snug+newton-{cut}" for cut in (1, 2, 4, 8))
-    members = [method for family in CURVES.values() for method in family]
-    assert len(set(members)) == len(members) and set(members) <= {entry.name for entry in METHODS}
-    assert {entry.name for entry in METHODS if entry.cut_short} <= set(members)
+def test_families_hold_every_level_from_coarse_to_fine():
+    families: dict[str, list[str]] = {}
+    for entry in sorted((e for e in METHODS if e.level is not None), key=lambda e: e.level):
+        families.setdefault(entry.family, []).append(entry.name)
+    assert families["lbfgs"] == ["lbfgs-5", "lbfgs-10", "lbfgs-20", "lbfgs-40"]
+    assert families["snug+newton"] == [f"snug+newton-{count}" for count in (1, 2, 4, 8)]
+    assert all(entry.level for entry in METHODS if entry.truncated)
+
+
+def test_every_metric_has_a_unit_a_title_and_a_definition_and_a_pattern_serves_a_new_term():
+    units = {metric.unit for metric in declared().values()}
+    known = {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1", "deg", "frames"}
+    assert known <= units <= known | {"N m", "% of weight", "weights", "vertex weights"}
+    assert all(metric.title and metric.definition for metric in declared().values())
+    own = find_metric("energy/my_term")
+    assert (own.name, own.unit, own.title, own.table) == ("energy/my_term", "J", "My term", "energies")
+    with pytest.raises(KeyError):
+        find_metric("nonsense/x")

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benchmarks.methods.hybrids import FromElsewhere, Hybrid
+from tasks_by_hand import small_scene
 
+from benchmarks.methods.warm_started import FromElsewhere, WarmStarted
 from benchmarks.metrics.optimality import first_guess
 from benchmarks.minimisers.block_descent import VertexBlockDescent
 from benchmarks.minimisers.elements import contacts, hinges, membrane, terms_of, weights
 from benchmarks.minimisers.kernels import block, depth, fold, strain
 from benchmarks.minimisers.xpbd import XPBD
-from benchmarks.presets import find_preset
-from benchmarks.scenes import hanging_sheet, sheet_on_sphere
 from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
@@ -99,10 +98,10 @@ def test_block_descent_falls_with_every_sweep_to_the_minimum_and_stays_there(tou
     assert np.abs(again.positions - best.positions).max() < 1e-8
 
 
-@pytest.mark.parametrize("module", [hanging_sheet, sheet_on_sphere], ids=lambda m: m.__name__.split(".")[-1])
-def test_the_reference_is_where_another_solver_ends_from_another_start(module):
+@pytest.mark.parametrize("name", ["hanging_sheet", "sheet_on_sphere"])
+def test_the_reference_is_where_another_solver_ends_from_another_start(name):
     """Block descent shares neither derivatives nor steps with the simulator; its start is 1 mm away."""
-    scene = module.build("scene", find_preset("smoke"))
+    scene = small_scene(name)
     run = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=8, obstacle=scene.obstacle, start=scene.start
     )
@@ -190,25 +189,27 @@ def test_a_hybrid_starts_each_step_from_the_next_frame_with_the_pins_of_the_step
             return make_minimiser(potential, max_iterations=1).minimise(x0)
 
     pins = potential.cloth.pins
-    hybrid = FromElsewhere(Looking(), iter([start.copy() for start in starts]), pins)
+    warm_started = FromElsewhere(Looking(), iter([start.copy() for start in starts]), pins)
     for start in starts:
-        result = hybrid.minimise(guess)
+        result = warm_started.minimise(guess)
         free = potential.cloth.free
         assert np.array_equal(seen[-1][free], start[free]) and np.array_equal(seen[-1][pins], guess[pins])
         assert np.array_equal(result.positions[pins], guess[pins])
 
 
-def test_a_hybrid_has_its_first_guesses_ready_before_the_clock_starts(monkeypatch, tmp_path):
-    scene = hanging_sheet.build("hanging_sheet", find_preset("smoke"))
+def test_a_warm_started_solver_has_its_first_guesses_ready_before_the_clock_starts(monkeypatch, tmp_path):
+    scene = small_scene("hanging_sheet")
     made = []
 
     def frames():
-        made.append("on the clock" if hybrid.prepared else "before")
+        made.append("on the clock" if warm_started.prepared else "before")
         return (scene.start.copy() for _ in range(scene.frames))
 
-    hybrid = Hybrid("skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1, "finish": False})
-    hybrid.prepared = False
-    monkeypatch.setattr(hybrid, "_frames", lambda scene: frames)
-    hybrid.prepare(scene)
-    hybrid.prepared = True
-    assert hybrid.run().frames == scene.frames and set(made) == {"before"}
+    warm_started = WarmStarted(
+        "skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1, "finish": False}
+    )
+    warm_started.prepared = False
+    monkeypatch.setattr(warm_started, "_frames", lambda scene: frames)
+    warm_started.prepare(scene)
+    warm_started.prepared = True
+    assert warm_started.run().frames == scene.frames and set(made) == {"before"}

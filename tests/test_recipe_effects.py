@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import pytest
 from benchmarks.wardrobe import Wardrobe
 from dressing import swaying, tube_dress
+from reports.findings import recipes
 
 from benchmarks import presets, recipe_trials, workers
 from benchmarks.recipe_effects import DEVIATIONS, main, variants
 from benchmarks.recipe_trials import HELD_OUT, learned, steps_within
 from benchmarks.results import RunFolder
-from reports.findings import recipes
 from snug.motion_library import TEST, TRAIN
 from snug.recipe import DEFAULT, PAPER, Recipe
 from snug.training_set import TrainingError

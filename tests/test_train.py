@@ -9,6 +9,7 @@ import pytest
 import torch
 from dressing import leaning, swaying, tube_dress
 
+from snug import trained_model
 from snug.baselines.supervised import TargetError, vertex_loss
 from snug.motion import Motion, arm_clearance
 from snug.motion_augmentation import lap_clearance, mirrored, mixed_for, mixed_motions
@@ -120,6 +121,14 @@ def test_broken_model_files_are_named(tmp_path, trained):
         ModelFileError, match=r"later\.safetensors: broken model file \(unknown model 'later-kind'"
     ):
         TrainedModel.load(later.save(tmp_path / "later.safetensors"))
+
+
+def test_a_model_file_of_an_older_version_is_refused_before_it_is_read(tmp_path, trained, monkeypatch):
+    monkeypatch.setattr(trained_model, "FORMAT", "snug-model-5")
+    path = trained.save(tmp_path / "old.safetensors")
+    monkeypatch.undo()
+    with pytest.raises(ModelFileError, match=r"old\.safetensors: format 'snug-model-5', this version reads"):
+        TrainedModel.load(path)
 
 
 def test_supervised_learns_what_it_is_shown():

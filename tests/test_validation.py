@@ -7,8 +7,9 @@ import math
 
 import pytest
 
-from benchmarks.plan import Motions, choose_cells
+from benchmarks.plan import Motions
 from benchmarks.presets import find_preset
+from benchmarks.selection import Request, choose
 from benchmarks.validation.case import Case
 from benchmarks.validation.fitted_order import fitted_order
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
@@ -35,15 +36,14 @@ def test_there_are_enough_of_every_kind():
 
 def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
     def chosen(preset, scenes=()):
-        nothing = Motions((), (), {})
-        return choose_cells(
-            ("validation",), full=True, preset=find_preset(preset), motions=nothing,
-            scenes=scenes, methods=(), seeds=(0,),
-        )[1]  # fmt: skip
+        suites = ("validation",)
+        return choose(
+            Request(suites=suites, full=True, preset=find_preset(preset), motions=Motions(), scenes=scenes)
+        )[1]
 
     assert chosen("quick") == KNOWN_ANSWERS
     assert chosen("smoke") == tuple(case for case in KNOWN_ANSWERS if case.smoke)
-    assert [case.name for case in chosen("smoke", ["slit_annulus_inner"])] == ["slit_annulus_inner"]
+    assert [case.name for case in chosen("smoke", ("slit_annulus_inner",))] == ["slit_annulus_inner"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,32 @@
+"""Isolated processes: hangs and crashes are ended, and the next work is done."""
+
+from __future__ import annotations
+
+import operator
+import os
+import time
+
+import pytest
+
+from benchmarks.process import IsolatedProcess, WorkerDied
+
+
+def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():
+    with IsolatedProcess() as process:
+        assert process.call(operator.mul, 2, 4, seconds=60) == 8
+        began = time.monotonic()
+        with pytest.raises(WorkerDied, match=r"no answer within 0\.2 s"):
+            process.call(time.sleep, 1000, seconds=0.2)
+        assert time.monotonic() - began < 4.0
+        with pytest.raises(WorkerDied, match="ended with status 7"):
+            process.call(os._exit, 7, seconds=60)
+        with pytest.raises(ValueError, match="invalid literal"):
+            process.call(int, "x", seconds=60)
+        assert process.call(operator.mul, 2, 5, seconds=60) == 10
+
+
+def test_a_process_that_cannot_start_is_none_at_all():
+    with IsolatedProcess(lambda: None) as process:  # cannot be sent to it
+        for _ in range(2):
+            with pytest.raises(Exception, match="lambda"):
+                process.call(operator.mul, 2, 4, seconds=1)
