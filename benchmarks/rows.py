@@ -10,6 +10,7 @@ from typing import Any
 
 from snug.recipe import learns_from_simulation
 
+from .methods import find_method
 from .metrics import find_metric
 from .plan import Plan, network_of
 from .results import Row
@@ -199,7 +200,9 @@ def _fineness(row: Row) -> float:
 
 def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
-    metrics = {row.metric for row in rows if any(row.method == cell.method for cell in plan.cells)}
+    entries = {cell.method: cell.entry for cell in plan.cells}
+    entries |= {benchmark.method: find_method(benchmark.method) for benchmark in plan.microbenchmarks}
+    metrics = {row.metric for row in rows if row.method in entries}
     found = {}
     for name in sorted(metrics):
         try:
@@ -209,7 +212,6 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     scenes = {
         scene.name: _fields(scene, "name", "module", "sizes", "options", "metrics") for scene in plan.scenes
     }
-    entries = {cell.method: cell.entry for cell in plan.cells}
     words = ("label", "description", "role", "family", "level", "base", "seeded", "dtype")
     methods = {name: {word: getattr(entry, word) for word in words} for name, entry in entries.items()}
     cases = {
