@@ -27,7 +27,7 @@ class Suite:
     """A question put to many cells, or to cases of benchmarks.validation.
 
     scenes, methods: names of those that meet. more_methods: those that take part only where methods are
-    named, or at a preset that holds all.
+    named, or at a preset that holds all. default: whether it takes part where no suite is named.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Suite:
     scenes: Callable[[Extent], list[str]] = lambda extent: []
     methods: Callable[[Extent], list[str]] = lambda extent: []
     more_methods: tuple[str, ...] = ()
+    default: bool = True
 
 
 # --- garments ----------------------------------------------------------------------------------------------
@@ -128,6 +129,11 @@ SUITES = (
     Suite(
         name="extremes",
         description="stiff, huge and degenerate input: converged, or an honest failure",
+    ),
+    Suite(
+        name="performance",
+        description="microbenchmarks of simulator, trainings and networks; only where it is named",
+        default=False,
     ),
 )  # fmt: skip
 
