@@ -52,9 +52,13 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
         elif measured.failed:
             status, reason = "failed", f"metrics: {measured.reason}"
         else:
-            costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
-            metrics = {**measured.result, **costs, **model_costs(cell, schedule, outcomes)}
-            reason = reason or remark
+            if status == "ok":
+                status, reason = measured.status, measured.reason or reason
+            metrics = dict(measured.result)
+            if cell.scene.timed:
+                costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
+                metrics |= {**costs, **model_costs(cell, schedule, outcomes)}
+                reason = reason or remark
     batch = outcomes.get(("batch", cell.name), Outcome())
     if batch.reason.startswith(UNBELIEVABLE):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}

@@ -86,14 +86,16 @@ def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, 
         if suite.name not in request.suites or not suite.methods(extent):
             continue
         more = suite.more_methods if request.methods or request.preset.further else ()
-        methods = (*suite.methods(extent), *more, *sorted(own_methods))
+        further = suite.named_methods if request.methods else ()
+        methods = (*suite.methods(extent), *more, *further, *sorted(own_methods))
         for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
             # Networks for a second garment double the training: only for whoever names its scenes.
             plain = not extent.further and declared[scene].garment not in ("", FIRST_GARMENT)
             for method in methods:
                 if not (named(scene, request.scenes) and named(method, request.methods)):
                     continue
-                if not (plain and find_method(method).trained):
+                entry = find_method(method)
+                if entry.meant_for(declared[scene]) and not (plain and entry.trained):
                     yield suite.name, scene, method
 
 
@@ -144,7 +146,11 @@ def _listed_methods() -> set[str]:
     extents = [Extent(preset, Motions()) for preset in PRESETS]
 
     def of_suite(suite: Suite) -> set[str]:
-        return {*suite.more_methods, *(name for extent in extents for name in suite.methods(extent))}
+        return {
+            *suite.more_methods,
+            *suite.named_methods,
+            *(name for extent in extents for name in suite.methods(extent)),
+        }
 
     return set().union(*map(of_suite, SUITES))
 
@@ -166,7 +172,7 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     Without paths: the embedded library with its own division. With paths: the files alone, plus the library
     where "library" is among the paths. test_names moves motions to the test set; without it the test
     motions of the library test, and of files alone the first in order of names. A single file tests, and the
-    library trains.
+    library trains. The test motions of the library never train, whichever motions test.
     """
     from snug.motion_files import load_motions
     from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, LIBRARY, TEST, TRAIN
@@ -186,8 +192,7 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
         test = tuple(name for name in names if name in test_names)
     else:
         test = TEST if with_library else tuple(names[:1])
-    train = tuple(name for name in names if name not in test)
-    train = train if test_names else tuple(name for name in train if name not in TEST)
+    train = tuple(name for name in names if name not in (*test, *TEST))
     if not train:
         train = tuple(name for name in TRAIN if name not in test)
     # Whoever names the test motions means all of them, whatever the size of the preset.

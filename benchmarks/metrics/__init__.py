@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from types import ModuleType
@@ -21,12 +22,19 @@ MODULES = (
     "time_error",
     "cost",
 )
+WHERE_NAMED = ("extrapolation", "roll_out", "mesh", "training")  # measured only in scenes that name them
+
+
+def names_of(chosen: Sequence[str] | None) -> tuple[str, ...]:
+    """The modules that a scene measures, from what it declares."""
+    return MODULES if chosen is None else tuple(name for name in (*MODULES, *WHERE_NAMED) if name in chosen)
 
 
 @cache
 def modules() -> dict[str, ModuleType]:
-    """Name -> module, in the order of MODULES; loads them."""
-    return {name: importlib.import_module(f"{__name__}.{name}") for name in MODULES}
+    """Name -> module, of all there are; loads them."""
+    names = (*MODULES, *WHERE_NAMED)
+    return {name: importlib.import_module(f"{__name__}.{name}") for name in names}
 
 
 @cache

@@ -5,24 +5,22 @@ windows are close to a roll-out by the way they are trained); a roll-out carries
 frame of a motion on. Windows of every training motion are predicted both ways, and the training's own loss
 judges both: the same frames and terms (a window of three has one inertia), contact searched anew for every
 frame.
-
-    train/window, train/roll_out   mean J per frame
-    train/high_windows             windows above the recipe's limit once the training had settled
-    train/step                     ms of one training step
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from snug.recipe import DEFAULT
 
-from ..methods.networks import model_path
-from ..results import Row, RunFolder
-from .long_roll_outs import SUITE
+from ..methods import find_method
+from ..metrics import find_metric
+from ..results import Row
+from .task import Context, Outcome, Task, TaskId, one_line
+from .training import TrainNetwork
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -31,55 +29,63 @@ if TYPE_CHECKING:
     from snug.trained_model import TrainedModel
     from snug.training_set import Batch
 
-    from ..plan import Plan
-    from ..wardrobe import Wardrobe
-
-SCENE = "training"
+SUITE, SCENE = "garments", "training"
 STRIDE = 18  # frames from one window that is looked at to the next: the searches for contact take the time
 
 
-def rows(plan: Plan, folder: RunFolder, wardrobe: Wardrobe | None) -> list[Row]:
-    """Those of every network of the run that has a past and learned from the energies alone."""
-    from snug.dressed_body import DressedBody
-    from snug.trained_model import TrainedModel, find_kind
-    from snug.training_set import TrainingError
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CompareWindows(Task):
+    """Metrics train/* of a network that has a past and learned from the energies alone."""
 
-    if wardrobe is None or not plan.models:
-        return []  # no network of the run: its training motions were not even loaded
-    dressed, motions = DressedBody(wardrobe.body, wardrobe.garment), wardrobe.named(plan.train)
-    found: list[Row] = []
-    for name, seed in plan.models:
-        path = model_path(folder.models, name, seed)
-        if not path.is_file():
-            continue  # its training has failed, and the run says so
-        model = TrainedModel.load(path)
+    kind = "windows"
+    stage = "training windows"
+    unit = "network"
+    training: TrainNetwork
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        from snug.dressed_body import DressedBody
+        from snug.trained_model import TrainedModel, find_kind
+        from snug.training_set import TrainingError
+
+        training, assets = self.training, context.assets
+        assert assets is not None
+        model = TrainedModel.load(training.path(context.folder))
         how = find_kind(model.kind)
-        if model.steps and how.physics and how.sequences and how.supervision is None:
-            try:
-                found += _judged(name, seed, model, dressed, motions)
-            except TrainingError as error:  # no given motion has as many frames as a window of this one
-                reason = " ".join(str(error).split())
-                found.append(Row(SUITE, SCENE, name, seed, "train/window", "J", None, "skipped", reason))
-    return found
+        context.tell(self.units)
+        if not (model.steps and how.physics and how.sequences and how.supervision is None):
+            return Outcome()
+        dressed = DressedBody(assets.body, assets.garments[training.garment])
+        try:
+            window, roll_out = both_losses(model, dressed, assets.named(training.motions))
+        except TrainingError as error:  # no given motion has as many frames as a window of this one
+            return Outcome(result={"train/window": None}, reason=one_line(error))
+        found = {
+            "train/window": window,
+            "train/roll_out": roll_out,
+            "train/step": 1e3 * model.seconds / model.steps,
+        }
+        if model.recipe.spike == DEFAULT.spike:  # what is called high elsewhere is something else
+            found["train/high_windows"] = float(model.summary["high_windows"])
+        return Outcome(result=found)
 
+    def rows(self, outcome: Outcome) -> list[Row]:
+        """One for each metric; one that failed, or of which there was nothing to compare, says why."""
+        if outcome.failed:
+            return [self._row("train/window", None, outcome.status, outcome.reason)]
+        return [self._row(name, value, "skipped", outcome.reason) for name, value in outcome.result.items()]
 
-def _judged(
-    name: str, seed: int, model: TrainedModel, dressed: DressedBody, motions: Sequence[Any]
-) -> Iterator[Row]:
-    window, roll_out = both_losses(model, dressed, motions)
-    numbers = {
-        "train/window": (window, "J"),
-        "train/roll_out": (roll_out, "J"),
-        "train/step": (1e3 * model.seconds / model.steps, "ms"),
-    }
-    if model.recipe.spike == DEFAULT.spike:  # what is called high elsewhere is something else
-        numbers["train/high_windows"] = (float(model.summary["high_windows"]), "1")
-    for metric, (number, unit) in numbers.items():
-        if math.isfinite(number):
-            yield Row(SUITE, SCENE, name, seed, metric, unit, number, dtype="float32")
-        else:
-            reason = f"its mean is {number}"
-            yield Row(SUITE, SCENE, name, seed, metric, unit, None, "diverged", reason, dtype="float32")
+    def _row(self, metric: str, value: float | None, status: str, reason: str) -> Row:
+        training, entry = self.training, find_method(self.training.training)
+        if value is not None:
+            finite = math.isfinite(value)
+            status, reason = ("ok", "") if finite else ("diverged", f"its mean is {value}")
+            value = value if finite else None
+        return Row(
+            suite=SUITE, scene=SCENE, method=entry.name, seed=training.seed, metric=metric,
+            unit=find_metric(metric).unit, value=value, status=status, reason=reason, dtype=entry.dtype,
+            garment=training.garment, family=entry.family or entry.name, role=entry.role, base=entry.base,
+            seeded=entry.seeded, pairing_group=entry.pairing_group,
+        )  # fmt: skip
 
 
 def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any]) -> tuple[float, float]:
