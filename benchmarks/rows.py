@@ -10,6 +10,7 @@ from typing import Any
 
 from snug.recipe import learns_from_simulation
 
+from .methods import find_method
 from .metrics import declared, find_metric
 from .plan import Plan, network_of
 from .results import Row
@@ -204,6 +205,7 @@ def _fineness(row: Row) -> float:
 def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
     methods = {cell.method: cell.entry for cell in plan.cells}
+    methods |= {benchmark.method: find_method(benchmark.method) for benchmark in plan.microbenchmarks}
     measured = dict.fromkeys(row.metric for row in rows if row.method in methods and _is_declared(row.metric))
     order = {name: place for place, name in enumerate(declared())}
     ordered = sorted(measured, key=lambda name: order.get(name, len(order)))

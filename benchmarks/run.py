@@ -15,6 +15,7 @@ from datetime import datetime
 from pathlib import Path
 
 from .cache import DEFAULT_ONLY, STATES
+from .performance.microbenchmark import SUITE
 from .plan import Motions, OwnBody, Plan, PlanError
 from .presets import PRESETS, find_preset
 from .provenance import usable_cores
@@ -76,8 +77,8 @@ def make_parser() -> argparse.ArgumentParser:
     names = ", ".join(preset.name for preset in PRESETS)
     add("--preset", default="quick", metavar="NAME", help=f"how much of everything: {names} (default quick)")
     add("--suite", action="append", default=[], metavar="NAME",
-        help="garments, speed, validation, extremes or all, in full; repeat or separate by commas "
-        "(default: the quick subset of each)")  # fmt: skip
+        help="garments, speed, validation, extremes, performance or all, in full; repeat or separate by "
+        "commas (default: the quick subset of each but performance)")  # fmt: skip
     add("--scenes", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
     add("--methods", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
     add("--motions", action="append", default=[], metavar="PATH",
@@ -158,13 +159,15 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=scenes,
         methods=methods, seeds=seeds,
     )  # fmt: skip
-    cells, cases = choose(request)
+    cells, cases, microbenchmarks = choose(request)
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
+    asked |= {SUITE} if microbenchmarks else set()
     return Plan(
         preset=preset,
         suites=tuple(suite for suite in suites if suite in asked),
         cells=cells,
         cases=cases,
+        microbenchmarks=microbenchmarks,
         motions=motions,
         body=choose_body(options.body),
         seeds=seeds,

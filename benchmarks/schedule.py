@@ -15,6 +15,7 @@ from snug.recipe import DEFAULT, TRAININGS
 
 from . import provenance
 from .metrics import names_of
+from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
 from .scene import Scene
 from .scenes import GARMENT_SCENES, find_scene, of_garment
@@ -23,6 +24,7 @@ from .tasks.case import RunCase
 from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
 from .tasks.ground_truth import SettleStart, SimulateMotion, SimulateQuasiStatic
 from .tasks.metrics import MeasureCell
+from .tasks.microbenchmark import RunMicrobenchmark
 from .tasks.task import Task, TaskId
 from .tasks.training import TrainNetwork
 from .tasks.training_windows import SUITE, CompareWindows
@@ -60,6 +62,7 @@ class Schedule:
             if network and network.garment == GARMENT_SCENES[0].garment and network.name in TRAININGS:
                 yield self.windows(network)
         yield from map(self.case, plan.cases)
+        yield from map(self.microbenchmark, plan.microbenchmarks)
 
     # --- ground truth and training -------------------------------------------------------------------------
 
@@ -199,6 +202,21 @@ class Schedule:
             name=case.name, label=case.name, case=case, deadline=case.seconds,
             inputs=self._inputs() | {"declared": _declared(case)},
             modules=(case.module, "benchmarks.validation.case", f"{TASKS}.case"),
+        )  # fmt: skip
+
+    def microbenchmark(self, benchmark: Microbenchmark) -> RunMicrobenchmark:
+        name, method = flat(benchmark.label.replace(" ", "-")), benchmark.method
+        inputs = self._inputs() | {"declared": _declared(benchmark)}
+        modules = (benchmark.module, "benchmarks.performance.microbenchmark", f"{TASKS}.microbenchmark")
+        settings = Settings(method=method, repeats=benchmark.repeats)
+        if benchmark.trains:
+            device, steps = self.plan.device, self.preset.steps_of(method, method)
+            inputs |= {"device": device, "steps": steps}
+            key = digest([inputs, code_of(*modules)])
+            settings = dataclasses.replace(settings, device=device, steps=steps, key=key)
+        return RunMicrobenchmark(
+            name=name, label=benchmark.label, inputs=inputs, modules=modules, benchmark=benchmark,
+            settings=settings, process=name,
         )  # fmt: skip
 
     # --- inputs --------------------------------------------------------------------------------------------

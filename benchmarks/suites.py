@@ -29,7 +29,8 @@ class Suite:
     """A question put to many cells, or to cases of benchmarks.validation.
 
     scenes, methods: names of those that meet. more_methods: those that take part only where methods are
-    named, or at a preset that holds all; named_methods: those that have to be named.
+    named, or at a preset that holds all; named_methods: those that have to be named. default: whether it
+    takes part where no suite is named.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Suite:
     methods: Callable[[Extent], list[str]] = lambda extent: []
     more_methods: tuple[str, ...] = ()
     named_methods: tuple[str, ...] = ()
+    default: bool = True
 
 
 # --- garments ----------------------------------------------------------------------------------------------
@@ -148,6 +150,11 @@ SUITES = (
         scenes=_out_of_distribution,
         methods=lambda extent: ["simulation", *FAST],
         more_methods=tuple(entry.name for entry in LEARNED if entry.batched),
+    ),
+    Suite(
+        name="performance",
+        description="microbenchmarks of simulator, trainings and networks; only where it is named",
+        default=False,
     ),
 )  # fmt: skip
 

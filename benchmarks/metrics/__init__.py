@@ -39,8 +39,11 @@ def modules() -> dict[str, ModuleType]:
 
 @cache
 def declared() -> dict[str, Metric]:
-    """Name -> metric, of all modules."""
-    return {metric.name: metric for module in modules().values() for metric in module.METRICS}
+    """Name -> metric, of all modules, and of microbenchmarks."""
+    from ..performance.metrics import METRICS
+
+    own = (metric for module in modules().values() for metric in module.METRICS)
+    return {metric.name: metric for metric in (*own, *METRICS)}
 
 
 def find_metric(name: str) -> Metric:

@@ -36,4 +36,4 @@ class RunCase(Task):
         from ..validation.case import timed_out
 
         died = not outcome.result
-        return [timed_out(self.case, outcome.reason, outcome.status) if died else Row(**outcome.result)]
+        return [timed_out(self.case, outcome.reason) if died else Row(**outcome.result)]

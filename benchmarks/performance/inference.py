@@ -12,41 +12,38 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..parts import Row
-from .settings import Settings, dressed_body, kind_and_vertices, training_motions
+from .learning import dressed_body, training_motions
+from .microbenchmark import Settings
 
 if TYPE_CHECKING:
     from snug.dressed_body import DressedBody
     from snug.motion import Motion
     from snug.trained_model import TrainedModel
 
-KINDS = ("snug", "pbns", "tailornet", "santesteban2019")
-CASES = tuple(f"{kind}, {vertices}" for kind in KINDS for vertices in (1000, 4400))
 
-
-def measure(case: str, settings: Settings) -> list[Row]:
+def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Median, 95 % and least time over all frames of roll-outs; memory and file of the network."""
     from snug.recipe import TRAININGS
     from snug.train import untrained_model
 
-    kind, vertices = kind_and_vertices(case)
+    chosen = TRAININGS[settings.method]
     dressed, motions = dressed_body(vertices), training_motions()
-    model = untrained_model(TRAININGS[kind].kind, dressed, motions, seed=0, recipe=TRAININGS[kind].recipe)
+    model = untrained_model(chosen.kind, dressed, motions, seed=0, recipe=chosen.recipe)
     _frame_seconds(model, dressed, motions[0])
     runs = [_frame_seconds(model, dressed, motions[0]) for _ in range(settings.repeats)]
     frames = 1e3 * np.concatenate(runs)
     with tempfile.TemporaryDirectory() as folder:
         size = model.save(Path(folder) / "model.safetensors").stat().st_size
-    return [
-        ("vertices", dressed.vertices, ""),
-        ("frames timed", len(frames), ""),
-        ("frame, median", float(np.median(frames)), "ms"),
-        ("frame, 95 %", float(np.quantile(frames, 0.95)), "ms"),
-        ("frame, least", float(frames.min()), "ms"),
-        ("parameters", sum(p.numel() for p in model.network.parameters()), ""),
-        ("memory of the network", model.megabytes, "MB"),
-        ("model file", size / 1e6, "MB"),
-    ]
+    return {
+        "vertices": dressed.vertices,
+        "timed_frames": len(frames),
+        "inference": float(np.median(frames)),
+        "inference_p95": float(np.quantile(frames, 0.95)),
+        "inference_least": float(frames.min()),
+        "parameters": sum(p.numel() for p in model.network.parameters()),
+        "network_memory": model.megabytes,
+        "model_file": size / 1e6,
+    }
 
 
 def _frame_seconds(model: TrainedModel, dressed: DressedBody, motion: Motion) -> list[float]:

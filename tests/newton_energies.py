@@ -17,8 +17,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from benchmarks.methods.newton_physics import spring_stiffness
 from reference_sim import Cloth
 from reference_sim.energies.energy import Energy
 
@@ -65,20 +64,3 @@ class UnequalSprings(Energy):
         length = torch.linalg.vector_norm(u[..., 1, :] - u[..., 0, :], dim=-1)
         rest = torch.as_tensor(self.cloth.edge_lengths).to(u)
         return 0.5 * torch.as_tensor(self.stiffness).to(u) * (length - rest) ** 2
-
-
-def spring_stiffness(cloth: Cloth) -> np.ndarray:
-    """(E,) [N/m] for `cloth.edges`: E2 (A1 + A2)/l0^2, which is near an isotropic sheet of modulus E2.
-
-    The area-weighted springs of Van Gelder (1998). They cannot have our Poisson ratio.
-    """
-    n = cloth.vertex_count
-    corners = np.sort(
-        np.stack([cloth.faces, np.roll(cloth.faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1
-    )
-    edges = np.sort(cloth.edges, axis=1)
-    key = edges[:, 0] * n + edges[:, 1]
-    order = np.argsort(key)
-    place = order[np.searchsorted(key[order], corners[:, 0] * n + corners[:, 1])]
-    area = np.bincount(place, weights=np.repeat(cloth.areas, 3), minlength=len(edges))
-    return cloth.material.membrane_modulus * area / cloth.edge_lengths**2

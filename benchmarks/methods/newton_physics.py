@@ -1,4 +1,4 @@
-"""One cloth in NVIDIA's newton: SolverVBD or SolverXPBD on the processor, in float32.
+"""Vertex block descent and XPBD of NVIDIA's newton: other solvers on their own energies, in float32.
 
 How our material becomes newton's (its units are SI; tri_ and edge_ parameters as its kernels use them):
     particle mass   our lumped mass; 0 at pins, which makes a particle kinematic
@@ -7,39 +7,29 @@ How our material becomes newton's (its units are SI; tri_ and edge_ parameters a
     edge_ke         k / l0 [J/m], k / (A1 + A2) [J/m^2] per inner edge      VBD, XPBD
     spring_ke       E2 (A1 + A2) / l0^2 [N/m] per edge                     XPBD, which ignores triangles
     damping, drag, lift, particle radius, contacts: 0, none
+So VBD's membrane is stable Neo-Hookean, close to ours at small strain and not at large, and XPBD has springs.
+Sub-steps are those of newton's examples: a frame is not the minimum of one step of ours, and its energy gap
+says so. Copies into and out of newton are on the clock.
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from reference_sim import Cloth
+from reference_sim import Cloth, Trajectory
 from reference_sim.material import GRAVITY
 
-from .peer_energies import spring_stiffness
+from ..method import Method
+from ..scene import BuiltScene
+
+FAR = 100.0  # [m] from the origin, where a vertex has flown away
 
 
-@dataclass(frozen=True)
-class Advance:
-    """Positions (V, 3) [m], velocities [m/s] at the end of a frame and before its last sub-step; seconds."""
-
-    x: np.ndarray
-    v: np.ndarray
-    x_before: np.ndarray
-    v_before: np.ndarray
-    seconds: float
-
-    @property
-    def diverged(self) -> bool:
-        """Whether a vertex is nowhere, or 100 m away."""
-        return not (np.isfinite(self.x).all() and np.abs(self.x).max() < 100)
-
-
-class Peer:
+class NewtonCloth:
     """A solver of newton bound to one cloth.
 
     Args:
@@ -63,24 +53,65 @@ class Peer:
         self._states = self.model.state(), self.model.state()
         self.substeps = substeps
 
-    def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> Advance:
-        """One frame of dt [s] from x (V, 3) [m] and v (V, 3) [m/s]; copying in and out is off the clock."""
+    def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (V, 3) [m] and velocities [m/s] after one frame of dt [s] from x and v, in float64."""
         now, then = self._states
         now.particle_q.assign(x.astype(np.float32))
         now.particle_qd.assign(v.astype(np.float32))
-        seconds = 0.0
-        for substep in range(self.substeps):
-            if substep == self.substeps - 1:
-                x_before, v_before = _numbers(now)
-            clock = time.perf_counter()
+        for _ in range(self.substeps):
             self._solver.step(now, then, None, None, dt / self.substeps)
-            seconds += time.perf_counter() - clock  # a launch on the processor returns when it is done
             now, then = then, now
-        return Advance(*_numbers(now), x_before, v_before, seconds)
+        return now.particle_q.numpy().astype(np.float64), now.particle_qd.numpy().astype(np.float64)
 
 
-def _numbers(state: Any) -> tuple[np.ndarray, np.ndarray]:
-    return state.particle_q.numpy().astype(np.float64), state.particle_qd.numpy().astype(np.float64)
+@dataclass
+class NewtonSolver(Method):
+    """One solver of newton on one scene without contact."""
+
+    solver: str
+    iterations: int
+    substeps: int
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Build the model and let it compile, by one frame that nobody looks at."""
+        self.scene = scene
+        counts = {"iterations": self.iterations, "substeps": self.substeps}
+        self.newton = NewtonCloth(scene.cloth, self.solver, **counts)
+        self.newton.advance(scene.start, np.zeros_like(scene.start), scene.dt)
+
+    def run(self) -> Trajectory:
+        scene = self.scene
+        x = scene.start
+        v = np.zeros_like(x) if scene.start_velocity is None else scene.start_velocity
+        positions, status, reason = [x], "ok", ""
+        for frame in range(1, scene.frames):
+            if scene.pin_positions is not None:
+                x = x.copy()
+                x[scene.cloth.pins] = scene.pin_positions(frame)
+            x, v = self.newton.advance(x, v, scene.dt)
+            if not (np.isfinite(x).all() and np.abs(x).max() < FAR):
+                status, reason = "diverged", f"frame {frame}: a vertex is nowhere, or 100 m away"
+                break
+            positions.append(x)
+        return Trajectory(
+            positions=np.array(positions),
+            faces=scene.cloth.faces,
+            times=scene.dt * np.arange(len(positions)),
+            frame_seconds=np.full(len(positions), np.nan),
+            status=status,
+            reason=reason,
+            provenance=self._provenance(),
+            frame_fields={},
+        )
+
+    def _provenance(self) -> dict[str, Any]:
+        import newton
+
+        return {
+            "method": f"newton {newton.__version__} {self.solver}",
+            "iterations": self.iterations,
+            "substeps": self.substeps,
+        }
 
 
 def build_model(cloth: Cloth, solver: str) -> Any:
@@ -133,3 +164,25 @@ def _two_areas(cloth: Cloth, edges: np.ndarray) -> np.ndarray:
     areas = np.ones(len(edges))
     areas[inner] = 0.5 * (double[0] + double[1])
     return areas
+
+
+def spring_stiffness(cloth: Cloth) -> np.ndarray:
+    """(E,) [N/m] for `cloth.edges`: E2 (A1 + A2)/l0^2, which is near an isotropic sheet of modulus E2.
+
+    The area-weighted springs of Van Gelder (1998). They cannot have our Poisson ratio.
+    """
+    n = cloth.vertex_count
+    corners = np.sort(
+        np.stack([cloth.faces, np.roll(cloth.faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1
+    )
+    edges = np.sort(cloth.edges, axis=1)
+    key = edges[:, 0] * n + edges[:, 1]
+    order = np.argsort(key)
+    place = order[np.searchsorted(key[order], corners[:, 0] * n + corners[:, 1])]
+    area = np.bincount(place, weights=np.repeat(cloth.areas, 3), minlength=len(edges))
+    return cloth.material.membrane_modulus * area / cloth.edge_lengths**2
+
+
+def make(*, models: Path, seed: int, solver: str, iterations: int, substeps: int) -> NewtonSolver:
+    """The solver "VBD" or "XPBD" of newton."""
+    return NewtonSolver(solver, iterations, substeps)

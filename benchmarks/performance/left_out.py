@@ -17,29 +17,26 @@ from reference_sim import Cloth, Material, Potential, simulate
 from reference_sim.energies import Energy, Gravity, StretchStVK
 from reference_sim.minimise import minimise
 
-from ..parts import Row
 from ..scenes.sheet import square_sheet
+from .microbenchmark import Settings
 
-CASES = ("no body", "no bending", "no inertia", "no network")
 CELLS, FRAMES = 14, 20
 STATIC = 1e6  # [s]: inertia of such a step is below round-off
 
-
-def measure(case: str, repeats: int) -> list[Row]:
-    """Seconds with and without, minima over repeats, and their ratio."""
-    without, with_it = {
-        "no body": _body, "no bending": _bending, "no inertia": _inertia, "no network": _network,
-    }[case]()  # fmt: skip
-    without(), with_it()  # compile, load
-    seconds = np.array([[_timed(run) for run in (without, with_it)] for _ in range(repeats)]).min(axis=0)
-    return [
-        ("without", 1e3 * float(seconds[0]), "ms"),
-        ("with what is not needed", 1e3 * float(seconds[1]), "ms"),
-        ("saved", 100.0 * float(1.0 - seconds[0] / seconds[1]), "%"),
-    ]
-
-
 Run = Callable[[], object]
+
+
+def measure(settings: Settings, *, what: str) -> dict[str, float]:
+    """Seconds with and without, minima over repeats, and their ratio."""
+    without, with_it = {"body": _body, "hinges": _hinges, "inertia": _inertia, "networks": _networks}[what]()
+    without(), with_it()  # compile, load
+    pairs = [[_timed(run) for run in (without, with_it)] for _ in range(settings.repeats)]
+    seconds = np.array(pairs).min(axis=0)
+    return {
+        "without": 1e3 * float(seconds[0]),
+        "with": 1e3 * float(seconds[1]),
+        "saved": 100.0 * float(1.0 - seconds[0] / seconds[1]),
+    }
 
 
 def _timed(run: Run) -> float:
@@ -71,7 +68,7 @@ def _body() -> tuple[Run, Run]:
     )
 
 
-def _bending() -> tuple[Run, Run]:
+def _hinges() -> tuple[Run, Run]:
     from reference_sim.energies import BendHinge
 
     flat, faces = square_sheet(CELLS, 0.4)
@@ -98,7 +95,7 @@ def _inertia() -> tuple[Run, Run]:
     )
 
 
-def _network() -> tuple[Run, Run]:
+def _networks() -> tuple[Run, Run]:
     """A process that can simulate, and one that has loaded the networks' library too."""
 
     def process(imports: str) -> Run:
