@@ -15,7 +15,7 @@ from .cache import Cache
 from .console import remarks, summary
 from .executor import LocalExecutor
 from .plan import Plan, runs
-from .results import FORMAT, Row, RunFolder, with_provenance
+from .results import Row, RunFolder, with_provenance
 from .rows import described, rows_of
 from .runner import Runner
 from .schedule import tasks_of
@@ -78,7 +78,6 @@ class RunLog:
         self.rows: list[Row] = []
         self.stages: list[dict[str, Any]] = []
         self.config: dict[str, Any] = {
-            "format": FORMAT,
             "command": plan.command,
             "preset": plan.preset.name,
             "suites": list(plan.suites),

@@ -209,7 +209,8 @@ class RunFolder:
             path.unlink(missing_ok=True)
 
     def write_config(self, config: dict[str, Any]) -> None:
-        """Write run.json whole or not at all."""
+        """Write run.json, with its format, whole or not at all."""
+        config = {"format": FORMAT, **config}
         with replacing(self.config_path) as temporary:
             temporary.write_text(json.dumps(config, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from snug.recipe import learns_from_simulation
 
-from .metrics import find_metric
+from .metrics import declared, find_metric
 from .plan import Plan, network_of
 from .results import Row
 from .schedule import Schedule
@@ -202,24 +202,32 @@ def _fineness(row: Row) -> float:
 
 def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
-    metrics = {row.metric for row in rows if any(row.method == cell.method for cell in plan.cells)}
-    found = {}
-    for name in sorted(metrics):
-        try:
-            found[name] = _fields(find_metric(name), "name", "reference_tolerance")
-        except KeyError:
-            continue  # of a case, which describes itself
+    methods = {cell.method: cell.entry for cell in plan.cells}
+    measured = dict.fromkeys(row.metric for row in rows if row.method in methods and _is_declared(row.metric))
+    order = {name: place for place, name in enumerate(declared())}
+    ordered = sorted(measured, key=lambda name: order.get(name, len(order)))
+    metrics = {name: _fields(find_metric(name), "name", "reference_tolerance") for name in ordered}
     scenes = {
         scene.name: _fields(scene, "name", "module", "sizes", "options", "metrics") for scene in plan.scenes
     }
-    entries = {cell.method: cell.entry for cell in plan.cells}
     words = ("label", "description", "role", "family", "level", "base", "seeded", "dtype")
-    methods = {name: {word: getattr(entry, word) for word in words} for name, entry in entries.items()}
+    said = {name: {word: getattr(entry, word) for word in words} for name, entry in methods.items()}
     cases = {
-        case.name: {"description": case.description, "suite": case.suite, "options": dict(case.options)}
+        case.name: {
+            "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
+            "metric": case.metric, "options": dict(case.options),
+        }
         for case in plan.cases
-    }
-    return {"metrics": found, "methods": methods, "scenes": scenes, "cases": cases}
+    }  # fmt: skip
+    return {"metrics": metrics, "methods": said, "scenes": scenes, "cases": cases}
+
+
+def _is_declared(metric: str) -> bool:
+    """Cases describe their rows themselves."""
+    try:
+        return bool(find_metric(metric))
+    except KeyError:
+        return False
 
 
 def _fields(entry: Any, *without: str) -> dict[str, Any]:

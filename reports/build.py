@@ -59,15 +59,16 @@ def read_run(folder: RunFolder) -> Run:
 
 def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
     """Every figure that the run holds something for."""
-    from reports import figures, stability, training
+    from reports import figures, training
     from reports.break_even import break_even
     from reports.profile import performance_profile
+    from reports.stability import stability_maps
     from reports.work_precision import error_against_time
 
     pictures = draw_trajectories(folder, run, problems)
     for make in (
         error_against_time, performance_profile, break_even, figures.throughput,
-        stability.stability_maps, stability.outcomes,
+        stability_maps,
     ):  # fmt: skip
         pictures += make(folder.figures, run)
     return pictures + training.training_curves(folder.figures, run, folder.models, problems)

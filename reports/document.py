@@ -50,7 +50,7 @@ def document(
         ),
         "Speed: error against run time": blocks("break_even", "crossings", "profile", "speed"),
         "Validation: known answers": blocks("validation") + _of_suite(run, tables, "validation"),
-        "Extremes: where it breaks": blocks("maps", "outcomes") + _of_suite(run, tables, "extremes")
+        "Extremes: where it breaks": blocks("maps") + _of_suite(run, tables, "extremes")
             + _not_converged(run, tables),
         "What did not run to its end": _trouble(run, tables, problems),
     }  # fmt: skip
@@ -85,9 +85,9 @@ def _of_suite(run: Run, tables: Mapping[str, Table], suite: str) -> list[Block]:
 
 
 def _not_converged(run: Run, tables: Mapping[str, Table]) -> list[Block]:
-    """The stress tests that the figure shows in another colour; the CSV has all."""
+    """The stress tests that did not converge; the CSV has all."""
     rows = [row for row in tables["extremes"].rows if row[2] != "converged"] if "extremes" in tables else []
-    caption = "Stress tests that did not converge, and why."
+    caption = "Stress tests that did not converge, and why; all the others are in tables/extremes.csv."
     return (
         list(table_blocks(run, replace(tables["extremes"], rows=tuple(rows), caption=caption)))
         if rows

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import pandas as pd
 
@@ -20,13 +21,15 @@ def summary(run: Run) -> list[tuple[str, str]]:
     """(topic, sentences), of what the run holds numbers for; means are of the first garment."""
     scenes = next(iter(run.garments(run.worn).values()), [])
     worn = run.worn[run.worn["scene"].isin(scenes)]
+    cells = run.cells("speed")
+    compared = next(iter(compared_scenes(run, cells).values()), [])
     found = [
         ("Total energy", least(run, worn, TOTAL, "J")),
         ("Wrinkles", least(run, worn, CURVATURE, "1/m")),
-        ("Run time", run_time(run, worn if NETWORK in set(worn["method"]) else run.cells("speed"))),
-        ("Error against time", fronts(run)),
-        ("When training pays", training_pays(run)),
-        ("Known answers", f"{checks(run)} {stress(run)}".strip()),
+        ("Run time", run_time(run, worn if NETWORK in set(worn["method"]) else cells)),
+        ("Error against time", fronts(run, cells, compared)),
+        ("When training pays", training_pays(run, cells, compared)),
+        ("Known answers", checks(run).strip()),
         ("Not finished", trouble(run)),
     ]
     # A number keeps its unit on its line.
@@ -59,44 +62,31 @@ def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
 
 def run_time(run: Run, frame: pd.DataFrame) -> str:
     own, reference = pair(frame, NETWORK, run.reference, TIME)
-    if own is None or reference is None or not own.value or not reference.value:
+    if own is None or reference is None or not own.value:
         return ""
     text = f"{run.label(NETWORK)} takes {number(own.value)} ms per frame, the simulation "
-    text += f"{number(reference.value)} ms: {number(reference.value / own.value, 2)} times"
-    return f"{text}{own.fewer}."
+    return f"{text}{number(reference.value)} ms: {number(reference.value / own.value, 2)} times{own.fewer}."
 
 
-def fronts(run: Run) -> str:
+def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
     """By each error, what beats the network, and the fastest truncated solver that is as accurate."""
-    frame = run.cells("speed")
-    scenes = next(iter(compared_scenes(run, frame).values()), [])
-    sentences = []
+    text = ""
     for metric in ("gap/relative", CURVATURE):
-        points = points_of(run, frame, scenes, metric) if scenes else []
+        points = points_of(run, frame, scenes, metric)
         own = next((p for p in points if p.method == NETWORK), None)
         if own is None:
             continue
-        title = run.metrics[metric].title
-        title = f"{title[:1].lower()}{title[1:]}"
         best, solver = beaten_by(points, own), fastest(truncated(run, points), own.error)
-        text = f"By {title} ({number(own.error)} in {number(own.time)} ms) "
-        text += (
-            "nothing as fast as SNUG is nearer" if best is None else f"{run.label(best.method)} beats SNUG"
-        )
+        text += f" By {run.metrics[metric].title.lower()} ({number(own.error)} in {number(own.time)} ms) "
+        text += f"{run.label(best.method)} beats SNUG" if best else "nothing as fast as SNUG is nearer"
         text += f" ({number(best.error)} in {number(best.time)} ms)" if best else ""
-        text += (
-            f"; the fastest solver as near is {run.label(solver.method)}, {number(solver.time)} ms."
-            if solver
-            else "."
-        )
-        sentences.append(text)
-    return " ".join(sentences)
+        text += f"; the fastest solver as near is {run.label(solver.method)}, " if solver else ""
+        text += f"{number(solver.time)} ms." if solver else "."
+    return text.strip()
 
 
-def training_pays(run: Run) -> str:
-    frame = run.cells("speed")
-    scenes = next(iter(compared_scenes(run, frame).values()), [])
-    own = cost_of(frame, NETWORK, scenes) if scenes else None
+def training_pays(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
+    own = cost_of(frame, NETWORK, scenes)
     if own is None or own.before <= 0.0:
         return ""
     parts = []
@@ -109,24 +99,26 @@ def training_pays(run: Run) -> str:
 
 
 def checks(run: Run) -> str:
-    """How many validation checks passed, and which did not."""
+    """How many checks passed and stress tests converged, and what the others did."""
     rows = tables.checks(run)
     rows = rows[rows["tolerance"].notna() | (rows["status"] != "ok")]
     bad = [tables.check_name(run, row) for row in rows[rows["status"] != "ok"].itertuples()]
-    text = f"{len(rows) - len(bad)} of {len(rows)} checks pass" if len(rows) else ""
-    return f"{text}; failed: {', '.join(bad)}." if bad else text and f"{text}."
-
-
-def stress(run: Run) -> str:
-    """How many stress tests converged; the rest by status."""
-    counts = tables.stress_tests(run)["status"].value_counts()
-    rest = "".join(f"; {count} {status}" for status, count in counts.items() if status != "ok")
-    return f"{counts.get('ok', 0)} of {counts.sum()} stress tests converged{rest}." if len(counts) else ""
+    failed = f"; failed: {', '.join(bad)}" if bad else ""
+    text = f"{len(rows) - len(bad)} of {len(rows)} checks pass{failed}. " if len(rows) else ""
+    tests = tables.stress_tests(run)["status"]
+    others = f"; {counts(tests)}" if (tests != "ok").any() else ""
+    return text + (
+        f"{(tests == 'ok').sum()} of {len(tests)} stress tests converged{others}." if len(tests) else ""
+    )
 
 
 def trouble(run: Run) -> str:
-    rows = run.suite("garments", "speed")
-    rows = rows[rows["status"] != "ok"].drop_duplicates(["scene", "method", "seed"])
-    counts = rows["status"].value_counts()
-    words = ", ".join(f"{count} {status}" for status, count in counts.items())
+    cells = run.suite("garments", "speed").sort_values("status", key=lambda s: s == "ok", kind="stable")
+    words = counts(cells.drop_duplicates(["scene", "method", "seed"])["status"])
     return f"Cells of garments and speed: {words}; the reasons stand near the end." if words else ""
+
+
+def counts(statuses: pd.Series) -> str:
+    """As "8 stalled, 2 diverged"."""
+    others = statuses[statuses != "ok"].value_counts()
+    return ", ".join(f"{count} {status}" for status, count in others.items())

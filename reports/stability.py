@@ -1,4 +1,4 @@
-"""How far stiffness and time step go, as a map for each scene; and how stress tests ended."""
+"""How far stiffness and time step go, as a map for each scene."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from reports.data import Run
-from reports.plotting import PAGE_WIDTH, Picture, new_figure, power_text, save, wrapped
+from reports.plotting import PAGE_WIDTH, Picture, new_figure, power_text, save
 from reports.styles import STATUS_COLOURS
-from reports.tables import map_points, stress_tests
+from reports.tables import map_points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FEW, MANY = 2.0, 300.0  # iterations at the ends of the colour scale
 PALE, DEEP = (0.90, 0.95, 0.99), (0.03, 0.27, 0.49)
-TWO_COLUMNS = 24  # stress tests from which a figure has several columns
 
 
 def stability_maps(folder: Path, run: Run) -> list[Picture]:
@@ -82,40 +81,3 @@ def shade(iterations: float) -> tuple[float, float, float]:
     place = min(math.log(max(iterations, FEW) / FEW) / math.log(MANY / FEW), 1.0)
     red, green, blue = (a + place * (b - a) for a, b in zip(PALE, DEEP))
     return red, green, blue
-
-
-def outcomes(folder: Path, run: Run) -> list[Picture]:
-    """Every stress test in columns on one page, worded and coloured by how it ended."""
-    found = list(stress_tests(run).itertuples())
-    if not found:
-        return []
-    columns = 1 if len(found) <= TWO_COLUMNS else 3
-    lines = -(-len(found) // columns)
-    figure = new_figure(PAGE_WIDTH if columns > 1 else 0.5 * PAGE_WIDTH, 0.2 + 0.21 * lines)
-    axes = figure.subplots()
-    for place, row in enumerate(found):
-        _outcome(axes, place // lines, place % lines, row)
-    axes.set_xlim(-0.01, columns - 0.02)
-    axes.set_ylim(lines - 0.5, -0.5)
-    axes.axis("off")
-    caption = (
-        "How each stress test ended. Blue: converged. The number is the largest gradient left, in vertex "
-    )
-    caption += "weights. The table says why the others did not."
-    return [save(figure, folder, "extremes_1", caption=caption, kind="outcomes")]
-
-
-def _outcome(axes: Axes, column: int, line: int, row) -> None:
-    """A pale cell with a strip of the status's full colour at its left."""
-    from matplotlib.colors import to_rgb
-    from matplotlib.patches import Rectangle
-
-    colour = to_rgb(STATUS_COLOURS[row.status])
-    pale = tuple(1.0 - 0.28 * (1.0 - part) for part in colour)
-    axes.add_patch(Rectangle((column, line - 0.43), 0.97, 0.86, facecolor=pale, linewidth=0))
-    axes.add_patch(Rectangle((column, line - 0.43), 0.02, 0.86, facecolor=colour, linewidth=0))
-    name = wrapped(row.scene.replace("_", " "), 40).partition("\n")[0]
-    axes.text(column + 0.035, line, name, ha="left", va="center", fontsize=7.2)
-    words = [] if row.status == "ok" else [row.status]
-    words += [power_text(row.value)] if math.isfinite(row.value) else []
-    axes.text(column + 0.955, line, "  ".join(words), ha="right", va="center", fontsize=7.2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 
 from benchmarks.assets import Assets
 from benchmarks.presets import Preset, find_preset
@@ -41,3 +42,29 @@ def training(name: str, *motions: str, steps: int, key: str = "0", device: str =
 def context(folder, assets: Assets | None = None, **fields) -> Context:
     """Of a process in which a task runs."""
     return Context(RunFolder(folder), assets, **fields)
+
+
+class InProcess:
+    """An executor that does everything here: the seam behind which a cluster could stand."""
+
+    def __init__(self, folder: RunFolder, assets: Assets | None = None) -> None:
+        self.folder, self.assets = folder, assets
+        self._named: dict[str, Context] = {}
+
+    def context(self) -> Context:
+        return Context(self.folder, self.assets)
+
+    def together(self, batches, bar):
+        for tasks, needed in batches:
+            clock = time.perf_counter()
+            for task, outcome in zip(tasks, type(tasks[0]).run_together(tasks, self.context(), needed)):
+                yield task, dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
+
+    def alone(self, task, needed):
+        return task.run(self._named.setdefault(task.process, self.context()), needed)
+
+    def release(self, process):
+        self._named.pop(process, None)
+
+    def close(self):
+        self._named.clear()

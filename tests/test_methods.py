@@ -3,200 +3,234 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
-from benchmarks.cell import Outcome, run_cell
-from benchmarks.curves import CURVES
-from benchmarks.evaluate import measure_scene
-from benchmarks.ground_truth import settle, simulate_motion
-from benchmarks.training import train_network
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
+from tasks_by_hand import InProcess, dressed_scene, small_scene
+from test_cell_tasks import NoLog, plan_of
 
+from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.cache import Cache
+from benchmarks.method import Method
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
-from benchmarks.plan import Cell, Network
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.plan import Motions
 from benchmarks.presets import find_preset
 from benchmarks.results import RunFolder
-from benchmarks.rows import clock_costs, model_costs, rows_of
-from benchmarks.scenes import SMALL_SCENES, dressed_scene
+from benchmarks.rows import rows_of
+from benchmarks.runner import Runner
+from benchmarks.scenes import SCENES
+from benchmarks.schedule import tasks_of
+from benchmarks.tasks.cell import Cell, built
+from benchmarks.tasks.metrics import measured
 from reference_sim import Trajectory
 
-TINY = dataclasses.replace(find_preset("smoke"), frames=16, settle_frames=4, sheet_cells=4, sheet_frames=5)
+SIZES = {"frames": 16, "settle_frames": 4, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 TRAIN, TEST = "arm_raise", "kick"
 KINDS = ("untrained", "snug", "supervised", "pbns")
+TINY = dataclasses.replace(
+    find_preset("smoke"), **SIZES, repeats=1, steps=dict.fromkeys(("snug", "supervised", "pbns"), 2)
+)
 # Further learned methods have tests of their own. On a body the coarsest speaks for each family of solvers.
 SMALL_METHODS = [e for e in METHODS if e not in LEARNED and (e.trained is None or e.trained in KINDS)]
-FINER = {name for family in CURVES.values() for name in family[1:]} - {"simulation"}
-FINER |= {"simulation-dt/4", "simulation-dt/8"}
-DRESSED_METHODS = [entry for entry in SMALL_METHODS if entry.name not in FINER]
-
-
-def silent(units: int) -> None:
-    assert units >= 0
+BY_LEVEL = sorted(SMALL_METHODS, key=lambda entry: (entry.family, entry.level or 0.0))
+COARSEST = [next(own) for family, own in itertools.groupby(BY_LEVEL, lambda e: e.family) if family]
+COARSEST += [find_method("simulation-1e-2")]
+FINER = [e for e in SMALL_METHODS if e.level is not None and e not in COARSEST] + [
+    find_method("simulation-1e-8")
+]
+DRESSED_METHODS = [entry for entry in SMALL_METHODS if entry not in FINER]
+BODY = f"tshirt/{TEST}"
+NAMES = [*(scene.name for scene in SCENES), BODY]
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    return RunFolder(tmp_path_factory.mktemp("run"))
+    """A whole run in this process."""
+    folder = RunFolder(tmp_path_factory.mktemp("run"))
+    scenes = [*(scene.at(TINY) for scene in SCENES), dressed_scene(TEST, preset=TINY)]
+    cells = tuple(
+        Cell(scene, entry, 0, ("garments", "speed"))
+        for scene in scenes
+        for entry in (DRESSED_METHODS if scene.dressed else SMALL_METHODS)
+    )
+    plan = dataclasses.replace(
+        plan_of(folder.path), preset=TINY, cells=cells, motions=Motions((TRAIN,), (TEST,))
+    )
+    assets = open_assets(TINY, embedded_motions([TRAIN, TEST]), ["tshirt"])
+    runner = Runner(tasks_of(plan), Cache(folder))
+    executor = InProcess(folder, assets)
+    runner.run(executor, NoLog())
+    return plan, runner, executor
 
 
 @pytest.fixture(scope="module")
-def wardrobe():
-    return open_wardrobe(TINY, embedded_motions([TRAIN, TEST]))
+def rows(run):
+    plan, runner, _ = run
+    return rows_of(plan, runner.tasks, runner.outcomes)
 
 
 @pytest.fixture(scope="module")
-def trained(run, wardrobe):
-    simulated = simulate_motion(wardrobe, silent, dressed_scene(TRAIN), TINY, run.path)
-    assert simulated.whole and simulated.frames == TINY.frames and simulated.seconds > 0
-    motions = {TRAIN: run.path / simulated.files[0]}
-    networks = {kind: Network(kind, 0) for kind in KINDS}
-    return {
-        k: train_network(wardrobe, silent, n, 2, motions, run.path, "cpu", "0") for k, n in networks.items()
-    }
+def scenes(run):
+    """Name -> built scene."""
+    plan, _, executor = run
+    return {scene.name: built(scene, executor.context()) for scene in plan.scenes}
 
 
-@pytest.fixture(scope="module")
-def outcomes(run, wardrobe, trained):
-    """Of each scene: the built scene and the outcome of every method."""
-    settle(wardrobe, silent, dressed_scene(TEST), TINY, run.path)
-    found = {}
-    for scene in (*SMALL_SCENES, dressed_scene(TEST)):
-        built = scene.build(TINY, wardrobe)
-        if scene.dressed:
-            start = np.load(run.start_path(scene.name))
-            built = dataclasses.replace(built, settle=lambda start=start: start)
-        methods = DRESSED_METHODS if scene.dressed else SMALL_METHODS
-        found[scene.name] = (
-            built,
-            [run_cell(Cell(scene, m.name, 0, ("garments", "speed")), m, built, run) for m in methods],
-        )
-    return found
+def outcomes_of(run, name):
+    plan, runner, _ = run
+    return {c.method: runner.outcomes["cell", c.name] for c in plan.cells if c.scene.name == name}
 
 
-SCENES = [scene.name for scene in SMALL_SCENES] + [f"dressed/{TEST}"]
+def trajectory_of(run, name, method) -> Trajectory:
+    return Trajectory.load(run[1].cache.folder.trajectory_path(name, method))
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_every_method_gives_a_whole_trajectory_or_a_reason(name, outcomes, run):
-    built, found = outcomes[name]
-    for outcome in found:
+@pytest.mark.parametrize("name", NAMES)
+def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
+    scene, found = scenes[name], outcomes_of(run, name)
+    for method, outcome in found.items():
         if outcome.status == "skipped":
-            assert outcome.reason and (built.dressed is None or find_method(outcome.cell.method).package)
+            assert outcome.reason and (scene.dressed is None or find_method(method).package)
             continue
-        assert outcome.status == "ok", f"{outcome.cell.label}: {outcome.reason}"
-        trajectory = Trajectory.load(run.trajectory_path(name, outcome.cell.method))
-        assert trajectory.positions.shape == (built.frames, *built.cloth.rest_positions.shape)
-        assert np.isfinite(trajectory.positions).all() and np.array_equal(trajectory.faces, built.cloth.faces)
-        seconds = trajectory.frame_seconds[1:]
-        assert (seconds > 0).all() and seconds.sum() <= outcome.seconds[0]
+        assert outcome.status == "ok", f"{name} x {method}: {outcome.reason}"
+        trajectory = trajectory_of(run, name, method)
+        assert trajectory.positions.shape == (scene.frames, *scene.cloth.rest_positions.shape)
+        assert np.isfinite(trajectory.positions).all() and np.array_equal(trajectory.faces, scene.cloth.faces)
+        seconds = trajectory.frame_seconds[1:]  # the simulator's own; no method takes times
+        simulated = np.isfinite(seconds).all()
+        assert simulated == (find_method(method).dtype == "float64")
+        assert not simulated or ((seconds > 0).all() and seconds.sum() <= outcome.result["seconds"])
         assert trajectory.provenance["scene"] == name
-    skipped = {outcome.cell.method for outcome in found if not outcome.recorded}
+        given = 0 if find_method(method).gives_first_frame else 1
+        assert outcome.result["frames"] == scene.frames - given
+    skipped = {method for method, outcome in found.items() if not outcome.files}
     bound = {entry.name for entry in METHODS if entry.needs_body or entry.package}
-    assert skipped <= bound and (built.dressed is None or skipped <= {"newton-vbd", "newton-xpbd"})
+    assert skipped <= bound and (scene.dressed is None or skipped <= {"newton-vbd", "newton-xpbd"})
 
 
-def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(outcomes, run, trained):
+def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows, scenes):
     expected = {
-        "cost/frame", "curvature/mean", "energy/total", "gap/relative", "gap/local", "gradient/norm",
-        "deformation/edges", "deformation/areas", "dihedral/mean", "intersections/triangles",
+        "cost/frame", "cost/peak", "curvature/mean", "energy/total", "gap/relative", "gap/local",
+        "gradient/norm", "deformation/edges", "deformation/areas", "dihedral/mean", "intersections/triangles",
     }  # fmt: skip
-    against = {"distance/rms", "distance/p95", "distance/floor", "curvature/error", "curvature/histogram"}
-    for name, (built, found) in outcomes.items():
-        recorded = [outcome for outcome in found if outcome.recorded]
-        kinds = [find_method(outcome.cell.method).trained for outcome in recorded]
-        costs = [
-            model_costs(kind, dataclasses.asdict(trained[kind]) if kind in trained else None, 7.0)
-            for kind in kinds
-        ]
-        metrics = measure_scene(recorded, built, run, gap_samples=2)
-        for outcome, measured, cost in zip(recorded, metrics, costs):
-            values = measured | clock_costs(outcome) | cost
-            assert {f"energy/{term}" for term in built.terms} | expected <= set(values)
-            assert ("penetration/vertices" in values) == (built.obstacle is not None)
-            assert len(against & set(values)) == (0 if outcome.cell.method == "simulation" else len(against))
-            ladder = outcome.cell.method == "simulation" and built.dressed is None
+    against = {
+        "distance/rms", "distance/p95", "distance/sensitivity", "curvature/error", "curvature/histogram"
+    }  # fmt: skip
+    for name, scene in scenes.items():
+        for method, outcome in outcomes_of(run, name).items():
+            if outcome.status == "skipped":
+                continue
+            own = [r for r in rows if (r.suite, r.scene, r.method) == ("speed", name, method)]
+            values = {row.metric: row.value for row in own}
+            entry, on_body = find_method(method), scene.dressed is not None
+            assert {f"energy/{term}" for term in scene.terms} | expected <= set(values)
+            assert ("penetration/vertices" in values) == (scene.obstacle is not None)
+            assert len(against & set(values)) == (0 if method == "simulation" else len(against))
+            ladder = method == "simulation" and not on_body
             assert ({"time_error/total", "time_error/curvature"} <= set(values)) == ladder
-            network = outcome.cell.method in KINDS
-            assert ("cost/train" in values) == (find_method(outcome.cell.method).trained is not None)
-            # What has an answer to held poses: networks, skinning, and the simulator on a body.
-            on_body = built.dressed is not None
-            still = network or (on_body and outcome.cell.method in ("skinning", "simulation"))
-            assert ("dynamics/held_difference" in values) == still
-            assert ("dynamics/amplitude" in values) == (built.dressed is not None)
-            if outcome.cell.method == "simulation" and built.dressed:
+            network = method in KINDS
+            assert ("cost/train" in values) == (entry.trained is not None)
+            assert ("cost/batch" in values) == network
+            # What has an answer to poses held still: networks, skinning, and the simulator on a body.
+            still = network or (on_body and method in ("skinning", "simulation"))
+            assert ("dynamics/quasi_static_difference" in values) == still
+            assert ("dynamics/amplitude" in values) == on_body
+            asked = on_body and (method in ("simulation", "skinning") or (network and method != "untrained"))
+            assert ("conservation/momentum" in values) == asked
+            if method == "simulation" and on_body:
                 assert values["dynamics/amplitude"] == pytest.approx(1.0)
-            if outcome.cell.method == "skinning":
-                assert values["dynamics/amplitude"] == values["dynamics/held_difference"] == 0.0
+                assert values["conservation/momentum_worst"] < 2e-6
+            if method == "skinning":
+                assert values["dynamics/amplitude"] == values["dynamics/quasi_static_difference"] == 0.0
             if network:
-                assert values["cost/data"] == (7.0 if outcome.cell.method == "supervised" else 0.0)
-            assert all(row.status == "ok" for row in rows_of(outcome, values)), (name, values)
-        by_method = {outcome.cell.method: m for outcome, m in zip(recorded, metrics)}
-        assert by_method["simulation"]["gap/local"] == pytest.approx(0.0, abs=1e-12)
+                assert (values["cost/data"] > 0.0) == (method == "supervised")
+            assert all(row.status == "ok" for row in own), (name, method, values)
+        by_method = {r.method: r.value for r in rows if r.scene == name and r.metric == "gap/local"}
+        assert by_method["simulation"] == pytest.approx(0.0, abs=1e-12)
+        sensitivity = {r.value for r in rows if r.scene == name and r.metric == "distance/sensitivity"}
         # So few frames do not drive two runs apart [mm].
-        assert 0.0 < by_method["simulation-moved"]["distance/floor"] < 1e-3
+        assert len(sensitivity) == 1 and 0.0 < sensitivity.pop() < 1e-3
 
 
-def test_the_settled_shirt_is_at_rest_outside_of_the_body(outcomes):
-    built, _ = outcomes[f"dressed/{TEST}"]
-    distance = built.obstacle.signed_distance(built.start, 0)
+def test_the_settled_shirt_is_at_rest_outside_of_the_body(scenes):
+    scene = scenes[BODY]
+    distance = scene.obstacle.signed_distance(scene.start, 0)
     assert (distance < -0.002).mean() < 0.02 and np.median(distance) < 0.1
-    assert np.abs(built.origin_heights - 0.9).max() < 0.4
+    assert np.abs(scene.origin_heights - 0.9).max() < 0.4
 
 
-def test_skinning_is_the_network_that_starts_at_zero_offsets(outcomes, run):
+def test_skinning_is_the_network_that_starts_at_zero_offsets(run):
     """PBNS after two steps has moved by little from skinning, its start: both stand on one skinning."""
-    name = f"dressed/{TEST}"
-    skinned = Trajectory.load(run.trajectory_path(name, "skinning")).positions
-    pbns = Trajectory.load(run.trajectory_path(name, "pbns")).positions
+    skinned, pbns = (trajectory_of(run, BODY, method).positions for method in ("skinning", "pbns"))
     assert 0.0 < np.linalg.norm(pbns - skinned, axis=2).max() < 0.01
 
 
-def test_all_solvers_start_where_the_scene_starts(outcomes, run):
-    for name, (built, found) in outcomes.items():
-        for outcome in found:
-            entry = find_method(outcome.cell.method)
-            if outcome.recorded and entry.dtype == "float64":
-                first = Trajectory.load(run.trajectory_path(name, entry.name)).positions[0]
-                assert np.abs(first - built.start).max() <= 1.01e-9, f"{name} x {entry.name}"
+def test_all_solvers_start_where_the_scene_starts(run, scenes):
+    for name, scene in scenes.items():
+        for method, outcome in outcomes_of(run, name).items():
+            if outcome.files and find_method(method).dtype == "float64":
+                first = trajectory_of(run, name, method).positions[0]
+                assert np.abs(first - scene.start).max() <= 1.01e-9, f"{name} x {method}"
 
 
-def test_a_hybrid_goes_on_from_skinning_and_keeps_its_networks_time(outcomes, run):
-    name = f"dressed/{TEST}"
-    skinned, hybrid = (
-        Trajectory.load(run.trajectory_path(name, method)) for method in ("skinning", "skinning+lbfgs-1")
-    )
-    built, _ = outcomes[name]
-    moved = np.linalg.norm(hybrid.positions - skinned.positions, axis=2).max(axis=1)
-    assert np.array_equal(hybrid.positions[0], built.start) and moved[1:].min() > 1e-4
-    assert np.median(hybrid.frame_seconds[1:]) > np.median(skinned.frame_seconds[1:])
-    assert hybrid.frame_fields["iterations"].tolist() == [0] + [1] * (built.frames - 1)
+def test_a_warm_started_solver_goes_on_from_skinning_and_has_its_time_on_the_clock(run, scenes):
+    skinned, warm = (trajectory_of(run, BODY, method) for method in ("skinning", "skinning+lbfgs-1"))
+    moved = np.linalg.norm(warm.positions - skinned.positions, axis=2).max(axis=1)
+    assert np.array_equal(warm.positions[0], scenes[BODY].start) and moved[1:].min() > 1e-4
+    seconds = {m: o.result["seconds"] for m, o in outcomes_of(run, BODY).items() if o.files}
+    assert seconds["skinning+lbfgs-1"] > seconds["skinning"]
+    assert warm.frame_fields["iterations"].tolist() == [0] + [1] * (scenes[BODY].frames - 1)
 
 
-def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_metrics(tmp_path):
-    scene, run = next(scene for scene in SMALL_SCENES if scene.name == "hanging_sheet"), RunFolder(tmp_path)
-    built = scene.build(TINY)
-    falling = np.asarray(built.start) + 0.001 * np.arange(built.frames)[:, None, None]
+def test_every_method_has_the_whole_protocol(tmp_path):
+    for entry in METHODS:
+        if entry.package is None:
+            assert isinstance(entry.make(models=tmp_path, seed=0), Method)
+            assert entry.label and entry.role
+    assert Method().quasi_static() is None
+    with pytest.raises(NotImplementedError):
+        Method().batch(2)
+
+
+def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_metrics():
+    scene = small_scene("hanging_sheet", cells=4, frames=5)
+    falling = np.asarray(scene.start) + 0.001 * np.arange(scene.frames)[:, None, None]
     lost = {"simulation": (9, 0.0), "newton-1": (3, np.nan), "newton-4": (0, np.inf), "newton-8": (4, 1e200)}
     lost |= {"simulation-dt/2": (9, 0.0), "simulation-dt/4": (9, 0.0), "simulation-dt/8": (3, np.nan)}
-    outcomes = []
+    group = SceneRollOuts(scene, gap_samples=3)
     for method, (first, value) in lost.items():
         x = falling.copy()
         x[first:] = value
-        path = run.trajectory_path(scene.name, method)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        Trajectory(
-            positions=x, faces=built.cloth.faces, times=built.dt * np.arange(len(x)),
+        trajectory = Trajectory(
+            positions=x, faces=scene.cloth.faces, times=scene.dt * np.arange(len(x)),
             frame_seconds=np.full(len(x), 1e-3), status="ok",
-        ).save(path)  # fmt: skip
+        )  # fmt: skip
         status = "ok" if first > len(x) else "diverged"
-        outcomes.append(Outcome(Cell(scene, method, 0, ("speed",)), status, seconds=(1.0,), recorded=True))
+        entry = find_method(method)
+        group.roll_outs.append(RollOut(group, entry, trajectory, status=status, suites=("speed",)))
     with np.errstate(all="ignore"):
-        found = dict(zip(lost, measure_scene(outcomes, built, run, gap_samples=3)))
+        found, curves = zip(*(measured(roll_out) for roll_out in group.roll_outs))
+    found, curves = dict(zip(lost, found)), dict(zip(lost, curves))
     assert np.isfinite(list(found["simulation"].values())).all() and found["newton-4"] == {}
     assert found["newton-1"]["distance/rms"] == 0.0 and np.isfinite(found["newton-1"]["gap/energy"])
     assert np.isnan(found["newton-8"]["gap/energy"])
-    fields = Trajectory.load(run.trajectory_path(scene.name, "newton-1")).frame_fields
-    assert np.isfinite(fields["energy/total"]).tolist() == [True] * 3 + [False] * 2
+    assert (
+        len(curves["newton-1"]["energy/total"]) == 3 and np.isfinite(curves["newton-1"]["energy/total"]).all()
+    )
     assert not any(name.startswith("time_error") for name in found["simulation"])  # dt/8 was not whole
+
+
+def test_curves_of_a_roll_out_that_was_lost_end_where_it_did(tmp_path):
+    from benchmarks.tasks.metrics import _add_curves
+
+    x = np.zeros((5, 3, 3))
+    path = tmp_path / "lost.vtkhdf"
+    Trajectory(
+        positions=x, faces=np.array([[0, 1, 2]]), times=np.arange(5.0), frame_seconds=np.ones(5), status="ok"
+    ).save(path)  # fmt: skip
+    _add_curves(path, {"energy/total": np.ones(3)}, 5)
+    fields = Trajectory.load(path).frame_fields
+    assert np.isfinite(fields["energy/total"]).tolist() == [True] * 3 + [False] * 2

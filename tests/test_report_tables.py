@@ -15,7 +15,7 @@ from reports.ablations import ablations, ablations_judged
 from reports.document import document
 from reports.layout import table_blocks
 from reports.means import Mean, mean_of, pair
-from reports.narrative import fronts, least, run_time, summary, trouble
+from reports.narrative import least, run_time, summary, trouble
 from reports.tables import make_tables, merged
 
 
@@ -251,7 +251,7 @@ def test_run_times_are_of_the_scenes_that_both_have():
 def test_what_did_not_end_well_is_counted_by_cell():
     rows = [*all_rows(), row("tshirt/walk", "pbns", "energy/bending", status="stalled", reason="a frame")]
     assert trouble(run_of(rows)).startswith("Cells of garments and speed: 2 failed, 1 skipped, 1 stalled;")
-    assert trouble(run_of(rows[:3])) == "" and fronts(run_of(rows[:3])) == ""
+    assert trouble(run_of(rows[:3])) == ""
 
 
 @pytest.mark.parametrize(
@@ -287,6 +287,20 @@ def test_other_suites_stand_scene_by_scene_in_their_sections():
     assert [group["title"] for group in block["groups"]] == [
         "tshirt/fast"
     ]  # the walk stands in its own suite
+
+
+def test_the_page_lists_the_stress_tests_that_did_not_converge_and_the_table_all():
+    run = run_of(all_rows())
+    made = make_tables(run)
+    assert [line[:3] for line in made["extremes"].rows] == [
+        ("stiff", "simulation", "converged"), ("teleport", "simulation", "timeout"),
+    ]  # fmt: skip
+    sections = {s["title"]: s["blocks"] for s in document(run, made, [], [])["sections"]}
+    (block,) = sections["Extremes: where it breaks"]
+    assert [[cell["text"] for cell in line[:3]] for line in block["groups"][0]["rows"]] == [
+        ["teleport", "Simulation", "timeout"]
+    ]
+    assert dict(summary(run))["Known answers"].endswith("1 of 2 stress tests converged; 1 timeout.")
 
 
 def test_no_number_of_the_report_is_infinite_or_nan():

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from benchmarks.results import COLUMNS, ResultsError, Row, RunFolder, replacing, with_provenance
+from benchmarks.results import COLUMNS, FORMAT, ResultsError, Row, RunFolder, replacing, with_provenance
 
 ROWS = [
     Row("garments", "dressed/walk", "snug", 0, "energy/strain", "J", 0.1 + 0.2, terms="strain+gravity"),
@@ -34,7 +34,10 @@ def test_rows_come_back_digit_for_digit(tmp_path):
 def test_config_comes_back(tmp_path):
     folder = RunFolder(tmp_path)
     folder.write_config({"preset": "smoke", "seeds": [0, 1], "note": "λ"})
-    assert folder.read_config() == {"preset": "smoke", "seeds": [0, 1], "note": "λ"}
+    assert folder.read_config() == {"format": FORMAT, "preset": "smoke", "seeds": [0, 1], "note": "λ"}
+    folder.config_path.write_text('{"preset": "smoke"}')
+    with pytest.raises(ResultsError, match=r"run\.json: written by an earlier version .* new folder"):
+        folder.read_config()
 
 
 @pytest.mark.parametrize(
@@ -57,8 +60,8 @@ def test_a_row_that_says_nothing_true_is_refused(changes, word):
     [
         ("", "line 1: the columns"),
         ("a,b\n1,2\n", "line 1: the columns"),
-        (",".join(COLUMNS) + "\n1,2\n", "line 2: 17 cells"),
-        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,1,\n", "line 2: column seed"),
+        (",".join(COLUMNS) + "\n1,2\n", f"line 2: {len(COLUMNS)} cells"),
+        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,1,,,,,,,,,false,\n", "line 2: column seed"),
     ],
 )
 def test_a_broken_file_is_named_with_its_line(tmp_path, text, word):

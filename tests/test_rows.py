@@ -6,24 +6,24 @@ import dataclasses
 
 import numpy as np
 import pytest
-from benchmarks.cell import Outcome, frames_computed, judge
-from benchmarks.clock import Reading
-from benchmarks.closing import remarks, summary
-from benchmarks.named_metrics import UNITS, unit_of
-from benchmarks.record import Record
-from benchmarks.stages import accepted
+from tasks_by_hand import dressed_scene
+from test_cell_tasks import plan_of
 
 from benchmarks import provenance
-from benchmarks.methods import METHODS
-from benchmarks.plan import Cell, Plan
-from benchmarks.presets import find_preset
-from benchmarks.results import NOT_FALLING, Row
-from benchmarks.rows import model_costs, rows_of
-from benchmarks.scenes import SMALL_SCENES, dressed_scene
-from benchmarks.validation.registry import KNOWN_ANSWERS
+from benchmarks.console import remarks, summary
+from benchmarks.execution import RunLog, accepted
+from benchmarks.methods import METHODS, find_method
+from benchmarks.plan import Motions
+from benchmarks.results import Row
+from benchmarks.rows import NOT_FALLING, rows_of
+from benchmarks.scenes import SCENES
+from benchmarks.schedule import Schedule
+from benchmarks.tasks.cell import Cell, judge
+from benchmarks.tasks.task import Outcome
+from benchmarks.timing import Reading
 from reference_sim import Trajectory
 
-SHEET = SMALL_SCENES[0]
+SHEET = SCENES[0]
 
 
 def trajectory(frames=4, **changes) -> Trajectory:
@@ -41,11 +41,11 @@ class FourFrames:
 
 
 def test_a_trajectory_is_judged_by_what_is_in_it():
-    def judged(cut_short=False, **changes):
-        return judge(trajectory(**changes), Reading(1.0), FourFrames(), cut_short=cut_short)
+    def judged(truncated=False, **changes):
+        return judge(trajectory(**changes), Reading(1.0), FourFrames(), truncated=truncated)
 
     assert judged() == ("ok", "")
-    assert judged(status="max_iterations", cut_short=True) == ("ok", "")
+    assert judged(status="max_iterations", truncated=True) == ("ok", "")
     assert judged(status="max_iterations", reason="frame 2: gave up")[0] == "stalled"
     assert judged(frames=2)[0] == "diverged"
     assert judged(positions=np.full((4, 3, 3), np.nan))[0] == "diverged"
@@ -57,34 +57,55 @@ def test_a_trajectory_is_judged_by_what_is_in_it():
 
 
 def test_a_time_that_cannot_be_believed_fails_the_cell():
-    status, reason = judge(trajectory(), Reading(1.0, "it went on"), FourFrames(), cut_short=False)
+    status, reason = judge(trajectory(), Reading(1.0, "it went on"), FourFrames(), truncated=False)
     assert status == "failed" and "it went on" in reason
 
 
-def test_a_first_frame_that_was_given_does_not_count():
-    assert frames_computed(trajectory()) == 3
-    assert frames_computed(trajectory(frame_seconds=np.r_[np.nan, np.ones(3)])) == 3
-    assert frames_computed(trajectory(frame_seconds=np.full(4, 0.1))) == 4
+def rows(cell: Cell, outcome: Outcome, metrics: dict[str, float] | None = None, **more: Outcome) -> list[Row]:
+    """Of one cell with these metrics; more: outcomes of other tasks of it by kind."""
+    outcomes = {("cell", cell.name): outcome} | {(kind, cell.name): other for kind, other in more.items()}
+    if metrics is not None:
+        outcomes["metrics", cell.name] = Outcome(result=metrics)
+    return rows_of(dataclasses.replace(plan_of(None), cells=(cell,)), (), outcomes)
+
+
+RAN = Outcome(result={"seconds": 1.0, "frames": 4, "peak": 70.0, "terms": "strain+inertia"}, files=("x",))
 
 
 def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
-    cell = Cell(SHEET, "newton-1", 0, ("garments", "speed"))
-    rows = rows_of(Outcome(cell, "ok", recorded=True), {"energy/strain": 1.0, "distance/rms": np.nan})
-    assert [row.suite for row in rows] == ["garments", "garments", "speed", "speed"]
-    assert {row.dtype for row in rows} == {"float64"}
-    skinned = rows_of(Outcome(Cell(SHEET, "skinning", 0, ("speed",)), "ok"), {"energy/strain": 1.0})
+    cell = Cell(SHEET, find_method("newton-1"), 0, ("garments", "speed"))
+    found = rows(cell, RAN, {"energy/strain": 1.0, "distance/rms": np.nan})
+    assert [row.suite for row in found] == ["garments"] * 4 + ["speed"] * 4
+    assert {row.dtype for row in found} == {"float64"} and {row.terms for row in found} == {"strain+inertia"}
+    by_metric = {row.metric: row for row in found}
+    assert by_metric["cost/frame"].value == 250.0 and by_metric["cost/peak"].unit == "MB"
+    strain, lost = by_metric["energy/strain"], by_metric["distance/rms"]
+    assert strain.value == 1.0 and strain.unit == "J" and strain.status == "ok"
+    assert lost.value is None and lost.status == "failed" and "finite" in lost.reason
+    skinned = rows(Cell(SHEET, find_method("skinning"), 0, ("speed",)), RAN, {"energy/strain": 1.0})
     assert skinned[0].dtype == "float32"
-    assert rows[0].value == 1.0 and rows[0].unit == "J" and rows[0].status == "ok"
-    assert rows[1].value is None and rows[1].status == "failed" and "finite" in rows[1].reason
-    skipped = rows_of(Outcome(cell, "skipped", "why"), {})
+    skipped = rows(cell, Outcome("skipped", "why"))
     assert [(row.status, row.reason, row.value) for row in skipped] == [("skipped", "why", None)] * 2
 
 
-def test_every_unit_is_known():
-    assert unit_of("energy/strain") == "J" and unit_of("penetration/depth_p99") == "mm"
-    assert set(UNITS.values()) == {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1", "deg", "frames"}
-    with pytest.raises(KeyError):
-        unit_of("nonsense/x")
+def test_rows_carry_what_scene_and_method_declare():
+    scene = dressed_scene("kick", part="clip")
+    (row, *_) = rows(Cell(scene, find_method("snug+lbfgs-4"), 1, ("speed",)), RAN, {"energy/strain": 1.0})
+    assert (row.garment, row.motion, row.part) == ("tshirt", "kick", "clip")
+    assert (row.role, row.family, row.level, row.base) == ("warm-started", "snug+lbfgs", 4.0, "snug")
+    assert row.seeded and row.pairing_group == "snug" and row.seed == 1
+    (row, *_) = rows(Cell(SHEET, find_method("vbd-20"), 0, ("speed",)), RAN, {"energy/strain": 1.0})
+    assert (row.garment, row.motion, row.part, row.base) == ("", "", "", "")
+    assert (row.role, row.family, row.level, row.seeded) == ("solver", "vbd", 20.0, False)
+
+
+def test_only_the_reference_is_judged_by_what_nobody_asks_of_a_network():
+    for method, statuses in (("simulation", ("ok", "failed")), ("skinning", ("ok", "ok"))):
+        cell = Cell(SHEET, find_method(method), 0, ("garments",))
+        for value, status in zip((1e-7, 1e-5), statuses):
+            found = rows(cell, RAN, {"conservation/momentum_worst": value})
+            row = next(row for row in found if row.metric.startswith("conservation"))
+            assert row.status == status and row.tolerance == (2e-6 if method == "simulation" else None)
 
 
 def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
@@ -104,9 +125,9 @@ def test_networks_skip_scenes_without_a_body_and_solvers_skip_nothing():
 
 def test_the_closing_table_shows_a_dash_for_what_is_not_there():
     rows = [
-        Row("garments", "dressed/a", "snug", 0, "energy/total", "J", 1.0),
-        Row("garments", "dressed/b", "snug", 0, "energy/total", "J", 3.0),
-        Row("garments", "dressed/a", "pbns", 0, "cost/frame", "ms", None, "failed", "why"),
+        Row("garments", "tshirt/a", "snug", 0, "energy/total", "J", 1.0),
+        Row("garments", "tshirt/b", "snug", 0, "energy/total", "J", 3.0),
+        Row("garments", "tshirt/a", "pbns", 0, "cost/frame", "ms", None, "failed", "why"),
         Row("validation", "c", "simulation", 0, "check", "1", 0.0),
     ]
     text = summary(rows, [{"name": "cells", "seconds": 3.2}])
@@ -118,25 +139,19 @@ def test_the_closing_table_shows_a_dash_for_what_is_not_there():
 
 def test_the_closing_table_keeps_garments_apart_and_marks_means_over_less():
     rows = [
-        Row("garments", scene, method, 0, "energy/total", "J", value)
+        Row("garments", scene, method, 0, "energy/total", "J", value, garment=scene.partition("/")[0])
         for scene, method, value in (
-            ("dressed/a", "snug", 1.0), ("dressed/b", "snug", 3.0), ("dressed/a", "pbns", 5.0),
+            ("tshirt/a", "snug", 1.0), ("tshirt/b", "snug", 3.0), ("tshirt/a", "pbns", 5.0),
             ("tunic/a", "snug", 9.0),
         )
     ]  # fmt: skip
-    rows.append(Row("garments", "dressed/b", "pbns", 0, "cost/frame", "ms", None, "diverged", "why"))
+    rows.append(
+        Row("garments", "tshirt/b", "pbns", 0, "cost/frame", "ms", None, "diverged", "why", garment="tshirt")
+    )
     lines = summary(rows, []).splitlines()
-    assert "garments, dressed, mean of 2 scenes" in lines[0] and lines[1].split() == ["snug", "2", "ok"]
+    assert "garments, tshirt, mean of 2 scenes" in lines[0] and lines[1].split() == ["snug", "2", "ok"]
     assert lines[2].split() == ["pbns", "5*", "ok,", "diverged"] and lines[3].startswith("* over fewer")
     assert "garments, tunic, mean of 1 scene " in lines[5] and lines[6].split() == ["snug", "9", "ok"]
-
-
-def test_a_check_that_is_off_or_raises_is_a_failed_row(monkeypatch):
-    check = KNOWN_ANSWERS[0]
-    off = dataclasses.replace(check, expected=1.0).run()
-    assert off.status == "failed" and off.value is not None and check.reason in off.reason
-    broken = dataclasses.replace(check, function="nothing").run()
-    assert broken.status == "failed" and broken.value is None and "nothing" in broken.reason
 
 
 def test_the_remarks_name_repeats_that_lie_apart_gaps_that_rise_and_what_is_out_of_date():
@@ -144,9 +159,9 @@ def test_the_remarks_name_repeats_that_lie_apart_gaps_that_rise_and_what_is_out_
     late = dataclasses.replace(base, method="lbfgs-5", value=31.0, status="stalled", reason="2 of 4 frames")
     tight = dataclasses.replace(base, status="stalled", reason="2 of 4 frames")
     gap = dataclasses.replace(base, method="vbd-20", metric="gap/relative", reason=f"{NOT_FALLING}: so")
-    said = remarks([tight, late, gap], 3, {"flag x snug": "preset"})
+    said = remarks([tight, late, gap], 3, {"cell flag x snug": "kept though scene changed"})
     assert [line for line in said if "flag x newton-1" in line] == [] and len(said) == 4
-    assert said[0].startswith("3 results") and said[1] == "flag x snug: kept though preset changed"
+    assert said[0].startswith("3 results") and said[1] == "cell flag x snug: kept though scene changed"
     assert said[2].endswith("flag x lbfgs-5 (31 %)") and said[3].endswith("flag x vbd-20")
     assert remarks([base], 0, {}) == []
 
@@ -154,21 +169,26 @@ def test_the_remarks_name_repeats_that_lie_apart_gaps_that_rise_and_what_is_out_
 def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch):
     facts = {"processor": "a processor", "cores": 2, "device": "cuda", "accelerator": "a GPU"}
     monkeypatch.setattr(provenance, "hardware", lambda device: facts)
-    record = Record(
-        Plan(preset=find_preset("smoke"), suites=(), cells=(), checks=(), cases=(), train=(), test=(),
-             seeds=(0,), device="cuda", folder=tmp_path, command="")
-    )  # fmt: skip
+    log = RunLog(plan_of(tmp_path, device="cuda"))
     metrics = ("cost/train", "cost/frame")
-    record.rows = [Row("garments", "dressed/kick", "snug", 0, metric, "s", 1.0) for metric in metrics]
-    record.write_rows()
-    found = {row.metric: row.hardware for row in record.folder.read_rows()}
+    log.write_rows([Row("garments", "tshirt/kick", "snug", 0, metric, "s", 1.0) for metric in metrics])
+    found = {row.metric: row.hardware for row in log.folder.read_rows()}
     assert found == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
 
 
-def test_what_a_network_has_cost_is_read_from_records_of_any_version():
-    record = {"seconds": 120.0, "megabytes": 9.0, "long_gone": 1}
-    assert model_costs("snug", record, 7.0) == {"cost/data": 0.0, "cost/train": 120.0, "cost/memory": 9.0}
-    whole = model_costs("supervised", record | {"setup_seconds": 20.0}, 7.0)
-    assert whole["cost/data"] == 7.0 and whole["cost/setup"] == 20.0
-    assert "cost/data" not in model_costs("supervised", record, None)
-    assert model_costs(None, record, 7.0) == model_costs("snug", None, 7.0) == {}
+@pytest.mark.parametrize(("method", "data"), [("snug", 0.0), ("supervised", 7.0)])
+def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_from(method, data):
+    cell = Cell(dressed_scene("kick"), find_method(method), 0, ("garments",))
+    motions = Motions(train=("walk", "run"), test=("kick",))
+    plan = dataclasses.replace(plan_of(None), cells=(cell,), motions=motions)
+    schedule = Schedule(plan)
+    trained = Outcome(result={"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0})
+    outcomes = {
+        ("cell", cell.name): RAN, ("metrics", cell.name): Outcome(result={"energy/strain": 1.0}),
+        schedule.network(plan.networks[0]).id: trained,
+        schedule.data("walk", "tshirt").id: Outcome(seconds=3.0),
+        schedule.data("run", "tshirt").id: Outcome(seconds=4.0),
+    }  # fmt: skip
+    costs = {row.metric: row.value for row in rows_of(plan, (), outcomes)}
+    assert costs["cost/data"] == data and costs["cost/train"] == 120.0
+    assert costs["cost/setup"] == 20.0 and costs["cost/memory"] == 9.0

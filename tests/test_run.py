@@ -50,8 +50,8 @@ def test_nothing_heavy_is_loaded_before_there_is_something_to_do(word, tmp_path)
         "import runpy, contextlib, io\n"
         "with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):\n"
         "    runpy.run_module('benchmarks.run', run_name='__main__')\n"
-        "print([m for m in ('torch', 'vtk', 'vtkmodules', 'pandas', 'numba', 'igl', 'matplotlib') "
-        "if m in sys.modules])"
+        "print([m for m in ('torch', 'vtk', 'vtkmodules', 'pyvista', 'pandas', 'numba', 'igl', 'scipy', "
+        "'skfem', 'matplotlib') if m in sys.modules])"
     )
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     answer = subprocess.run(

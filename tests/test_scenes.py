@@ -7,19 +7,22 @@ import json
 
 import numpy as np
 import pytest
-from benchmarks.agenda import Agenda
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
+from tasks_by_hand import dressed_scene
 
-from benchmarks import agenda
+from benchmarks import schedule
+from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.cache import dependencies
 from benchmarks.clips import clip, joint_speeds
 from benchmarks.methods import find_method
-from benchmarks.plan import choose_suites, network_of
+from benchmarks.plan import network_of
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.run import main
-from benchmarks.scenes import SMALL_SCENES, all_scenes, dressed_scene
+from benchmarks.scenes import SCENES, all_scenes
 from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
+from benchmarks.schedule import Schedule
+from benchmarks.selection import choose_suites
 from snug.body import Body
 from snug.motion_library import make_motion
 
@@ -27,9 +30,9 @@ SMOKE = find_preset("smoke")
 TINY = dataclasses.replace(SMOKE, garment_vertices=300, frames=8)
 
 
-@pytest.mark.parametrize("scene", SMALL_SCENES, ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
 def test_small_scenes_build_alike_twice_and_declare_their_terms(scene):
-    first, second = scene.build(SMOKE), scene.build(SMOKE)
+    first, second = scene.at(SMOKE).build(), scene.at(SMOKE).build()
     assert np.array_equal(first.start, second.start) and first.frames == SMOKE.sheet_frames
     assert first.terms[-1] == "inertia" and len(set(first.terms)) == len(first.terms)
     assert (first.obstacle is not None) == ("collision" in first.terms)
@@ -37,20 +40,20 @@ def test_small_scenes_build_alike_twice_and_declare_their_terms(scene):
 
 
 def test_the_terms_are_those_of_the_descriptions():
-    built = {scene.name: scene.build(SMOKE) for scene in SMALL_SCENES}
+    built = {scene.name: scene.at(SMOKE).build() for scene in SCENES}
     assert built["hanging_sheet"].terms == ("strain", "bending", "gravity", "inertia")
     assert built["sheet_on_sphere"].terms == ("strain", "bending", "gravity", "collision", "inertia")
     assert built["free_fall"].terms == ("gravity", "inertia")
     assert built["free_fall"].exact is not None
 
 
-def test_scene_names_are_unique_and_a_dressed_scene_needs_a_wardrobe():
+def test_scene_names_are_unique_and_a_dressed_scene_needs_assets():
     scenes = all_scenes(["walk", "run"], ["twist_stop"])
-    assert len(scenes) == len(SMALL_SCENES) + 2 * 3 + 2 * 2  # each motion whole and as a clip
-    assert scenes["dressed/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
-    assert scenes["dressed/walk"].dressed and not scenes["flag"].dressed
-    with pytest.raises(ValueError, match="needs a wardrobe"):
-        dressed_scene("walk").build(SMOKE)
+    assert len(scenes) == len(SCENES) + 2 * 3 + 2 * 2  # each motion whole and as a clip
+    assert scenes["tshirt/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
+    assert scenes["tshirt/walk"].dressed and not scenes["flag"].dressed
+    with pytest.raises(ValueError, match="needs assets"):
+        dressed_scene("walk").build()
 
 
 def test_the_sheet_is_a_square_without_slivers():
@@ -88,11 +91,11 @@ def test_presets_grow():
 def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
     out = tmp_path / "run"
     words = ["--preset", "smoke", "--scenes", "hanging_sheet", "--methods", "simulation,newton-1"]
-    monkeypatch.setattr("benchmarks.stages.Stages.make_report", lambda self: True)
+    monkeypatch.setattr("benchmarks.execution.RunLog.make_report", lambda self: True)
     assert main([*words, "-o", str(out)]) == 0
     for method in ("simulation", "newton-1"):
-        record = json.loads((out / "records" / "cell" / "hanging_sheet" / f"{method}.json").read_text())
-        loaded = set(record["result"]["modules"])  # by the process of the cell
+        record = json.loads((out / "cache" / "cell" / "hanging_sheet" / f"{method}.json").read_text())
+        loaded = set(record["outcome"]["result"]["modules"])  # by the process of the cell
         assert "reference_sim.energies.stretch_stvk" in loaded  # the list is not empty by mistake
         # Names of trainings stand in the list of methods.
         assert {name for name in loaded if name.startswith("snug")} <= {"snug", "snug.recipe"}
@@ -104,36 +107,38 @@ def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(t
 
 def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):
     """And each scene is built with its own: the tunic is not the T-shirt."""
-    wardrobe = open_wardrobe(TINY, embedded_motions(["twist_stop"]), ["tunic"])
-    assert list(wardrobe.garments) == ["tunic"]
-    built = dressed_scene("twist_stop", "tunic").build(TINY, wardrobe)
+    assets = open_assets(TINY, embedded_motions(["twist_stop"]), ["tunic"])
+    assert list(assets.garments) == ["tunic"]
+    built = dressed_scene("twist_stop", "tunic").build(assets)
     assert built.dressed.garment.name == "tunic" and built.dressed.garment.parameters["flare"] > 0
     assert len(built.cloth.rest_positions) == pytest.approx(300, abs=3)
     with pytest.raises(KeyError):
-        dressed_scene("twist_stop").build(TINY, wardrobe)
+        dressed_scene("twist_stop").build(assets)
 
 
 def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes():
-    plan = planned("--scenes", "tunic/*,dressed/kick", "--methods", "simulation,snug,snug-dynamic")
-    by_garment = {garment: plan.train_of(garment) for garment in plan.garments}
+    plan = planned("--scenes", "tunic/*,tshirt/kick", "--methods", "simulation,snug,snug-dynamic")
+    by_garment = {garment: plan.motions.train_of(garment) for garment in plan.garments}
     assert set(by_garment) == {"tshirt", "tunic"} and "twist_1" in by_garment["tunic"]
-    assert not set(by_garment["tunic"]) & {*plan.test_of("tunic"), *by_garment["tshirt"]}
+    assert not set(by_garment["tunic"]) & {*plan.motions.test_of("tunic"), *by_garment["tshirt"]}
     assert {(n.name, n.garment) for n in plan.networks} == {
         (name, garment) for name in ("snug", "snug-dynamic") for garment in by_garment
     }
     assert set(plan.simulated) == {"tshirt", "tunic"}  # snug-dynamic learns from simulations
-    assert set(plan.models) == {("snug", 0), ("snug-dynamic", 0)}
-    keys = {Agenda(plan).network(network).key for network in plan.networks}
+    keys = {key_of(Schedule(plan).network(network)) for network in plan.networks}
     assert len(keys) == 4
 
 
 def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not(monkeypatch):
-    plan = planned("--scenes", "dressed/kick,hanging_sheet", "--methods", "simulation")
-    parts = (Agenda(plan).cell, Agenda(plan).metrics)
-    before = {(part.__name__, cell): part(cell).key for part in parts for cell in plan.cells}
-    monkeypatch.setattr(agenda, "DEFAULT", dataclasses.replace(agenda.DEFAULT, smoothing=7))
-    changed = {(n, c.scene.name) for (n, c), key in before.items() if getattr(Agenda(plan), n)(c).key != key}
-    assert changed == {("metrics", "dressed/kick")}
+    plan = planned("--scenes", "tshirt/kick,hanging_sheet", "--methods", "simulation")
+
+    def keys():
+        tasks = [t for cell in plan.cells for t in (Schedule(plan).cell(cell), Schedule(plan).metrics(cell))]
+        return {(task.kind, task.cell.scene.name): key_of(task) for task in tasks}
+
+    before = keys()
+    monkeypatch.setattr(schedule, "DEFAULT", dataclasses.replace(schedule.DEFAULT, smoothing=7))
+    assert {name for name, key in keys().items() if key != before[name]} == {("metrics", "tshirt/kick")}
 
 
 def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_networks():
@@ -146,15 +151,17 @@ def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_ne
 
 def test_suite_speed_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
     plan = planned("--suite", "speed")
-    cells = [cell for cell in plan.cells if cell.scene.name == "dressed/turning_stop@clip"]
+    cells = [cell for cell in plan.cells if cell.scene.name == "tshirt/turning_stop@clip"]
     assert {"simulation", "snug", "lbfgs-5"} <= {cell.method for cell in cells}
-    assert "turning_stop" in plan.test_of("tshirt") and "turning_stop" not in plan.train_of("tshirt")
+    assert "turning_stop" in plan.motions_of("tshirt") and "turning_stop" not in plan.motions.train_of(
+        "tshirt"
+    )
     body = Body.load()
     walk = clip(body, make_motion("turning_stop"), plan.preset.clip_frames)
     assert joint_speeds(body, walk).min() > 0.5  # [m/s] it is over before the stop
     pace = np.linalg.norm(np.ptp(walk.translations[:, [0, 2]], axis=0)) / walk.duration
     assert 0.6 < pace < 1.6
-    for name in plan.train_of("tshirt"):  # its strides are those of `walk`, its heading is nobody's
+    for name in plan.motions.train_of("tshirt"):  # its strides are those of `walk`, its heading is nobody's
         nearest = np.abs(walk.poses[:, None] - make_motion(name).poses).max(axis=(2, 3)).min(axis=1)
         assert nearest.mean() > np.radians(10), name
 
@@ -169,14 +176,20 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     plain, own = (planned("--suite", "garments", *more) for more in ((), ("--body", str(path))))
     cell = next(cell for cell in own.cells if cell.method == "snug")
     keys = [
-        (Agenda(plan).network(network_of(cell)).key, Agenda(plan).cell(cell).key) for plan in (plain, own)
+        (key_of(Schedule(plan).network(network_of(cell))), key_of(Schedule(plan).cell(cell)))
+        for plan in (plain, own)
     ]
     assert not set(keys[0]) & set(keys[1])
-    low, high = (open_wardrobe(TINY, [make_motion("walk")], body=file) for file in (None, path))
-    heights = [np.ptp(wardrobe.garment.rest_positions[:, 1]) for wardrobe in (low, high)]
+    low, high = (open_assets(TINY, [make_motion("walk")], ["tshirt"], body=file) for file in (None, path))
+    heights = [np.ptp(assets.garments["tshirt"].rest_positions[:, 1]) for assets in (low, high)]
     assert 1.05 < heights[1] / heights[0] < 1.15
-    scene = dressed_scene("walk").build(TINY, high)
+    scene = dressed_scene("walk").build(high)
     assert scene.dressed is not None and scene.dressed.body is high.body
+
+
+def key_of(task) -> str:
+    """Equal where nothing that the task depends on has changed."""
+    return json.dumps(dependencies(task), sort_keys=True)
 
 
 def planned(*words):

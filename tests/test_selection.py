@@ -1,4 +1,4 @@
-"""What a request becomes: cells, checks and cases, and motions divided into training and test."""
+"""What a request becomes: cells and cases, and motions divided into training and test."""
 
 from __future__ import annotations
 
@@ -7,37 +7,35 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import plan
-from benchmarks.plan import Motions, PlanError, choose_cells, choose_motions
+from benchmarks import selection
+from benchmarks.plan import Motions, PlanError
 from benchmarks.presets import find_preset
-from benchmarks.validation import stress_tests
+from benchmarks.selection import Request, choose, choose_motions
+from benchmarks.validation.stress_tests import MAPS
 
 SMOKE = find_preset("smoke")
 
 
-def cells(suites, *, full=False, scenes=(), methods=(), seeds=(0,), test=("kick", "punch")):
-    return choose_cells(
-        suites,
-        full=full,
-        preset=find_preset("quick"),
-        motions=Motions(("walk",), test, {}),
-        scenes=scenes,
-        methods=methods,
-        seeds=seeds,
-    )
+def chosen(suites, *, full=False, scenes=(), methods=(), seeds=(0,), test=("kick", "punch")):
+    return choose(
+        Request(
+            suites=tuple(suites), full=full, preset=find_preset("quick"), scenes=tuple(scenes),
+            motions=Motions(("walk",), test, {}), methods=tuple(methods), seeds=seeds,
+        )
+    )  # fmt: skip
 
 
 def test_a_cell_in_two_suites_is_run_once():
-    found, _, _ = cells(("garments", "speed"))
+    found, _ = chosen(("garments", "speed"))
     keys = [(cell.scene.name, cell.method, cell.seed) for cell in found]
     assert len(set(keys)) == len(keys)
     # Whole motions and their clips are scenes of their own: a suite that times every solver takes the clips.
-    assert {cell.suites for cell in found if cell.scene.name.endswith("@clip")} == {("speed",)}
-    assert {cell.suites for cell in found if cell.scene.name == "dressed/kick"} == {("garments",)}
+    assert {cell.suites for cell in found if cell.scene.part == "clip"} == {("speed",)}
+    assert {cell.suites for cell in found if cell.scene.name == "tshirt/kick"} == {("garments",)}
 
 
 def test_the_reference_comes_first_in_every_scene():
-    found, _, _ = cells(("garments", "speed"), full=True)
+    found, _ = chosen(("garments", "speed"), full=True)
     first = {}
     for cell in found:
         first.setdefault(cell.scene.name, cell.method)
@@ -45,58 +43,59 @@ def test_the_reference_comes_first_in_every_scene():
 
 
 def test_only_what_has_a_seed_is_repeated_and_the_rest_is_the_same_whatever_the_seeds():
-    found, _, _ = cells(("garments",), seeds=(3, 5))
+    found, _ = chosen(("garments",), seeds=(3, 5))
     seeds = {}
     for cell in found:
         seeds.setdefault(cell.method, set()).add(cell.seed)
     assert seeds["snug"] == seeds["untrained"] == {3, 5} and seeds["simulation"] == seeds["skinning"] == {0}
 
 
-def test_patterns_choose_scenes_methods_checks_and_cases():
-    found, checks, cases = cells(("speed", "validation", "extremes"), scenes=["*sheet*", "free_fall"])
+def test_patterns_choose_scenes_methods_and_cases():
+    found, cases = chosen(("speed", "validation", "extremes"), scenes=["*sheet*", "free_fall"])
     assert {cell.scene.name for cell in found} == {"hanging_sheet", "sheet_on_sphere", "free_fall"}
-    assert [check.name for check in checks] == ["free_fall"]
-    assert cases == stress_tests.MAPS["map_sheet"]
-    _, checks, cases = cells(("validation", "extremes"), methods=["sim*"])
-    assert len(checks) >= 10 and len(cases) >= 8
+    assert [case.name for case in cases if case.suite == "validation"] == ["free_fall"]
+    assert tuple(case for case in cases if case.suite == "extremes") == MAPS["map_sheet"]
+    _, cases = chosen(("validation", "extremes"), methods=["sim*"])
+    assert sum(case.suite == "validation" for case in cases) >= 10
+    assert sum(case.suite == "extremes" for case in cases) >= 8
 
 
-def swinging(suites, **chosen):
+def dynamic(suites, **changes):
     motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
-    options = {"full": False, "preset": find_preset("quick"), "seeds": (0,), "scenes": (), "methods": ()}
-    return choose_cells(suites, motions=motions, **(options | chosen))[0]
+    words = {name: tuple(value) for name, value in changes.items()}
+    return choose(Request(suites=tuple(suites), preset=find_preset("quick"), motions=motions, **words))[0]
 
 
 def test_what_no_suite_lists_is_met_by_its_whole_name():
     both = ("garments", "speed")
-    plain = {(cell.scene.name, cell.suites) for cell in swinging(both, scenes=["tunic/*"])}
+    plain = {(cell.scene.name, cell.suites) for cell in dynamic(both, scenes=["tunic/*"])}
     assert plain == {("tunic/twist_stop", ("garments",))}
-    clip, whole = "tunic/twist_stop@clip", "dressed/twist_stop"
-    met = {(cell.scene.name, cell.suites) for cell in swinging(both, scenes=[clip, whole])}
+    clip, whole = "tunic/twist_stop@clip", "tshirt/twist_stop"
+    met = {(cell.scene.name, cell.suites) for cell in dynamic(both, scenes=[clip, whole])}
     assert met == {(clip, ("speed",)), (whole, ("garments",))}
-    assert not {clip, whole} & {cell.scene.name for cell in swinging(both)}
+    assert not {clip, whole} & {cell.scene.name for cell in dynamic(both)}
 
 
 def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
-    from benchmarks import meetings, methods, scenes
+    from benchmarks import methods, scenes
     from benchmarks.method import MethodEntry
     from benchmarks.scene import Scene
 
     mine = Scene(name="my_scene", description="", module="my_scene")
-    monkeypatch.setattr(scenes, "SMALL_SCENES", (*scenes.SMALL_SCENES, mine))
+    monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, mine))
     entries = (*methods.METHODS, MethodEntry(name="my-method", description="", module="my_method"))
-    for module in (methods, meetings, plan):
+    for module in (methods, selection):
         monkeypatch.setattr(module, "METHODS", entries)
-    found = swinging(("garments", "speed"), scenes=["my_scene"], methods=["simulation", "my-method"])
+    found = dynamic(("garments", "speed"), scenes=["my_scene"], methods=["simulation", "my-method"])
     assert [(c.scene, c.method, c.suites) for c in found] == [
         (mine, "simulation", ("speed",)),
         (mine, "my-method", ("speed",)),
     ]
-    worn = swinging(("garments", "speed"), scenes=["dressed/kick"], methods=["my-method"])
-    assert [(c.scene.name, c.suites) for c in worn] == [("dressed/kick", ("garments",))]
+    worn = dynamic(("garments", "speed"), scenes=["tshirt/kick"], methods=["my-method"])
+    assert [(c.scene.name, c.suites) for c in worn] == [("tshirt/kick", ("garments",))]
     for choice in ({}, {"scenes": ["*"]}, {"methods": ["*"]}):
         assert not {"my_scene", "my-method"} & {
-            name for c in swinging(("speed",), **choice) for name in (c.scene.name, c.method)
+            name for c in dynamic(("speed",), **choice) for name in (c.scene.name, c.method)
         }
 
 
