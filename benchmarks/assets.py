@@ -44,10 +44,10 @@ class Assets:
         own = {name: self.motions[name] for name in names}
         return replace(self, motions=own, clips={name: self.clips[name] for name in names}, bodies={})
 
-    def posed_body(self, motion: Motion) -> np.ndarray:
-        """The body (T,B,3) [m] in that motion."""
+    def posed_body(self, motion: Motion, betas: np.ndarray | None = None) -> np.ndarray:
+        """The body (T,B,3) [m] of that shape, or of the mean one, in that motion."""
         ready = self.bodies.get(motion.name)
-        return self.body.vertices(motion.poses, motion.translations) if ready is None else ready
+        return self.body.vertices(motion.poses, motion.translations, betas) if ready is None else ready
 
 
 def open_assets(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from .performance.microbenchmark import SUITE
 from .results import Row
 from .rows import NOT_FALLING, SPREAD
 
@@ -31,7 +32,7 @@ def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
         of_suite = [row for row in rows if row.suite == suite]
         for title, kept in _groups(suite, of_suite):
             parts.append(_table(title, kept))
-    for suite in ("validation", "extremes"):
+    for suite in ("validation", "extremes", SUITE):
         kept = [row for row in rows if row.suite == suite]
         if kept:
             counts = {s: sum(row.status == s for row in kept) for s in dict.fromkeys(r.status for r in kept)}

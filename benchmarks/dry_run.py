@@ -41,7 +41,9 @@ def _head(plan: Plan) -> list[str]:
     for garment in dict.fromkeys(network.garment for network in plan.networks):
         how = "simulated for networks that learn from it" if garment in plan.simulated else "not simulated"
         lines.append(f"training motions {', '.join(plan.motions.train_of(garment))} ({how})")
-    return [*lines, f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"]
+    counts = f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"
+    more = f", {len(plan.microbenchmarks)} microbenchmarks" * bool(plan.microbenchmarks)
+    return [*lines, counts + more]
 
 
 def _verdict(found: Found, skip: str) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import multiprocessing
+import os
 import queue
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -157,6 +158,8 @@ _context: Context
 def _begin(context: Context, progress: Any = None) -> None:
     global _context
     tell: Callable[[int], None] = tell_nobody if progress is None else progress.put
+    if progress is not None:
+        os.environ["TQDM_DISABLE"] = "1"  # one bar for all that are side by side is enough
     _context = dataclasses.replace(context, tell=tell, memo={})
 
 

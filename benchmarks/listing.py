@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 from .method import MethodEntry
 from .methods import METHODS
+from .performance.microbenchmark import SUITE
+from .performance.registry import MICROBENCHMARKS
 from .presets import PRESETS, find_preset
 from .scenes import GARMENT_SCENES, SCENES
 from .selection import default_suites
@@ -36,6 +38,7 @@ def listing() -> str:
         ("training motions of garments with dynamics", ((name, "") for name in DYNAMIC_TRAIN)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
         *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
+        (f"microbenchmarks of suite {SUITE}", {b.name: b.description for b in MICROBENCHMARKS}.items()),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
 

@@ -79,6 +79,12 @@ class MethodEntry:
     base: str = ""
     pairing_group: str = ""
 
+    def meant_for(self, scene: Scene) -> bool:
+        """Whether the two may meet at all: some scenes are for networks alone, and some for none."""
+        if scene.networks_only:
+            return self.batched
+        return not (scene.own_garment and self.trained)
+
     def skip(self, scene: Scene) -> str | None:
         """Why this method cannot do that scene, or None."""
         if self.needs_body and not scene.dressed:

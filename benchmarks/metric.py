@@ -8,6 +8,10 @@ and where it wants curves in the trajectory file
 
     series(roll_out: RollOut) -> dict[str, np.ndarray]  name -> (T,)
 
+and where a roll-out that ended well by itself may still have failed
+
+    judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None     status and reason
+
 Its name in the tuple of benchmarks/metrics/__init__.py is all that it takes to have it measured, written,
 tabulated and defined in the report.
 """
@@ -15,7 +19,7 @@ tabulated and defined in the report.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -154,7 +158,10 @@ def skinned(group: SceneRollOuts) -> np.ndarray | None:
     from snug.dressed_body import DressedBody
     from snug.recipe import DEFAULT
 
-    dressed = group.scene.dressed
+    dressed, kept = group.scene.dressed, group.scene.kept
+    motion = dressed.motion
+    if kept is not None:
+        motion = replace(motion, poses=motion.poses[kept], translations=motion.translations[kept])
     return DressedBody(dressed.body, dressed.garment).skinned(
-        dressed.motion, dressed.betas, smoothing=DEFAULT.smoothing
+        motion, dressed.betas, smoothing=DEFAULT.smoothing
     )

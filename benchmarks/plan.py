@@ -16,6 +16,7 @@ from .tasks.cell import Cell
 if TYPE_CHECKING:
     from snug.motion import Motion
 
+    from .performance.microbenchmark import Microbenchmark
     from .validation.case import Case
 
 
@@ -78,6 +79,7 @@ class Plan:
     suites: tuple[str, ...]
     cells: tuple[Cell, ...]
     cases: tuple[Case, ...]
+    microbenchmarks: tuple[Microbenchmark, ...] = ()
     motions: Motions = Motions()
     body: OwnBody | None = None
     seeds: tuple[int, ...]

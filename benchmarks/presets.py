@@ -5,11 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
+@dataclass(frozen=True)
+class Dependence:
+    """Of the scenes that vary mesh and time step: meshes [vertices asked for], the one at which time steps
+    vary, time steps a frame, frames, and frames of settling.
+    """
+
+    meshes: tuple[int, ...]
+    middle: int
+    substeps: tuple[int, ...]
+    frames: int
+    settle_frames: int
+
+
 @dataclass(frozen=True, kw_only=True)
 class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
-    frames: at most so many frames of each motion, at 30 per second; clip_frames: of its liveliest part.
+    frames: at most so many frames of each motion, at 30 per second; clip_frames: of its liveliest part;
+    loop_frames: of the walk in a loop.
     steps: optimiser steps per kind of network, or per training. further: whether the
     ablations and further baselines of a suite take part without being named. settle_frames: frames from the
     T-pose into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along
@@ -25,6 +39,7 @@ class Preset:
     test_motions: int | None
     frames: int
     clip_frames: int
+    loop_frames: int
     settle_frames: int
     steps: dict[str, int]
     sheet_cells: int
@@ -34,6 +49,7 @@ class Preset:
     repeats: int
     repeat_seconds: float
     cell_seconds: float
+    dependence: Dependence
     further: bool = False
 
     def steps_of(self, training: str, kind: str) -> int:
@@ -50,6 +66,7 @@ PRESETS = (
         test_motions=1,
         frames=20,
         clip_frames=10,
+        loop_frames=390,
         settle_frames=12,
         steps={
             "snug": 60,
@@ -66,6 +83,7 @@ PRESETS = (
         repeats=2,
         repeat_seconds=0.5,
         cell_seconds=120.0,
+        dependence=Dependence((200, 300), 200, (1, 2), 5, 6),
     ),
     Preset(
         name="quick",
@@ -75,6 +93,7 @@ PRESETS = (
         test_motions=None,
         frames=150,
         clip_frames=36,
+        loop_frames=10_000,
         settle_frames=30,
         steps={
             "snug": 5300,
@@ -91,6 +110,7 @@ PRESETS = (
         repeats=3,
         repeat_seconds=1.5,
         cell_seconds=600.0,
+        dependence=Dependence((500, 1000, 2000), 1000, (1, 2, 4), 30, 20),
     ),
     Preset(
         name="paper",
@@ -100,6 +120,7 @@ PRESETS = (
         test_motions=None,
         frames=100_000,
         clip_frames=100_000,
+        loop_frames=10_000,
         settle_frames=60,
         steps=dict.fromkeys(
             ("snug", "dynamic", "supervised", "pbns", "santesteban2019", "tailornet"), 60_000
@@ -112,6 +133,7 @@ PRESETS = (
         repeats=3,
         repeat_seconds=120.0,
         cell_seconds=86_400.0,
+        dependence=Dependence((500, 1000, 2000, 4400), 1000, (1, 2, 4, 8), 90, 30),
     ),
 )
 

@@ -10,14 +10,13 @@ from typing import Any
 
 from snug.recipe import learns_from_simulation
 
+from .methods import find_method
 from .metrics import declared, find_metric
 from .plan import Plan, network_of
 from .results import Row
 from .schedule import Schedule
-from .tasks.case import RunCase
 from .tasks.cell import UNBELIEVABLE, Cell
 from .tasks.task import Outcome, Task, TaskId
-from .validation.case import timed_out
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
@@ -32,8 +31,8 @@ def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
     """The rows of everything that has an outcome; cells first, with remarks where an error does not fall."""
     schedule = Schedule(plan)
     cells = [row for cell in plan.cells for row in rows_of_cell(cell, schedule, outcomes)]
-    cases = [row for task in tasks if isinstance(task, RunCase) for row in _rows_of_case(task, outcomes)]
-    return [*remarked(cells), *cases]
+    others = [row for task in tasks for row in _rows_of_task(task, outcomes)]
+    return [*remarked(cells), *others]
 
 
 def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator[Row]:
@@ -53,9 +52,13 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
         elif measured.failed:
             status, reason = "failed", f"metrics: {measured.reason}"
         else:
-            costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
-            metrics = {**measured.result, **costs, **model_costs(cell, schedule, outcomes)}
-            reason = reason or remark
+            if status == "ok":
+                status, reason = measured.status, measured.reason or reason
+            metrics = dict(measured.result)
+            if cell.scene.timed:
+                costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
+                metrics |= {**costs, **model_costs(cell, schedule, outcomes)}
+                reason = reason or remark
     batch = outcomes.get(("batch", cell.name), Outcome())
     if batch.reason.startswith(UNBELIEVABLE):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
@@ -134,15 +137,14 @@ def model_costs(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str,
     return {"cost/data": sum(outcome.seconds for outcome in data)} | costs
 
 
-def _rows_of_case(task: RunCase, outcomes: Outcomes) -> Iterator[Row]:
-    """A case that died, or that hung, has a row too; one that --only leaves out has none."""
+def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
+    """The rows that a task gives by itself; one that --only leaves out has none."""
     outcome = outcomes.get(task.id)
     if outcome is None or outcome.status == "skipped":
         return
-    died = not outcome.result
-    row = timed_out(task.case, outcome.reason) if died else Row(**outcome.result)
-    reason = "; ".join(filter(None, (row.reason, outcome.remark)))
-    yield dataclasses.replace(row, commit=outcome.commit, reason=reason)
+    for row in task.rows(outcome):
+        reason = "; ".join(filter(None, (row.reason, outcome.remark)))
+        yield dataclasses.replace(row, commit=outcome.commit, reason=reason)
 
 
 def remarked(rows: Iterable[Row]) -> list[Row]:
@@ -203,6 +205,7 @@ def _fineness(row: Row) -> float:
 def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
     methods = {cell.method: cell.entry for cell in plan.cells}
+    methods |= {benchmark.method: find_method(benchmark.method) for benchmark in plan.microbenchmarks}
     measured = dict.fromkeys(row.metric for row in rows if row.method in methods and _is_declared(row.metric))
     order = {name: place for place, name in enumerate(declared())}
     ordered = sorted(measured, key=lambda name: order.get(name, len(order)))

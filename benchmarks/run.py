@@ -15,6 +15,7 @@ from datetime import datetime
 from pathlib import Path
 
 from .cache import DEFAULT_ONLY, STATES
+from .performance.microbenchmark import SUITE
 from .plan import Motions, OwnBody, Plan, PlanError
 from .presets import PRESETS, find_preset
 from .provenance import usable_cores
@@ -31,15 +32,18 @@ EXAMPLES = """examples:
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
   python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2
   python -m benchmarks.run --motions clips/ --test-motions 01_01
+  python -m benchmarks.run --suite garments --methods 'simulation,skinning,snug,snug-without-*' \\
+      --test-motions brisk_walk,torso_twist,lunge               what each choice of the recipe does
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
   python -m benchmarks.run --body mine.npz --suite garments
 
 motions: without --motions the embedded library, which has its own test set. With --motions the files
   replace the library; "library" among the paths keeps it. --test-motions names those to test on, all
-  others train. Without it the library's test set tests; of files alone the first by name tests and
-  the others train; a single file tests and the library trains. Files are brought to 30 frames per
-  second, placed on the floor, arms spread clear of the torso, and cut to the preset's length.
+  others train, but for the library's own test motions, which never do. Without it the library's test
+  set tests; of files alone the first by name tests and the others train; a single file tests and the
+  library trains. Files are brought to 30 frames per second, placed on the floor, arms spread clear of
+  the torso, and cut to the preset's length.
 
 a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
   as it is, the rest is done. A run that was killed is so taken up again. --only failed does again what
@@ -73,8 +77,8 @@ def make_parser() -> argparse.ArgumentParser:
     names = ", ".join(preset.name for preset in PRESETS)
     add("--preset", default="quick", metavar="NAME", help=f"how much of everything: {names} (default quick)")
     add("--suite", action="append", default=[], metavar="NAME",
-        help="garments, speed, validation, extremes or all, in full; repeat or separate by commas "
-        "(default: the quick subset of each)")  # fmt: skip
+        help="garments, speed, validation, extremes, performance or all, in full; repeat or separate by "
+        "commas (default: the quick subset of each but performance)")  # fmt: skip
     add("--scenes", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
     add("--methods", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
     add("--motions", action="append", default=[], metavar="PATH",
@@ -95,7 +99,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--fresh", action="store_true", help="reuse nothing from the folder")
     add("--workers", type=int, metavar="N",
         help="processes side by side for ground truth, training, metrics and cases (default 2, or the "
-        "cores there are); cells always run alone")  # fmt: skip
+        "cores there are); cells that are timed run alone")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
     add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
     return parser
@@ -155,13 +159,15 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=scenes,
         methods=methods, seeds=seeds,
     )  # fmt: skip
-    cells, cases = choose(request)
+    cells, cases, microbenchmarks = choose(request)
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
+    asked |= {SUITE} if microbenchmarks else set()
     return Plan(
         preset=preset,
         suites=tuple(suite for suite in suites if suite in asked),
         cells=cells,
         cases=cases,
+        microbenchmarks=microbenchmarks,
         motions=motions,
         body=choose_body(options.body),
         seeds=seeds,

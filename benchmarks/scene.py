@@ -30,6 +30,9 @@ class Scene:
     name, and part, whether it is "whole" or a "clip". obstacle: whether there is another thing to touch.
     metrics: names of the modules of benchmarks.metrics that are measured here; None for all that apply.
     counterpart: another scene that metrics compare each method's roll-out with, by the same method.
+    start_of: another scene whose settled start is that of this one too. networks_only: whether nobody
+    simulates it, so that it has neither start nor posed body. own_garment: whether it tailors a garment that
+    no network of the run was trained for.
     """
 
     name: str
@@ -43,6 +46,24 @@ class Scene:
     obstacle: bool = False
     metrics: tuple[str, ...] | None = None
     counterpart: str = ""
+    start_of: str = ""
+    networks_only: bool = False
+    own_garment: bool = False
+
+    @property
+    def timed(self) -> bool:
+        """Whether costs are measured; the cells of other scenes run side by side."""
+        return self.metrics is None or "cost" in self.metrics
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether answers to poses held still are measured against."""
+        return self.dressed and (self.metrics is None or "dynamics" in self.metrics)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a garment is to be settled on a posed body first."""
+        return self.dressed and not self.networks_only
 
     @property
     def dressed(self) -> bool:
@@ -79,6 +100,9 @@ class BuiltScene:
     trajectory, the start included. settle: gives the start (V,3) [m] from which to simulate; it may itself
     simulate, so it is called once, off the clock. origin_heights: (T,) [m] where the gravity energy of each
     frame is zero. exact: (T,V,3) [m] or None. pin_positions: frame -> (P,3) [m] of handles that move.
+    substeps: time steps that a simulator takes for a frame. glitch: the frame whose pose is wrong on purpose.
+    kept: frames of the motion that a trajectory holds, or None for all. repeated: two sets of frames of the
+    trajectory that show the same motion.
     """
 
     name: str
@@ -93,6 +117,10 @@ class BuiltScene:
     dressed: Dressed | None = None
     start_velocity: np.ndarray | None = None
     pin_positions: Callable[[int], np.ndarray] | None = None
+    substeps: int = 1
+    glitch: int | None = None
+    kept: np.ndarray | None = None
+    repeated: tuple[np.ndarray, np.ndarray] | None = None
 
     @cached_property
     def start(self) -> np.ndarray:

@@ -14,17 +14,20 @@ from typing import Any
 from snug.recipe import DEFAULT, TRAININGS
 
 from . import provenance
-from .metrics import MODULES
+from .metrics import names_of
+from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
 from .scene import Scene
-from .scenes import of_garment
+from .scenes import GARMENT_SCENES, find_scene, of_garment
 from .source import code_of, digest
 from .tasks.case import RunCase
-from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, flat
+from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
 from .tasks.ground_truth import SettleStart, SimulateMotion, SimulateQuasiStatic
 from .tasks.metrics import MeasureCell
+from .tasks.microbenchmark import RunMicrobenchmark
 from .tasks.task import Task, TaskId
 from .tasks.training import TrainNetwork
+from .tasks.training_windows import SUITE, CompareWindows
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 TASKS, ASSETS = "benchmarks.tasks", "benchmarks.assets"
@@ -43,24 +46,31 @@ class Schedule:
 
     def tasks(self) -> Iterator[Task]:
         plan = self.plan
-        dressed = [scene for scene in plan.scenes if scene.dressed]
-        yield from (self.start(scene) for scene in dressed)
+        settled = {scene.name: scene for scene in plan.scenes if scene.simulated}
+        others = (self._settled_in(scene) for scene in settled.values() if scene.start_of)
+        yield from map(self.start, ({scene.name: scene for scene in others} | settled).values())
         yield from (self.data(m, garment) for garment in plan.simulated for m in self._train(garment))
         yield from map(self.network, plan.networks)
-        for _, cells in groupby(plan.cells, key=lambda cell: cell.scene.name):
-            own = list(cells)
+        for scene, cells in groupby(plan.cells, key=lambda cell: cell.scene):
+            own = list(cells) if scene.timed else []
             for first in range(0, len(own), AT_ONCE):
                 yield from self.cells(own[first : first + AT_ONCE])
-        yield from (self.quasi_static(scene) for scene in dressed if self._has_reference(scene))
+        yield from (self.cell(cell) for cell in plan.cells if not cell.scene.timed)
+        yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and self._has_reference(s))
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
+        for network in dict.fromkeys(network_of(c) for c in plan.cells if SUITE in c.suites):
+            if network and network.garment == GARMENT_SCENES[0].garment and network.name in TRAININGS:
+                yield self.windows(network)
         yield from map(self.case, plan.cases)
+        yield from map(self.microbenchmark, plan.microbenchmarks)
 
     # --- ground truth and training -------------------------------------------------------------------------
 
     def start(self, scene: Scene) -> SettleStart:
+        needs = (self.start(self._settled_in(scene)).id,) if scene.start_of else ()
         return SettleStart(
             name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.settle_frames,
-            **self._of_scene(scene, f"{TASKS}.ground_truth"),
+            needs=needs, **self._of_scene(scene, f"{TASKS}.ground_truth"),
         )  # fmt: skip
 
     def data(self, motion: str, garment: str) -> SimulateMotion:
@@ -122,12 +132,13 @@ class Schedule:
             inputs["package"] = provenance.package_version(cell.entry.package)
         if cell.entry.needs_body:
             inputs["recipe"] = dataclasses.asdict(DEFAULT)
-        needs = (self.start(cell.scene).id,) if cell.scene.dressed else ()
+        needs = (self.start(cell.scene).id,) if cell.scene.simulated else ()
         if network := network_of(cell):
             needs = (*needs, self.network(network).id)
-        return RunCell(
-            name=cell.name, label=cell.label, cell=cell, needs=needs, process=cell.name,
-            deadline=self.preset.cell_seconds, **of_scene | {"inputs": inputs},
+        kind, process = (RunCell, cell.name) if cell.scene.timed else (RunUntimedCell, "")
+        return kind(
+            name=cell.name, label=cell.label, cell=cell, needs=needs, process=process,
+            batch="" if process else cell.scene.name, deadline=self.preset.cell_seconds, **of_scene | {"inputs": inputs},
         )  # fmt: skip
 
     def _after(self, kind: Any, cell: Cell, name: str, **fields: Any) -> Task:
@@ -154,7 +165,7 @@ class Schedule:
         )
         reads = tuple(("cell", other.name) for _, other in compared if other != cell)
         quasi_static, counterpart = None, None
-        if scene.dressed:
+        if scene.dynamic:
             quasi_static = self.quasi_static(scene).id
             reads = (*reads, quasi_static)
         if scene.counterpart:
@@ -162,10 +173,8 @@ class Schedule:
                     (scene.counterpart, cell.entry, cell.seed))  # fmt: skip
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, ("cell", counterpart.name))
-        names = (name for name in MODULES if scene.metrics is None or name in scene.metrics)
-        of_scene = self._of_scene(
-            scene, f"{TASKS}.metrics", *(f"benchmarks.metrics.{name}" for name in names)
-        )
+        modules = (f"benchmarks.metrics.{name}" for name in names_of(scene.metrics))
+        of_scene = self._of_scene(scene, f"{TASKS}.metrics", *modules)
         inputs = {
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,
@@ -180,11 +189,33 @@ class Schedule:
             **of_scene | {"inputs": of_scene["inputs"] | inputs},
         )  # fmt: skip
 
+    def windows(self, network: Network) -> CompareWindows:
+        training = self.network(network)
+        return CompareWindows(
+            name=training.name, label=training.label, training=training, inputs=training.inputs,
+            modules=(f"{TASKS}.training_windows", *training.modules), needs=(training.id,),
+        )  # fmt: skip
+
     def case(self, case: Any) -> RunCase:
         return RunCase(
             name=case.name, label=case.name, case=case, deadline=case.seconds,
             inputs=self._inputs() | {"declared": _declared(case)},
             modules=(case.module, "benchmarks.validation.case", f"{TASKS}.case"),
+        )  # fmt: skip
+
+    def microbenchmark(self, benchmark: Microbenchmark) -> RunMicrobenchmark:
+        name, method = flat(benchmark.label.replace(" ", "-")), benchmark.method
+        inputs = self._inputs() | {"declared": _declared(benchmark)}
+        modules = (benchmark.module, "benchmarks.performance.microbenchmark", f"{TASKS}.microbenchmark")
+        settings = Settings(method=method, repeats=benchmark.repeats)
+        if benchmark.trains:
+            device, steps = self.plan.device, self.preset.steps_of(method, method)
+            inputs |= {"device": device, "steps": steps}
+            key = digest([inputs, code_of(*modules)])
+            settings = dataclasses.replace(settings, device=device, steps=steps, key=key)
+        return RunMicrobenchmark(
+            name=name, label=benchmark.label, inputs=inputs, modules=modules, benchmark=benchmark,
+            settings=settings, process=name,
         )  # fmt: skip
 
     # --- inputs --------------------------------------------------------------------------------------------
@@ -221,6 +252,9 @@ class Schedule:
 
     def _train(self, garment: str) -> tuple[str, ...]:
         return self.plan.motions.train_of(garment)
+
+    def _settled_in(self, scene: Scene) -> Scene:
+        return find_scene(scene.start_of).at(self.preset)
 
     def _has_reference(self, scene: Scene) -> bool:
         return any(cell.scene == scene and cell.entry.role == "reference" for cell in self.plan.cells)

@@ -1,4 +1,4 @@
-"""What a request asks for: which scenes meet which methods, which cases, which motions train and test."""
+"""What a request asks for: scenes and methods, cases, microbenchmarks, motions to train and test on."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 from .methods import METHODS, find_method
+from .performance.microbenchmark import SUITE, Microbenchmark
+from .performance.registry import MICROBENCHMARKS
 from .plan import Motions, PlanError
 from .presets import PRESETS, Preset
 from .scene import Scene
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from .validation.case import Case
 
 FIRST_GARMENT = GARMENT_SCENES[0].garment
+MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,10 +50,10 @@ class Request:
         return Extent(self.preset, self.motions, self.full or named, named or self.preset.further)
 
 
-def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
-    """Cells and cases that the request names. Raises PlanError for a word that names nothing."""
+def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Microbenchmark, ...]]:
+    """What the request names. Raises PlanError for a word that names nothing."""
     declared = all_scenes(request.motions.test, request.motions.dynamic_test)
-    _check_words("scene", request.scenes, [*declared, *(case.name for case in CASES)])
+    _check_words("scene", request.scenes, [*declared, *(entry.name for entry in MEASURED)])
     _check_words("method", request.methods, [entry.name for entry in METHODS])
     found: dict[tuple[str, str, int], Cell] = {}
     for suite, scene, method in _pairs(request, declared):
@@ -59,14 +62,14 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
             key = (scene, method, seed)
             before = found[key].suites if key in found else ()
             found[key] = Cell(declared[scene].at(request.preset), entry, seed, (*before, suite))
-    cases = tuple(_cases(request))
-    if not (found or cases):
+    cases, microbenchmarks = tuple(_cases(request)), tuple(_microbenchmarks(request))
+    if not (found or cases or microbenchmarks):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
     # The reference first: an error against it can be said as soon as another cell is done.
     order = {entry.name: place for place, entry in enumerate(METHODS)}
     places = {name: place for place, name in enumerate(declared)}
     cells = sorted(found.values(), key=lambda c: (places[c.scene.name], order[c.method], c.seed))
-    return tuple(cells), cases
+    return tuple(cells), cases, microbenchmarks
 
 
 def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, str, str]]:
@@ -83,14 +86,16 @@ def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, 
         if suite.name not in request.suites or not suite.methods(extent):
             continue
         more = suite.more_methods if request.methods or request.preset.further else ()
-        methods = (*suite.methods(extent), *more, *sorted(own_methods))
+        further = suite.named_methods if request.methods else ()
+        methods = (*suite.methods(extent), *more, *further, *sorted(own_methods))
         for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
             # Networks for a second garment double the training: only for whoever names its scenes.
             plain = not extent.further and declared[scene].garment not in ("", FIRST_GARMENT)
             for method in methods:
                 if not (named(scene, request.scenes) and named(method, request.methods)):
                     continue
-                if not (plain and find_method(method).trained):
+                entry = find_method(method)
+                if entry.meant_for(declared[scene]) and not (plain and entry.trained):
                     yield suite.name, scene, method
 
 
@@ -104,6 +109,15 @@ def _cases(request: Request) -> Iterator[Case]:
             small = case.smoke or request.scenes or request.preset.name != "smoke"
             if small and case.suite in request.suites and named(case.name, request.scenes):
                 yield case
+
+
+def _microbenchmarks(request: Request) -> Iterator[Microbenchmark]:
+    """Those of the scenes and methods named; the smallest preset runs those marked, unless they are named."""
+    for benchmark in MICROBENCHMARKS if SUITE in request.suites else ():
+        small = benchmark.smoke or request.scenes or request.preset.name != "smoke"
+        wanted = small and named(benchmark.name, request.scenes) and named(benchmark.method, request.methods)
+        if wanted and (not benchmark.long or benchmark.name in request.scenes):
+            yield benchmark
 
 
 def named(name: str, patterns: Sequence[str]) -> bool:
@@ -132,19 +146,24 @@ def _listed_methods() -> set[str]:
     extents = [Extent(preset, Motions()) for preset in PRESETS]
 
     def of_suite(suite: Suite) -> set[str]:
-        return {*suite.more_methods, *(name for extent in extents for name in suite.methods(extent))}
+        return {
+            *suite.more_methods,
+            *suite.named_methods,
+            *(name for extent in extents for name in suite.methods(extent)),
+        }
 
     return set().union(*map(of_suite, SUITES))
 
 
 def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
-    """The suites named, "all" meaning each; none named means each too. Raises PlanError."""
+    """The suites named, "all" meaning each; without words those of a default run. Raises PlanError."""
     words = list(words)
     for word in words:
         if word not in (*SUITE_NAMES, "all"):
             known = ", ".join((*SUITE_NAMES, "all"))
             raise PlanError(f"--suite: unknown suite '{word}'; choose from {known}")
-    return tuple(name for name in SUITE_NAMES if not words or "all" in words or name in words)
+    chosen = words or [suite.name for suite in SUITES if suite.default]
+    return tuple(name for name in SUITE_NAMES if "all" in chosen or name in chosen)
 
 
 def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Preset) -> Motions:
@@ -153,7 +172,7 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     Without paths: the embedded library with its own division. With paths: the files alone, plus the library
     where "library" is among the paths. test_names moves motions to the test set; without it the test
     motions of the library test, and of files alone the first in order of names. A single file tests, and the
-    library trains.
+    library trains. The test motions of the library never train, whichever motions test.
     """
     from snug.motion_files import load_motions
     from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, LIBRARY, TEST, TRAIN
@@ -173,8 +192,7 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
         test = tuple(name for name in names if name in test_names)
     else:
         test = TEST if with_library else tuple(names[:1])
-    train = tuple(name for name in names if name not in test)
-    train = train if test_names else tuple(name for name in train if name not in TEST)
+    train = tuple(name for name in names if name not in (*test, *TEST))
     if not train:
         train = tuple(name for name in TRAIN if name not in test)
     # Whoever names the test motions means all of them, whatever the size of the preset.
@@ -184,9 +202,10 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
 
 
 def names_no_motion(scenes: Sequence[str]) -> bool:
-    """Whether a choice of scenes names scenes without a body and cases alone; no motion is looked at then."""
+    """Whether a choice of scenes names scenes without a body, cases and
+    microbenchmarks alone; no motion is looked at then."""
     known = {name for name, scene in all_scenes((), ()).items() if not scene.dressed}
-    known |= {case.name for case in CASES}
+    known |= {entry.name for entry in MEASURED}
     return bool(scenes) and known.issuperset(scenes)
 
 

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .methods import METHODS
-from .methods.learned import LEARNED
+from .methods.learned import LEARNED, RECIPE_DEVIATIONS
 from .plan import Motions
 from .presets import Preset
 from .scenes import GARMENT_SCENES
+from .scenes.further import OUT_OF_DISTRIBUTION, dependence, there_and_back
+from .scenes.further import SMALL as SMALL_OUT_OF_DISTRIBUTION
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,8 @@ class Suite:
     """A question put to many cells, or to cases of benchmarks.validation.
 
     scenes, methods: names of those that meet. more_methods: those that take part only where methods are
-    named, or at a preset that holds all.
+    named, or at a preset that holds all; named_methods: those that have to be named. default: whether it
+    takes part where no suite is named.
     """
 
     name: str
@@ -35,6 +38,8 @@ class Suite:
     scenes: Callable[[Extent], list[str]] = lambda extent: []
     methods: Callable[[Extent], list[str]] = lambda extent: []
     more_methods: tuple[str, ...] = ()
+    named_methods: tuple[str, ...] = ()
+    default: bool = True
 
 
 # --- garments ----------------------------------------------------------------------------------------------
@@ -44,6 +49,7 @@ def _whole_motions(extent: Extent) -> list[str]:
     """A T-shirt in each test motion; other garments where scenes are named, or at preset paper."""
     shirt, *others = GARMENT_SCENES
     names = [shirt.scene(name).name for name in extent.motions.test]
+    names += [there_and_back(name).name for name in extent.motions.test[:1]]
     if extent.further:
         names += [o.scene(name).name for o in others for name in extent.motions.dynamic_test]
     return names
@@ -98,6 +104,15 @@ def _solvers(extent: Extent) -> list[str]:
     return [*references, *families, *OTHER_SOLVERS, *EXTERNAL, *FAST]
 
 
+# --- out of distribution ------------------------------------------------------------------------------------
+
+
+def _out_of_distribution(extent: Extent) -> list[str]:
+    if extent.preset.name == "smoke" and not extent.further:
+        return list(SMALL_OUT_OF_DISTRIBUTION)
+    return [scene.name for scene in OUT_OF_DISTRIBUTION]
+
+
 SUITES = (
     Suite(
         name="garments",
@@ -107,6 +122,7 @@ SUITES = (
         more_methods=(
             *(entry.name for entry in LEARNED), "simulation-perturbed", "lbfgs-5", "lbfgs-10",
         ),
+        named_methods=tuple(entry.name for entry in RECIPE_DEVIATIONS),
     ),
     Suite(
         name="speed",
@@ -123,11 +139,22 @@ SUITES = (
     ),
     Suite(
         name="validation",
-        description="physics with an exact answer: measured, expected, tolerance",
+        description="physics with an exact answer: measured, expected, tolerance; other meshes and steps",
+        scenes=lambda extent: [scene.name for scene in dependence(extent.preset.dependence)],
+        methods=lambda extent: ["simulation", "skinning", "newton-1"],
     ),
     Suite(
         name="extremes",
-        description="stiff, huge and degenerate input: converged, or an honest failure",
+        description="stiff, huge and degenerate input; methods on a walk made hard: converged, or an honest "
+        "failure",
+        scenes=_out_of_distribution,
+        methods=lambda extent: ["simulation", *FAST],
+        more_methods=tuple(entry.name for entry in LEARNED if entry.batched),
+    ),
+    Suite(
+        name="performance",
+        description="microbenchmarks of simulator, trainings and networks; only where it is named",
+        default=False,
     ),
 )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """python -m reports.convergence DIR: the curve of a training at the paper's size, over its time.
 
-Reads convergence.csv, which part convergence of `python -m benchmarks.training_speed` writes into DIR; writes
-convergence.png there.
+Reads convergence.csv, which microbenchmark convergence/4400 of suite performance leaves in the folder of a
+run; writes convergence.png there.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ def read_curve(path: Path) -> pd.DataFrame:
     try:
         curve = pd.read_csv(path)[["seconds", *CURVES]].astype(float)
     except FileNotFoundError:
-        raise ResultsError(f"{path}: no such file; run part convergence of training_speed first") from None
+        raise ResultsError(f"{path}: no such file; see --scenes convergence/4400") from None
     except (KeyError, ValueError) as error:
-        raise ResultsError(f"{path}: not a curve of training_speed ({error})") from None
+        raise ResultsError(f"{path}: not a curve of a training ({error})") from None
     if curve.empty or curve.isna().any(axis=None):
         raise ResultsError(f"{path}: holds no rows, or not all of their numbers")
     return curve
@@ -60,9 +60,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m reports.convergence",
         description="Draw the curve of a training: convergence.png beside its convergence.csv.",
-        epilog="example: python -m reports.convergence reports/runs/training_speed",
+        epilog="example: python -m reports.convergence reports/runs/mine",
     )
-    parser.add_argument("folder", metavar="DIR", help="where benchmarks.training_speed has written")
+    parser.add_argument("folder", metavar="DIR", help="folder of a run that holds convergence.csv")
     options = parser.parse_args(arguments)
     try:
         print(convergence_curve(Path(options.folder)).path)

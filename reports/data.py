@@ -11,7 +11,7 @@ import pandas as pd
 from benchmarks.results import COLUMNS, Row
 
 USABLE = ("ok", "stalled")
-SUITES = ("garments", "speed", "validation", "extremes")
+SUITES = ("garments", "speed", "validation", "extremes", "performance")
 # Methods stand in this order of their roles, and within a role as they are declared.
 ROLES = (
     "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",

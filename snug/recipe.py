@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
+from snug.recipe_deviations import with_and_without
+
 TERMS = ("strain", "bending", "gravity", "inertia", "collision")
 
 
@@ -255,7 +257,10 @@ TRAININGS = {
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, simulated=True),
     "tailornet": Training("tailornet", TAILORNET, simulated=True),
     "snug-dynamic": Training("dynamic", DYNAMIC, simulated=True),
-    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
+    **{
+        f"snug-{recipe.name}": Training("snug", recipe)
+        for recipe in (PAPER, *ABLATIONS, *with_and_without(DEFAULT, PAPER))
+    },
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,22 +47,31 @@ def roll_out(
 
 
 def ready_to_roll_out(
-    model: TrainedModel, dressed: DressedBody, motion: Any, betas: np.ndarray | None = None
+    model: TrainedModel,
+    dressed: DressedBody,
+    motion: Any,
+    betas: np.ndarray | None = None,
+    *,
+    kept: np.ndarray | None = None,
 ) -> Callable[[], Trajectory]:
     """What gives the trajectory of `roll_out` when it is called, once: all that comes before is done here.
 
-    Raises RollOutError.
+    kept: the frames that the trajectory holds, or None for all; every one is computed. Raises RollOutError.
     """
     features = _features(model, dressed, motion, betas)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
     transforms, origins = dressed.transforms(motion.poses, betas), dressed.pelvis(motion, betas)
     frames = _one_by_one(model, features, rest, weights, transforms)
+    held = np.arange(len(features)) if kept is None else kept
+    places = {int(frame): place for place, frame in enumerate(held)}
 
     def run() -> Trajectory:
-        posed = np.empty((len(features), *rest.shape), np.float32)
+        posed = np.empty((len(held), *rest.shape), np.float32)
         for frame, vertices in enumerate(frames):
-            posed[frame] = vertices.numpy()
-        return _trajectory(model, dressed, motion, posed, origins)
+            if frame in places:
+                posed[places[frame]] = vertices.numpy()
+        whole = _trajectory(model, dressed, motion, posed, origins[held])
+        return replace(whole, times=held / motion.fps)
 
     return run
 

@@ -27,6 +27,7 @@ EXCEPTIONS = {("benchmarks/execution.py", "reports.build.build_report")}
 PURE = ("benchmarks/metrics/curvature.py", "benchmarks/metrics/geometry.py")
 DECLARATION = "benchmarks.metric.Metric"  # name, unit and definition: no physics
 
+
 def files_of(layer: str) -> list[Path]:
     return sorted((ROOT / layer).rglob("*.py"))
 

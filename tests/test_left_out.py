@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.wardrobe import embedded_motions, open_wardrobe
 from meshes import patch
 
+from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.presets import find_preset
-from benchmarks.scenes import SMALL_SCENES, dressed_scene
+from benchmarks.scenes import SCENES, of_garment
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Inertia, StretchStVK
 
@@ -24,8 +24,8 @@ import sys
 from pathlib import Path
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
-from benchmarks.scenes import SMALL_SCENES
-scene = next(scene for scene in SMALL_SCENES if scene.name == sys.argv[1]).build(find_preset("smoke"))
+from benchmarks.scenes import SCENES
+scene = next(scene for scene in SCENES if scene.name == sys.argv[1]).at(find_preset("smoke")).build()
 for name in sys.argv[2].split(","):
     method = find_method(name).make(models=Path("."), seed=0)
     method.prepare(scene)
@@ -37,10 +37,10 @@ import dataclasses, pickle, sys
 from pathlib import Path
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
-from benchmarks.scenes import dressed_scene
-wardrobe, body, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
-wardrobe = dataclasses.replace(wardrobe, motions={"kick": motion}, bodies={"kick": body})
-scene = dressed_scene("kick").build(find_preset("smoke"), wardrobe)
+from benchmarks.scenes import of_garment
+assets, body, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
+assets = dataclasses.replace(assets, motions={"kick": motion}, bodies={"kick": body})
+scene = of_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets)
 method = find_method("lbfgs-5").make(models=Path("."), seed=0)
 method.prepare(dataclasses.replace(scene, settle=lambda: start))
 assert method.run().frames == 4
@@ -90,11 +90,11 @@ def test_a_scene_loads_what_it_declares_and_no_more_whoever_solves_it(scene, pre
 
 def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
     """Whoever poses the joints needs torch; a cell is given the posed body."""
-    wardrobe = open_wardrobe(find_preset("smoke"), embedded_motions(["kick"]))
-    scene = dressed_scene("kick").build(find_preset("smoke"), wardrobe)
-    path = tmp_path / "told"
-    told = (wardrobe, wardrobe.posed_body("kick")[:4], scene.start, wardrobe.motions["kick"].cut(0, 4))
-    path.write_bytes(pickle.dumps(told))
+    assets = open_assets(find_preset("smoke"), embedded_motions(["kick"]), ["tshirt"])
+    scene = of_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets)
+    motion, path = assets.motions["kick"], tmp_path / "given"
+    given = (assets, assets.posed_body(motion)[:4], scene.start, motion.cut(0, 4))
+    path.write_bytes(pickle.dumps(given))
     modules = loaded(DRESSED, str(path))
     assert {"reference_sim.obstacle", CONTACT[0], *MATERIAL} <= modules
     assert not modules & {"torch", "snug.skinning", "snug.dressed_body", "snug.regressor"}
@@ -124,7 +124,7 @@ def test_what_is_not_declared_is_not_evaluated(monkeypatch):
 
 
 def test_no_scene_declares_what_it_has_no_use_for():
-    for scene in SMALL_SCENES:
-        built = scene.build(find_preset("smoke"))
+    for scene in SCENES:
+        built = scene.at(find_preset("smoke")).build()
         assert ("collision" in built.terms) == (built.obstacle is not None) == scene.obstacle
         assert built.dressed is None and not scene.dressed

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..method import MethodEntry
-from .learned import LEARNED, network
+from .learned import LEARNED, RECIPE_DEVIATIONS, network
 from .solvers import SOLVERS
 
 METHODS = (
@@ -32,6 +32,7 @@ METHODS = (
     network("supervised", "Supervised", "the SNUG network trained on simulated vertices instead"),
     network("pbns", "PBNS", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
     *LEARNED,
+    *RECIPE_DEVIATIONS,
     *SOLVERS,
 )  # fmt: skip
 

@@ -33,10 +33,10 @@ class CleanedNetwork(Method):
 
         assert scene.dressed is not None and scene.obstacle is not None
         self.model = TrainedModel.load(self.path)
-        self.motion = scene.dressed.motion
+        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         body, garment = scene.dressed.body, scene.dressed.garment
         self.dressed = DressedBody(body, garment)
-        self.frames = predictions(self.model, self.dressed, self.motion)
+        self.frames = predictions(self.model, self.dressed, self.motion, self.betas)
         positions = np.asarray(scene.obstacle.positions)
         self.clean = CleanUp(garment.rest_positions, body.shaped(), body.faces, positions)
         for frame in range(min(WARM_UP, self.motion.frames)):
@@ -64,7 +64,7 @@ class CleanedNetwork(Method):
         """What the network holds to be static, cleaned up as well. Never on the clock."""
         from snug.rollout import roll_out
 
-        still = roll_out(self.model, self.dressed, self.motion, quasi_static=True)
+        still = roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
         cleaned = [self.clean(x, frame) for frame, x in enumerate(still.positions)]
         return replace(still, positions=np.stack(cleaned))
 

@@ -67,7 +67,7 @@ class DirectOptimisation(Method):
         assert scene.dressed is not None
         self.scene, motion = scene, scene.dressed.motion
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.start = dressed.skinned(motion, smoothing=DEFAULT.smoothing)
+        self.start = dressed.skinned(motion, scene.dressed.betas, smoothing=DEFAULT.smoothing)
         one, frames = scene.cloth, scene.frames
         faces = one.faces + one.vertex_count * np.arange(frames)[:, None, None]
         # Side by side: a rest state is only sound where no two vertices coincide.

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from snug.recipe import ABLATIONS
+from snug.recipe_deviations import DEVIATIONS
 
 from ..method import MethodEntry
 from .solvers import warm_started
@@ -56,6 +57,16 @@ _LABELS = {
     "window12": "windows of 12",
     "springs": "springs instead of StVK",
 }
+
+# Each a training of its own, of equal steps: their times stand beside them.
+RECIPE_DEVIATIONS = tuple(
+    network(
+        f"{base}-{verb}-{deviation.name}", f"{label} {verb} {deviation.words}",
+        f"{base} {verb} {deviation.words}", role="ablation", base=base, pairing_group="snug",
+    )
+    for base, label, verb in (("snug", "SNUG", "without"), ("snug-paper", "SNUG, paper's text,", "with"))
+    for deviation in DEVIATIONS
+)  # fmt: skip
 
 LEARNED = (
     network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),

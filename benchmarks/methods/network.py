@@ -32,9 +32,9 @@ class Network(Method):
 
         assert scene.dressed is not None
         self.model = TrainedModel.load(self.path)
-        self.motion = scene.dressed.motion
+        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.frames = ready_to_roll_out(self.model, self.dressed, self.motion)
+        self.frames = ready_to_roll_out(self.model, self.dressed, self.motion, self.betas, kept=scene.kept)
 
     def run(self) -> Trajectory:
         return self.frames()
@@ -49,7 +49,7 @@ class Network(Method):
         """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""
         from snug.rollout import roll_out
 
-        return roll_out(self.model, self.dressed, self.motion, quasi_static=True)
+        return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
 
 
 def make(*, models: Path, seed: int, kind: str) -> Network:

@@ -27,11 +27,11 @@ class Skinning(Method):
         from snug.skinning import skin
 
         assert scene.dressed is not None
-        self.motion = scene.dressed.motion
+        self.motion, betas = scene.dressed.motion, scene.dressed.betas
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.rest, self.weights = dressed.rest(), dressed.weights(DEFAULT.smoothing)
-        self.transforms = dressed.transforms(self.motion.poses)
-        self.pelvis = dressed.pelvis(self.motion)
+        self.rest, self.weights = dressed.rest(betas), dressed.weights(DEFAULT.smoothing)
+        self.transforms = dressed.transforms(self.motion.poses, betas)
+        self.pelvis = dressed.pelvis(self.motion, betas)
         self.faces = np.asarray(scene.cloth.faces)
         for frame in range(min(WARM_UP, self.motion.frames)):
             skin(self.rest, self.weights, self.transforms[frame])

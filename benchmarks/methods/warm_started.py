@@ -73,12 +73,12 @@ class WarmStarted(Method):
         from snug.trained_model import TrainedModel
 
         assert scene.dressed is not None
-        motion = scene.dressed.motion
+        motion, betas = scene.dressed.motion, scene.dressed.betas
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         if self.guess == SKINNING:
-            return lambda: skinned_frames(dressed, motion, DEFAULT.smoothing)
+            return lambda: skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
         model = TrainedModel.load(self.path)
-        return lambda: predictions(model, dressed, motion)
+        return lambda: predictions(model, dressed, motion, betas)
 
 
 def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from types import ModuleType
@@ -21,18 +22,28 @@ MODULES = (
     "time_error",
     "cost",
 )
+WHERE_NAMED = ("extrapolation", "roll_out", "mesh", "training")  # measured only in scenes that name them
+
+
+def names_of(chosen: Sequence[str] | None) -> tuple[str, ...]:
+    """The modules that a scene measures, from what it declares."""
+    return MODULES if chosen is None else tuple(name for name in (*MODULES, *WHERE_NAMED) if name in chosen)
 
 
 @cache
 def modules() -> dict[str, ModuleType]:
-    """Name -> module, in the order of MODULES; loads them."""
-    return {name: importlib.import_module(f"{__name__}.{name}") for name in MODULES}
+    """Name -> module, of all there are; loads them."""
+    names = (*MODULES, *WHERE_NAMED)
+    return {name: importlib.import_module(f"{__name__}.{name}") for name in names}
 
 
 @cache
 def declared() -> dict[str, Metric]:
-    """Name -> metric, of all modules."""
-    return {metric.name: metric for module in modules().values() for metric in module.METRICS}
+    """Name -> metric, of all modules, and of microbenchmarks."""
+    from ..performance.metrics import METRICS
+
+    own = (metric for module in modules().values() for metric in module.METRICS)
+    return {metric.name: metric for metric in (*own, *METRICS)}
 
 
 def find_metric(name: str) -> Metric:

@@ -216,4 +216,4 @@ def _pelvis(scene: BuiltScene) -> Floats:
     """(T,3) [m] where angular momentum is taken about; the origin, where there is no body."""
     if scene.dressed is None:
         return np.zeros((scene.frames, 3))
-    return scene.dressed.body.joints()[0] + scene.dressed.motion.translations
+    return scene.dressed.body.joints(scene.dressed.betas)[0] + scene.dressed.motion.translations

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from ..presets import PRESETS
 from ..scene import Scene
+from .further import OUT_OF_DISTRIBUTION, dependence, there_and_back
 
 SHEET = ("sheet_cells", "sheet_frames")
 
@@ -41,7 +43,14 @@ SCENES = (
         module="benchmarks.scenes.free_fall",
         sizes=SHEET,
     ),
+    *OUT_OF_DISTRIBUTION,
+    *{scene.name: scene for preset in PRESETS for scene in dependence(preset.dependence)}.values(),
 )
+
+
+def find_scene(name: str) -> Scene:
+    """The scene of that name, of those that hang on no motion of the run. Raises KeyError."""
+    return {scene.name: scene for scene in SCENES}[name]
 
 
 @dataclass(frozen=True)
@@ -86,7 +95,8 @@ def all_scenes(motions: Iterable[str], dynamic_motions: Iterable[str]) -> dict[s
 
     motions: those of the T-shirt, which can do the others too; dynamic_motions: those of garments that swing.
     """
-    dynamic = list(dynamic_motions)
+    motions, dynamic = list(motions), list(dynamic_motions)
+    long = map(there_and_back, motions[:1])
     chosen = {False: [*motions, *dynamic], True: dynamic}
     dressed = [
         scenes.scene(motion, part)
@@ -94,4 +104,4 @@ def all_scenes(motions: Iterable[str], dynamic_motions: Iterable[str]) -> dict[s
         for motion in chosen[scenes.dynamic]
         for part in ("whole", "clip")
     ]
-    return {scene.name: scene for scene in (*SCENES, *dressed)}
+    return {scene.name: scene for scene in (*SCENES, *dressed, *long)}

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..results import Row
 from .task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
@@ -29,3 +30,10 @@ class RunCase(Task):
         row = self.case.run()
         context.tell(self.units)
         return Outcome(row.status, row.reason, failed=row.status != "ok", result=dataclasses.asdict(row))
+
+    def rows(self, outcome: Outcome) -> list[Row]:
+        """A case that died, or that hung, has a row too."""
+        from ..validation.case import timed_out
+
+        died = not outcome.result
+        return [timed_out(self.case, outcome.reason) if died else Row(**outcome.result)]

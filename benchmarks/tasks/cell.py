@@ -7,6 +7,7 @@ modules of ours and the heavy ones that it has loaded are in the result.
 from __future__ import annotations
 
 import dataclasses
+import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -116,7 +117,10 @@ class RunCell(CellTask):
     def _run(self, context: Context) -> Outcome:
         cell, folder = self.cell, context.folder
         scene, method = self.scene(context), self.ready(context)
-        trajectory, reading = clocked(method.run, of=lambda made: made.positions)
+        if cell.scene.timed:
+            trajectory, reading = clocked(method.run, of=lambda made: made.positions)
+        else:
+            trajectory, reading = method.run(), Reading(math.nan)
         peak = peak_memory()  # many bodies at once, and poses held still, are not what others are compared by
         status, reason = judge(trajectory, reading, scene, truncated=cell.entry.truncated)
         result: dict[str, Any] = {
@@ -131,12 +135,19 @@ class RunCell(CellTask):
         paths[0].parent.mkdir(parents=True, exist_ok=True)
         provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
         dataclasses.replace(trajectory, provenance=trajectory.provenance | provenance).save(paths[0])
-        quasi_static = method.quasi_static()
+        quasi_static = method.quasi_static() if cell.scene.dynamic or not cell.scene.dressed else None
         if quasi_static is not None:
             paths.append(cell.quasi_static(folder))
             quasi_static.save(paths[1])
         context.memo["method"] = method
         return Outcome(status, reason, result=result, files=tuple(map(folder.relative, paths)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunUntimedCell(RunCell):
+    """The same beside others, where nobody asks for the time."""
+
+    stage = "cells that are not timed"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,7 +18,7 @@ TOLERANCE = 1e-4  # mean vertex weights: the hem is measured in millimetres
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SettleStart(Task):
-    """The garment settled in the first pose of a dressed scene, and the posed body."""
+    """The garment settled in the first pose of a scene, or what settled in its `start_of`; the posed body."""
 
     kind = "start"
     silent = True
@@ -33,13 +33,13 @@ class SettleStart(Task):
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import numpy as np
 
-        scene, run = self.scene.build(context.assets), context.folder
+        scene, run, shared = self.scene.build(context.assets), context.folder, self.scene.start_of
         assert scene.obstacle is not None
         with replacing(run.body_path(scene.name)) as temporary:
             np.save(temporary, scene.obstacle.positions)
         write_body(run, scene)
         with replacing(run.start_path(scene.name)) as temporary:
-            np.save(temporary, scene.start)
+            np.save(temporary, np.load(run.start_path(shared)) if shared else scene.start)
         context.tell(self.units)
         paths = (run.start_path(scene.name), run.body_path(scene.name))
         return Outcome(files=tuple(map(run.relative, paths)))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..metric import RollOut, SceneRollOuts
-from ..metrics import modules
+from ..metrics import modules, names_of
 from .cell import Cell, built
 from .task import Context, Outcome, Task, TaskId
 
@@ -55,24 +55,29 @@ class MeasureCell(Task):
                 found[cell] = _roll_out(group, cell, outcome, own.get(cell), context)
                 group.roll_outs.append(found[cell])
         for cell, task in own.items():
-            metrics, curves = measured(found[cell], cell.scene.metrics)
+            metrics, curves, (status, reason) = measured(found[cell], cell.scene.metrics)
             _add_curves(cell.trajectory(folder), curves, found[cell].trajectory.frames)
             context.tell(task.units)
-            yield Outcome(result=metrics)
+            yield Outcome(status, reason, result=metrics)
 
 
 def measured(
     roll_out: RollOut, chosen: Sequence[str] | None = None
-) -> tuple[dict[str, float], dict[str, np.ndarray]]:
-    """Metrics and curves of a roll-out by all modules that apply, or by those chosen."""
+) -> tuple[dict[str, float], dict[str, np.ndarray], tuple[str, str]]:
+    """Metrics and curves of a roll-out by all modules that apply, or by those chosen; and status and reason
+    where one of them says that it has failed.
+    """
     metrics: dict[str, float] = {}
     curves: dict[str, np.ndarray] = {}
-    for name, module in modules().items() if len(roll_out.positions) else ():
+    ended = ("ok", "")
+    for module in (modules()[name] for name in names_of(chosen) if len(roll_out.positions)):
         suites = getattr(module, "SUITES", roll_out.suites)
-        if (chosen is None or name in chosen) and any(suite in suites for suite in roll_out.suites):
-            metrics |= module.measure(roll_out)
+        if any(suite in suites for suite in roll_out.suites):
+            values = module.measure(roll_out)
+            metrics |= values
             curves |= module.series(roll_out) if hasattr(module, "series") else {}
-    return metrics, curves
+            ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
+    return metrics, curves, ended
 
 
 def _add_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     from ..assets import Assets
-    from ..results import RunFolder
+    from ..results import Row, RunFolder
 
 TaskId = tuple[str, str]  # kind and name
 
@@ -102,6 +102,10 @@ class Task:
 
     def warm_up(self) -> None:
         """What a process does before its first task of this kind and module, without the deadline."""
+
+    def rows(self, outcome: Outcome) -> list[Row]:
+        """The rows of what came of it, skips aside; their commit and remark are filled in later."""
+        return []
 
     @classmethod
     def run_together(

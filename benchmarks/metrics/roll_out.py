@@ -1,0 +1,63 @@
+"""Does a garment look the same when the same motion comes again, a thousand frames later?
+
+Energies are those of the cloth alone (strain, bending, inertia), which need no body; the first two frames of
+either stretch have no inertia and are left out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..metric import Metric
+from .energy import FIRST_FULL_FRAME
+
+if TYPE_CHECKING:
+    from reference_sim import Cloth
+
+    from ..metric import RollOut
+
+MM = 1e3
+
+METRICS = (
+    Metric(
+        name="roll_out/first", unit="J", title="Energy, first", table="roll_outs", lower_is_better=True,
+        definition="strain, bending and inertia, mean over the frames of the early stretch",
+    ),
+    Metric(
+        name="roll_out/last", unit="J", title="Energy, last", table="roll_outs", lower_is_better=True,
+        definition="the same of the late stretch, which shows the same motion",
+    ),
+    Metric(
+        name="roll_out/drift", unit="mm", title="Drift", table="roll_outs", lower_is_better=True,
+        definition="root mean square distance between the two stretches, about the pelvis",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    scene, x = roll_out.scene, roll_out.positions
+    if scene.repeated is None or scene.dressed is None or len(x) < scene.frames:
+        return {}
+    early, late = scene.repeated
+    kept = np.arange(len(x)) if scene.kept is None else scene.kept
+    origins = scene.dressed.motion.translations[kept]
+    moved = (x[late] - x[early]) - (origins[late] - origins[early])[:, None]
+    return {
+        "roll_out/first": cloth_energy(x[early], scene.cloth, scene.dt),
+        "roll_out/last": cloth_energy(x[late], scene.cloth, scene.dt),
+        "roll_out/drift": MM * float(np.sqrt((moved[FIRST_FULL_FRAME:] ** 2).sum(-1).mean())),
+    }
+
+
+def cloth_energy(positions: np.ndarray, cloth: Cloth, dt: float) -> float:
+    """Mean strain, bending and inertia of frames (T,V,3) [m] from the third on [J per frame]."""
+    from reference_sim.energies import BendHinge, Inertia, StretchStVK
+
+    static, inertia = (StretchStVK(cloth), BendHinge(cloth)), Inertia(cloth, dt)
+    total = 0.0
+    for before, previous, x in zip(positions, positions[1:], positions[FIRST_FULL_FRAME:]):
+        total += inertia.value_and_gradient(x, 2 * previous - before)[0]
+        total += sum(term.value_and_gradient(np.ascontiguousarray(x))[0] for term in static)
+    return total / (len(positions) - FIRST_FULL_FRAME)

@@ -1,0 +1,52 @@
+"""The case that matters: a T-shirt on a moving body."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from snug.garments import TSHIRT
+
+from ..assets import embedded_motions, open_assets
+from ..methods.simulation import Simulation
+from ..metrics.geometry import DEEP, penetration
+from ..presets import find_preset
+from ..scene import BuiltScene
+from ..scenes import of_garment
+from .microbenchmark import Settings
+
+FRAMES = 60
+
+
+def dressed(motion: str, vertices: int) -> BuiltScene:
+    """The scene of an embedded motion, cut to FRAMES frames."""
+    preset = dataclasses.replace(find_preset("quick"), garment_vertices=vertices, frames=FRAMES)
+    assets = open_assets(preset, embedded_motions([motion]), [TSHIRT])
+    return of_garment(TSHIRT).scene(motion).at(preset).build(assets)
+
+
+def measure(settings: Settings, *, motion: str, vertices: int) -> dict[str, float]:
+    """Median and worst frame, convergence and depth under the skin."""
+    scene = dressed(motion, vertices)
+    assert scene.obstacle is not None
+    simulation = Simulation(options={})
+    simulation.prepare(scene)
+    medians, worst = [], []
+    for _ in range(settings.repeats):
+        trajectory = simulation.run()
+        medians.append(np.median(trajectory.frame_seconds[1:]))
+        worst.append(trajectory.frame_seconds.max())
+    fields = trajectory.frame_fields
+    depth = penetration([trajectory.positions], scene.obstacle)[0].depth
+    return {
+        "vertices": scene.cloth.vertex_count,
+        "frame": 1e3 * float(np.median(medians)),
+        "frame_worst": 1e3 * float(np.median(worst)),
+        "iterations": float(np.median(fields["iterations"][1:])),
+        "iterations_worst": float(fields["iterations"].max()),
+        "converged_frames": 100.0 * float(fields["converged"].sum()) / trajectory.frames,
+        "penetrating_vertices": 100.0 * float((depth > 0).mean()),
+        "deep_vertices": 100.0 * float((depth > DEEP).mean()),
+        "depth_p999": 1e3 * float(np.quantile(depth, 0.999)),
+    }

@@ -1,0 +1,58 @@
+"""A frame at a time on one CPU core, network and skinning, as in an application; and what a network weighs.
+
+Weights are random: neither time nor size depends on them. The supervised network is SNUG's.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .learning import dressed_body, training_motions
+from .microbenchmark import Settings
+
+if TYPE_CHECKING:
+    from snug.dressed_body import DressedBody
+    from snug.motion import Motion
+    from snug.trained_model import TrainedModel
+
+
+def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
+    """Median, 95 % and least time over all frames of roll-outs; memory and file of the network."""
+    from snug.recipe import TRAININGS
+    from snug.train import untrained_model
+
+    chosen = TRAININGS[settings.method]
+    dressed, motions = dressed_body(vertices), training_motions()
+    model = untrained_model(chosen.kind, dressed, motions, seed=0, recipe=chosen.recipe)
+    _frame_seconds(model, dressed, motions[0])
+    runs = [_frame_seconds(model, dressed, motions[0]) for _ in range(settings.repeats)]
+    frames = 1e3 * np.concatenate(runs)
+    with tempfile.TemporaryDirectory() as folder:
+        size = model.save(Path(folder) / "model.safetensors").stat().st_size
+    return {
+        "vertices": dressed.vertices,
+        "timed_frames": len(frames),
+        "inference": float(np.median(frames)),
+        "inference_p95": float(np.quantile(frames, 0.95)),
+        "inference_least": float(frames.min()),
+        "parameters": sum(p.numel() for p in model.network.parameters()),
+        "network_memory": model.megabytes,
+        "model_file": size / 1e6,
+    }
+
+
+def _frame_seconds(model: TrainedModel, dressed: DressedBody, motion: Motion) -> list[float]:
+    """Wall time [s] of each frame of a roll-out; inputs and joint transforms are ready before."""
+    from snug.rollout import predictions
+
+    frames, seconds = predictions(model, dressed, motion), []
+    for _ in range(motion.frames):
+        start = time.perf_counter()
+        next(frames)
+        seconds.append(time.perf_counter() - start)
+    return seconds

@@ -1,0 +1,31 @@
+"""The T-shirt in the first frames of a training motion, tailored to a given size, at a given time step.
+
+How much of every headline number is the mesh's or the time step's: numbers of two meshes are two definitions
+of the energy, of contact and of curvature, so they are reported and never judged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from snug.garments import find_template
+from snug.motion_library import make_motion
+
+from ..scene import BuiltScene, Scene
+from . import dressed_body
+
+if TYPE_CHECKING:
+    from ..assets import Assets
+    from ..presets import Dependence
+
+
+def build(
+    scene: Scene, assets: Assets, *, dependence: Dependence, vertices: int = 0, substeps: int = 1
+) -> BuiltScene:
+    """vertices: asked for, or those of the middle mesh; substeps: time steps of a frame."""
+    garment = find_template(scene.garment).tailor(assets.body, vertices=vertices or dependence.middle)
+    motion = make_motion(scene.motion).cut(0, dependence.frames)
+    own = replace(assets, garments={scene.garment: garment}, motions={scene.motion: motion})
+    built = dressed_body.build(scene, own, settle_frames=dependence.settle_frames)
+    return replace(built, substeps=substeps)

@@ -1,0 +1,147 @@
+"""A walk made hard: too fast, too far, too large a body, a glitch, another material. No training saw it.
+
+All start in the walk's first pose and share its settled shirt; but for the extreme shapes, which start in
+T-pose in the shirt's own rest shape, fitted to that body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reference_sim import Cloth, Material, Obstacle
+from snug.motion import Motion, transition
+from snug.motion_library import make_motion
+from snug.skeleton import JOINT, axis_angles, rotation_matrices
+
+from ..scene import BuiltScene, Dressed, Scene
+from .dressed_body import declared_energies, settled
+
+if TYPE_CHECKING:
+    from snug.body import Body
+
+    from ..assets import Assets
+
+ORDINARY = 44  # frames of the walk that the others are compared with
+APPROACH = 12  # frames from the walk's first pose to another
+STILL = 10  # frames for which a pose is kept, or a walk goes on
+GLITCH = 12  # the frame that is wrong
+
+
+def build(
+    scene: Scene,
+    assets: Assets,
+    *,
+    change: str,
+    settle_frames: int,
+    betas: tuple[float, ...] = (),
+    material: Mapping[str, float] | None = None,
+    **options: Any,
+) -> BuiltScene:
+    """The walk after `change`, one of CHANGES, with these options.
+
+    betas: the first shape coefficients, the others being zero. material: factors on the material, of the
+    simulator and of the energies that are measured. Raises ValueError for a body with fewer shapes.
+    """
+    body, garment = assets.body, assets.garments[scene.garment]
+    motion, shape = CHANGES[change](make_motion(scene.motion), **options), _shape(body, betas, scene.name)
+    changed = {name: factor * getattr(Material(), name) for name, factor in (material or {}).items()}
+    cloth = Cloth(garment.rest_positions, garment.faces, replace(Material(), **changed))
+    energies = declared_energies(cloth)
+
+    def settle() -> np.ndarray:
+        if shape is None:
+            return settled(cloth, energies, assets, garment, motion, settle_frames)
+        root = body.transforms(motion.poses[:1], motion.translations[:1], shape)[0, 0]
+        return garment.rest_for(body, shape) @ root[:, :3].T + root[:, 3]
+
+    return BuiltScene(
+        name=scene.name,
+        cloth=cloth,
+        energies=energies,
+        dt=1.0 / motion.fps,
+        frames=motion.frames,
+        settle=settle,
+        # Which faces a vertex may touch is a matter of the body that the shirt was made for.
+        obstacle=Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped()),
+        origin_heights=body.joints(shape)[0, 1] + motion.translations[:, 1],
+        dressed=Dressed(body, garment, motion, shape),
+        glitch=GLITCH if change in ("root_jumps", "limb_flips") else None,
+    )
+
+
+def _shape(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | None:
+    if not betas:
+        return None
+    if body.shape_count < len(betas):
+        raise ValueError(f"the body has {body.shape_count} shapes, {scene} needs {len(betas)}")
+    return np.pad(betas, (0, body.shape_count - len(betas)))
+
+
+def ordinary(walk: Motion) -> Motion:
+    """Its first frames, as they are."""
+    return walk.cut(0, ORDINARY)
+
+
+def faster(walk: Motion, times: int) -> Motion:
+    """Every so many-th frame."""
+    return replace(walk, poses=walk.poses[::times], translations=walk.translations[::times])
+
+
+def another_faster(walk: Motion, times: int, other: str) -> Motion:
+    """Into the first pose of another motion, then that faster."""
+    motion = faster(make_motion(other), times)
+    return _approached(walk, motion.poses, motion.translations)
+
+
+def posed(walk: Motion, degrees: Mapping[str, tuple[float, float, float]]) -> Motion:
+    """Into the walk's first pose with some joints at other angles, and a third of a second there."""
+    pose = walk.poses[0].copy()
+    for joint, angles in degrees.items():
+        pose[JOINT[joint]] = np.deg2rad(angles)
+    return _approached(walk, np.repeat(pose[None], STILL, axis=0), np.zeros((STILL, 3)))
+
+
+def from_t_pose(walk: Motion) -> Motion:
+    """From T-pose into the walk's first pose and ten frames on."""
+    t_pose = np.zeros_like(walk.poses[0])
+    t_pose[0] = walk.poses[0, 0]
+    poses = np.concatenate([transition(t_pose, walk.poses[0], APPROACH), walk.poses[1:STILL]])
+    start = np.repeat(walk.translations[:1], APPROACH, axis=0)
+    return replace(walk, poses=poses, translations=np.concatenate([start, walk.translations[1:STILL]]))
+
+
+def root_jumps(walk: Motion) -> Motion:
+    """One metre to the side for a single frame."""
+    motion = ordinary(walk)
+    translations = motion.translations.copy()
+    translations[GLITCH, 0] += 1.0
+    return replace(motion, translations=translations)
+
+
+def limb_flips(walk: Motion) -> Motion:
+    """The left arm turned by 180 degrees about the chest's front axis for a single frame."""
+    motion, joint = ordinary(walk), JOINT["left_shoulder"]
+    poses = motion.poses.copy()
+    half = rotation_matrices(np.array([0.0, 0.0, np.pi]))
+    poses[GLITCH, joint] = axis_angles(half @ rotation_matrices(poses[GLITCH, joint]))
+    return replace(motion, poses=poses)
+
+
+def _approached(walk: Motion, poses: np.ndarray, translations: np.ndarray) -> Motion:
+    """The walk's first pose, a smooth way to poses[0], then poses; the root goes on from where it stands."""
+    way = transition(walk.poses[0], poses[0], APPROACH)
+    stand = np.repeat(walk.translations[:1], APPROACH, axis=0)
+    moved = walk.translations[0] + translations - translations[0]
+    return replace(
+        walk, poses=np.concatenate([way, poses[1:]]), translations=np.concatenate([stand, moved[1:]])
+    )
+
+
+CHANGES = {
+    function.__name__: function
+    for function in (ordinary, faster, another_faster, posed, from_t_pose, root_jumps, limb_flips)
+}

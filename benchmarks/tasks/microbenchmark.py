@@ -1,0 +1,69 @@
+"""A microbenchmark of benchmarks.performance."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..performance.microbenchmark import SUITE, Settings
+from ..results import Row, RunFolder
+from .cell import peak_memory
+from .task import Context, Outcome, Task, TaskId, failure
+
+if TYPE_CHECKING:
+    from ..performance.microbenchmark import Microbenchmark
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunMicrobenchmark(Task):
+    """The rows of one microbenchmark. settings: but for the paths of its files."""
+
+    kind = "microbenchmark"
+    stage = SUITE
+    unit = "case"
+    benchmark: Microbenchmark
+    settings: Settings
+
+    def clear(self, folder: RunFolder) -> None:
+        for name in self.benchmark.files:
+            (folder.path / name).unlink(missing_ok=True)
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Measure. A failure has the memory of its process too."""
+        from ..performance.metrics import PROCESS_MEMORY
+
+        files = self.benchmark.files
+        settings = dataclasses.replace(
+            self.settings, files=tuple(context.folder.path / name for name in files)
+        )
+        try:
+            outcome = Outcome(result=self.benchmark.measure(settings), files=files)
+        except Exception as error:
+            outcome = failure(error)
+        return dataclasses.replace(outcome, result={**outcome.result, PROCESS_MEMORY: peak_memory()})
+
+    def rows(self, outcome: Outcome) -> list[Row]:
+        """One for each number; where the process died, one that says so."""
+        from ..methods import find_method
+        from ..metrics import find_metric
+        from ..performance.metrics import PROCESS_MEMORY
+
+        benchmark, entry = self.benchmark, find_method(self.benchmark.method)
+        base = Row(
+            suite=SUITE, scene=benchmark.name, method=entry.name, seed=0, metric=PROCESS_MEMORY, unit="MB",
+            status="failed", reason=outcome.reason, dtype=entry.dtype, family=entry.family or entry.name,
+            level=entry.level, role=entry.role, base=entry.base,
+        )  # fmt: skip
+        rows = []
+        for name, value in outcome.result.items():
+            status, reason = outcome.status, outcome.reason
+            if not math.isfinite(value):
+                status, reason, value = "failed", reason or f"{name} is not finite", None
+            unit = find_metric(name).unit
+            rows.append(
+                dataclasses.replace(base, metric=name, unit=unit, value=value, status=status, reason=reason)
+            )
+        return rows or [dataclasses.replace(base, status=outcome.status)]

@@ -1,1 +1,0 @@
-"""How fast networks train and run: one command, `python -m benchmarks.training_speed`."""
