@@ -1,4 +1,4 @@
-"""The documents: examples run as they are written, links lead somewhere, definitions are those of the code."""
+"""The documents: examples run as written, links lead somewhere, definitions are those of the code."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def extended(tmp_path_factory) -> Path:
     """A copy of the project to which every example has been added."""
     root = tmp_path_factory.mktemp("extended")
     for layer in ("reference_sim", "snug", "benchmarks", "reports", "tests"):
-        shutil.copytree(ROOT / layer, root / layer, ignore=shutil.ignore_patterns("published", "runs", "*.pyc"))
+        shutil.copytree(ROOT / layer, root / layer, ignore=shutil.ignore_patterns("published", "runs"))
     shutil.copy(ROOT / "pyproject.toml", root)
     for section in SECTIONS.values():
         apply(section, root)
@@ -77,7 +77,8 @@ def commands(root: Path, title: str, out: Path | None = None) -> None:
     """Run the scripts and commands of a section, in their order."""
     for before, language, content in blocks(SECTIONS[title]):
         if language == "sh":
-            run(root, "bash", "-ec", content.replace("python ", f"{sys.executable} ").replace("DIR", str(out)))
+            line = content.replace("python ", f"{sys.executable} ").replace("DIR", str(out))
+            run(root, "bash", "-ec", line)
         elif not (NEW_FILE.search(before) or INSERTION.search(before)):
             run(root, sys.executable, "-c", content)
 
