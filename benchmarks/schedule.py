@@ -138,7 +138,8 @@ class Schedule:
         kind, process = (RunCell, cell.name) if cell.scene.timed else (RunUntimedCell, "")
         return kind(
             name=cell.name, label=cell.label, cell=cell, needs=needs, process=process,
-            batch="" if process else cell.scene.name, deadline=self.preset.cell_seconds, **of_scene | {"inputs": inputs},
+            batch="" if process else cell.scene.name, deadline=self.preset.cell_seconds,
+            **of_scene | {"inputs": inputs},
         )  # fmt: skip
 
     def _after(self, kind: Any, cell: Cell, name: str, **fields: Any) -> Task:
