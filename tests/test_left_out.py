@@ -124,7 +124,9 @@ def test_what_is_not_declared_is_not_evaluated(monkeypatch):
 
 
 def test_no_scene_declares_what_it_has_no_use_for():
-    for scene in SCENES:
+    without_body = [scene for scene in SCENES if not scene.dressed]
+    assert len(without_body) >= 5
+    for scene in without_body:
         built = scene.at(find_preset("smoke")).build()
         assert ("collision" in built.terms) == (built.obstacle is not None) == scene.obstacle
-        assert built.dressed is None and not scene.dressed
+        assert built.dressed is None
