@@ -103,6 +103,9 @@ def test_an_example_of_extending_runs_as_written(title, extended, tmp_path):
     assert rows and all(row["status"] == "ok" for row in rows)
     if title == "A scene":
         assert {row["scene"] for row in rows} == {"curtain"}
+        # The section on energies gives the curtain its wind, which does work on it.
+        wind = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/wind"}
+        assert wind.keys() == {"simulation", "newton-1"} and max(wind.values()) < 0.0
     if title == "A method":
         total = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/total"}
         # In n frames backward Euler falls (n + 1) / n times as far.
