@@ -42,7 +42,7 @@ class Row:
     `value`, `expected` and `tolerance` are None where absent (an empty cell in the file); a skipped
     row has a reason and no value. `terms` names the energies of the scene, joined by "+".
 
-    Of the scene: garment and motion, and whether the motion is "whole" or a "clip"; empty without a body.
+    Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
     Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
     that number; base, the method that it varies or starts from; seeded, whether another seed gives another
     answer; pairing_group, shared by methods that begin with the same weights and draws when seeds are equal.

@@ -10,7 +10,7 @@ from .methods.learned import LEARNED, RECIPE_DEVIATIONS
 from .plan import Motions
 from .presets import Preset
 from .scenes import GARMENT_SCENES
-from .scenes.further import OUT_OF_DISTRIBUTION, dependence, there_and_back
+from .scenes.further import OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
 from .scenes.further import SMALL as SMALL_OUT_OF_DISTRIBUTION
 
 
@@ -140,7 +140,7 @@ SUITES = (
     Suite(
         name="validation",
         description="physics with an exact answer: measured, expected, tolerance; other meshes and steps",
-        scenes=lambda extent: [scene.name for scene in dependence(extent.preset.dependence)],
+        scenes=lambda extent: [scene.name for scene in meshes_and_steps(extent.preset.dependence)],
         methods=lambda extent: ["simulation", "skinning", "newton-1"],
     ),
     Suite(

@@ -1,65 +1,100 @@
-"""Dependence on mesh and time step: the same measures for each, and a mesh that fails."""
+"""Dependence on mesh and time step: the same measures for each, and which scenes a preset asks for."""
 
 from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
-from plans import SMOKE, plan_of
 
-from benchmarks import workers
-from benchmarks.plan import OwnBody
-from benchmarks.results import RunFolder
-from benchmarks.studies import dependence, hard_motions
-from reports import study_tables
+from benchmarks.assets import Assets
+from benchmarks.methods import METHODS, find_method
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.plan import Motions
+from benchmarks.presets import PRESETS, Dependence, find_preset
+from benchmarks.scenes import dependence as module
+from benchmarks.scenes import find_scene
+from benchmarks.selection import Request, choose
+from benchmarks.tasks.metrics import measured
+from snug.body import Body
+
+SIZES = Dependence((200,), 200, (1, 2), 4, 4)
+SCENES = ("dependence/mesh/200", "dependence/dt/60")
 
 
-def test_dependence_measures_each_mesh_and_time_step_the_same_way():
-    preset = dataclasses.replace(SMOKE, frames=4, settle_frames=4, garment_vertices=200)
-    told = []
-    rows = dependence.of_one_mesh(None, told.append, preset, (1, 2))
-    scenes = {row.scene for row in rows}
-    assert scenes == {"dependence/mesh/200", "dependence/dt/60"} and sum(told) == 200 * 3
-    assert {row.method for row in rows} == {"simulation", "skinning", "newton-1"}
-    assert all(row.suite == "validation" and row.tolerance is None and row.status == "ok" for row in rows)
-    value = {(row.scene, row.method, row.metric): row.value for row in rows}
-    for scene in scenes:
-        assert abs(value[scene, "simulation", "mesh/vertices"] - 200) < 40
-        assert value[scene, "newton-1", "curvature/error"] > 0
-        assert (scene, "simulation", "curvature/error") not in value
+@pytest.fixture(scope="module")
+def assets():
+    """A body; nothing of the run's own garments and motions is looked at."""
+    return Assets(Body.load(), {}, {}, {})
+
+
+def built(name, assets):
+    preset = dataclasses.replace(find_preset("smoke"), dependence=SIZES)
+    return find_scene(name).at(preset).build(assets)
+
+
+def test_each_mesh_and_time_step_is_measured_the_same_way(assets):
+    value = {}
+    for name in SCENES:
+        scene = built(name, assets)
+        group = SceneRollOuts(scene)
+        for method in ("simulation", "skinning", "newton-1"):
+            made = find_method(method).make(models=None, seed=0)
+            made.prepare(scene)
+            group.roll_outs.append(RollOut(group, find_method(method), made.run(), suites=("validation",)))
+        for roll_out in group.roll_outs:
+            found, _, ended = measured(roll_out, find_scene(name).metrics)
+            assert ended == ("ok", "") and not any(metric.startswith("cost/") for metric in found)
+            value |= {(name, roll_out.entry.name, metric): number for metric, number in found.items()}
+    for name in SCENES:
+        assert abs(value[name, "simulation", "mesh/vertices"] - 200) < 40
+        assert value[name, "newton-1", "curvature/error"] > 0
+        assert (name, "simulation", "curvature/error") not in value
+        assert (name, "skinning", "mesh/vertices") not in value
     # Skinning knows no time step; the simulation does.
     for metric in ("energy/strain", "energy/inertia", "curvature/mean"):
-        here, there = (value["dependence/" + v, "skinning", metric] for v in ("mesh/200", "dt/60"))
+        here, there = (value[name, "skinning", metric] for name in SCENES)
         assert here == there
-    own = [value["dependence/" + v, "simulation", "energy/strain"] for v in ("mesh/200", "dt/60")]
+    own = [value[name, "simulation", "energy/strain"] for name in SCENES]
     assert own[0] != own[1]
-    table = study_tables.dependence(rows)
-    assert len(table.rows) == 6 and {line[0][-6:] for line in table.rows} == {"1/30 s", "1/60 s"}
 
 
-def test_a_mesh_that_fails_is_a_row(tmp_path, monkeypatch):
+def test_time_steps_of_a_frame_are_taken_from_the_scene(assets, monkeypatch):
+    taken, scene = [], built("dependence/dt/60", assets)
+    scene = dataclasses.replace(scene, settle=lambda: np.zeros_like(scene.cloth.rest_positions))
     monkeypatch.setattr(
-        workers, "run_jobs", lambda jobs, *_, **__: [workers.Failure(j.label, "x") for j in jobs]
+        "benchmarks.methods.simulation.simulate", lambda *_, substeps, **__: taken.append(substeps)
     )
-    rows = dependence.rows(plan_of(tmp_path), RunFolder(tmp_path), None)
-    assert [row.status for row in rows] == ["failed"] * 2
-    assert {row.scene for row in rows} == {"dependence/mesh/200", "dependence/mesh/300"}
+    for method in ("simulation", "newton-1", "simulation-dt/4"):
+        made = find_method(method).make(models=None, seed=0)
+        made.prepare(scene)
+    assert taken == [2, 2, 8]  # so many for each of those that a method takes by itself
 
 
-def test_an_own_body_is_the_one_that_is_measured(tmp_path, monkeypatch):
-    asked, opened = [], []
-    monkeypatch.setattr(workers, "run_jobs", lambda jobs, *_, **__: asked.extend(jobs) or [[] for _ in jobs])
+def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
+    class Tailor:
+        def tailor(self, body, *, vertices):
+            raise ValueError(f"{vertices} vertices on a body of {len(body.template)}")
 
-    def opening(*_, body, **__):
-        opened.append(body)
-        raise ValueError("no such body")
+    monkeypatch.setattr(module, "find_template", lambda name: Tailor())
+    mine = dataclasses.replace(assets.body, template=np.zeros((7, 3)))
+    with pytest.raises(ValueError, match="200 vertices on a body of 7"):
+        built("dependence/dt/60", dataclasses.replace(assets, body=mine))
 
-    monkeypatch.setattr("benchmarks.wardrobe.open_wardrobe", opening)
-    own = OwnBody(tmp_path / "mine.npz", "0")
-    dependence.rows(plan_of(tmp_path, body=own), RunFolder(tmp_path), None)
-    for job in asked:
-        with pytest.raises(ValueError, match="no such body"):
-            job.function(None, lambda _: None, *job.arguments)
-    with pytest.raises(ValueError, match="no such body"):
-        hard_motions.rows(plan_of(tmp_path, body=own), RunFolder(tmp_path), None)
-    assert opened == [own.path] * 3
+
+@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
+def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
+    found, _ = choose(Request(suites=("validation",), preset=preset, motions=Motions()))
+    sizes = preset.dependence
+    assert {cell.scene.name for cell in found} == {
+        *(f"dependence/mesh/{count}" for count in sizes.meshes),
+        *(f"dependence/dt/{30 * count}" for count in sizes.substeps[1:]),
+    }
+    assert {cell.method for cell in found} == {"simulation", "skinning", "newton-1"}
+    assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
+
+
+def test_no_network_meets_a_garment_that_it_was_not_trained_for():
+    scene = find_scene("dependence/mesh/500")
+    assert not any(entry.meant_for(scene) for entry in METHODS if entry.trained)
+    assert all(entry.meant_for(scene) for entry in METHODS if not entry.trained)

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
-from benchmarks.methods.networks import model_path
 from dressing import swaying, tube_dress
 
+from benchmarks.assets import Assets
+from benchmarks.plan import Motions, Plan
+from benchmarks.presets import find_preset
 from benchmarks.results import RunFolder
-from benchmarks.studies.training_windows import _loss, both_losses, rows
+from benchmarks.schedule import tasks_of
+from benchmarks.selection import Request, choose
+from benchmarks.tasks.task import Context, Outcome
+from benchmarks.tasks.training import TrainNetwork
+from benchmarks.tasks.training_windows import CompareWindows, _loss, both_losses
 from snug.recipe import DEFAULT
 from snug.skinning import skin
 from snug.train import train, untrained_model
 from snug.trainer import Trainer
 
+SMOKE = find_preset("smoke")
 MOTIONS = [swaying(30), swaying(24, name="slow", degrees=10.0)]
 
 
@@ -50,12 +55,24 @@ def test_windows_that_remember_the_one_before_go_on_as_a_roll_out_but_for_their_
     assert both_losses(model, tube_dress(), MOTIONS)[0] != pytest.approx(roll_out, rel=1e-3)
 
 
-def test_a_run_without_a_network_has_no_windows_to_look_at():
-    def named(names):
-        raise KeyError(names[0])  # the motions of training are loaded for networks alone
+def test_a_run_without_a_network_has_no_windows_to_look_at(tmp_path):
+    def kinds(**words):
+        suites = words.pop("suites", ("garments",))
+        motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
+        cells, _ = choose(Request(suites=suites, preset=SMOKE, motions=motions, **words))
+        plan = Plan(
+            preset=SMOKE, suites=suites, cells=cells, cases=(), motions=motions, seeds=(0,), device="cpu",
+            folder=tmp_path, command="",
+        )  # fmt: skip
+        tasks = tasks_of(plan)
+        assert not any(task.process for task in tasks if task.kind == "windows")
+        return [task.name for task in tasks if task.kind == "windows"]
 
-    wardrobe = SimpleNamespace(body=None, garment=None, named=named)
-    assert rows(SimpleNamespace(models=(), train=("walk",)), RunFolder(Path()), wardrobe) == []
+    assert kinds() == [f"tshirt/{name}-seed0" for name in ("snug", "supervised", "pbns")]
+    assert kinds(methods=("simulation",)) == kinds(methods=("untrained",)) == []
+    assert kinds(suites=("speed",)) == []
+    assert kinds(methods=("snug+cleanup",), seeds=(3,)) == ["tshirt/snug-seed3"]
+    assert kinds(scenes=("skirt/*",)) == []  # windows of one garment are enough
 
 
 def test_what_was_judged_before_leaves_no_trace(monkeypatch):
@@ -69,55 +86,60 @@ def test_what_was_judged_before_leaves_no_trace(monkeypatch):
     assert np.isnan(_loss(trainer, batch, torch.nan * x))
 
 
-def test_rows_are_those_of_networks_that_energies_taught(tmp_path):
+def done(tmp_path, motions, name, model, seed=0):
+    """The rows of a network in the folder of a run, and their task."""
     dressed, folder = tube_dress(), RunFolder(tmp_path)
+    training = TrainNetwork(
+        name=f"tshirt/{name}-seed{seed}", label=name, inputs={}, modules=(), training=name, seed=seed,
+        garment="tshirt", steps=1, motions=tuple(m.name for m in motions), simulated={}, device="cpu", key="",
+    )  # fmt: skip
+    model.save(training.path(folder))
+    known = {motion.name: motion for motion in motions}
+    context = Context(folder, Assets(dressed.body, {"tshirt": dressed.garment}, known, {}))
+    task = CompareWindows(
+        name=training.name, label=name, inputs={}, modules=("x",), needs=(training.id,), training=training
+    )
+    return task.rows(task.run(context, {})), task
+
+
+def test_rows_are_those_of_networks_that_energies_taught(tmp_path):
+    dressed = tube_dress()
     model = train("snug", dressed, MOTIONS, steps=3, seed=1, progress=False)
     model.summary["high_windows"] = 2
-    model.save(model_path(folder.models, "snug", 1))
-    train("pbns", dressed, MOTIONS, steps=2, seed=0, progress=False).save(
-        model_path(folder.models, "pbns", 0)
-    )
-    untrained_model("snug", dressed, MOTIONS, seed=0).save(model_path(folder.models, "untrained", 0))
-    models = (("snug", 1), ("snug", 2), ("pbns", 0), ("untrained", 0))
-    wardrobe = SimpleNamespace(body=dressed.body, garment=dressed.garment, named=lambda names: MOTIONS)
-    found = rows(SimpleNamespace(models=models, train=("sway", "slow")), folder, wardrobe)
-    assert {(row.method, row.seed) for row in found} == {("snug", 1)}
+    found, task = done(tmp_path, MOTIONS, "snug", model, seed=1)
+    assert {(row.suite, row.scene, row.method, row.seed) for row in found} == {
+        ("garments", "training", "snug", 1)
+    }
+    assert {(row.role, row.dtype, row.garment) for row in found} == {("network", "float32", "tshirt")}
     values = {row.metric: row.value for row in found}
     assert set(values) == {"train/window", "train/roll_out", "train/high_windows", "train/step"}
     assert values["train/roll_out"] > 0.0 and values["train/high_windows"] == 2.0
+    (row,) = task.rows(Outcome("failed", "why", failed=True))
+    assert (row.status, row.reason, row.value) == ("failed", "why", None)
+    static = train("pbns", dressed, MOTIONS, steps=2, seed=0, progress=False)
+    assert done(tmp_path, MOTIONS, "pbns", static)[0] == []
+    assert done(tmp_path, MOTIONS, "snug", untrained_model("snug", dressed, MOTIONS, seed=0))[0] == []
 
 
 def test_a_network_that_is_not_finite_has_diverged(tmp_path):
-    dressed, folder = tube_dress(), RunFolder(tmp_path)
-    model = train("snug", dressed, MOTIONS, steps=1, seed=0, progress=False)
+    model = train("snug", tube_dress(), MOTIONS, steps=1, seed=0, progress=False)
     with torch.no_grad():
         model.network.offsets.bias.fill_(torch.nan)
-    model.save(model_path(folder.models, "snug", 0))
-    wardrobe = SimpleNamespace(body=dressed.body, garment=dressed.garment, named=lambda names: MOTIONS)
-    found = rows(SimpleNamespace(models=(("snug", 0),), train=("sway", "slow")), folder, wardrobe)
+    found, _ = done(tmp_path, MOTIONS, "snug", model)
     states = {row.metric: (row.status, row.value) for row in found}
     assert states["train/window"] == states["train/roll_out"] == ("diverged", None)
     assert states["train/step"][0] == "ok" and all(row.passed or row.reason for row in found)
 
 
 def test_a_network_whose_windows_are_longer_than_every_motion_costs_no_other(tmp_path):
-    dressed, folder = tube_dress(), RunFolder(tmp_path)
-    for seed, window in ((0, 24), (1, 3)):
-        recipe = replace(DEFAULT, window=window, batch=2, mixed=0.0)
-        model = train("snug", dressed, MOTIONS, steps=1, seed=seed, recipe=recipe, progress=False)
-        model.save(model_path(folder.models, "snug", seed))
-    short = [swaying(12)]
-    wardrobe = SimpleNamespace(body=dressed.body, garment=dressed.garment, named=lambda names: short)
-    found = rows(SimpleNamespace(models=(("snug", 0), ("snug", 1)), train=("sway",)), folder, wardrobe)
-    assert {(row.seed, row.status) for row in found} == {(0, "skipped"), (1, "ok")}
-    assert "24 frames" in next(row.reason for row in found if row.seed == 0)
+    recipe = replace(DEFAULT, window=24, batch=2, mixed=0.0)
+    model = train("snug", tube_dress(), MOTIONS, steps=1, seed=0, recipe=recipe, progress=False)
+    (row,), _ = done(tmp_path, [swaying(12)], "snug", model)
+    assert row.status == "skipped" and "24 frames" in row.reason
 
 
 def test_high_windows_are_counted_where_high_means_the_same(tmp_path):
-    dressed, folder = tube_dress(), RunFolder(tmp_path)
     recipe = replace(DEFAULT, spike=9.0, mixed=0.0)
-    model = train("snug", dressed, MOTIONS, steps=1, seed=0, recipe=recipe, progress=False)
-    model.save(model_path(folder.models, "snug", 0))
-    wardrobe = SimpleNamespace(body=dressed.body, garment=dressed.garment, named=lambda names: MOTIONS)
-    found = rows(SimpleNamespace(models=(("snug", 0),), train=("sway", "slow")), folder, wardrobe)
+    model = train("snug", tube_dress(), MOTIONS, steps=1, seed=0, recipe=recipe, progress=False)
+    found, _ = done(tmp_path, MOTIONS, "snug", model)
     assert {row.metric for row in found} == {"train/window", "train/roll_out", "train/step"}

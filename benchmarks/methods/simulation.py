@@ -44,7 +44,7 @@ class Simulation(Method):
             velocity=scene.start_velocity,
             pin_positions=scene.pin_positions,
             progress=progress,
-            **{"substeps": scene.substeps} | self.options,
+            **self.options | {"substeps": scene.substeps * self.options.get("substeps", 1)},
         )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..presets import PRESETS
 from ..scene import Scene
-from .further import OUT_OF_DISTRIBUTION, dependence, there_and_back
+from .further import OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
 
 SHEET = ("sheet_cells", "sheet_frames")
 
@@ -44,7 +44,7 @@ SCENES = (
         sizes=SHEET,
     ),
     *OUT_OF_DISTRIBUTION,
-    *{scene.name: scene for preset in PRESETS for scene in dependence(preset.dependence)}.values(),
+    *{scene.name: scene for preset in PRESETS for scene in meshes_and_steps(preset.dependence)}.values(),
 )
 
 

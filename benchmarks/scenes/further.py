@@ -79,7 +79,7 @@ SMALL = (ORDINARY, "out_of_distribution/walk_x4", "out_of_distribution/long")  #
 FRAME_RATE = 30
 
 
-def dependence(sizes: Dependence) -> list[Scene]:
+def meshes_and_steps(sizes: Dependence) -> list[Scene]:
     """The T-shirt on several meshes at one step a frame, and on the middle one at several."""
     meshes = [
         _dependence(f"mesh/{count}", f"the walk by a T-shirt of about {count} vertices", vertices=count)
