@@ -124,6 +124,13 @@ def test_the_example_of_an_energy_runs_as_written(extended):
     commands(extended, "An energy")
 
 
+def test_lines_to_insert_are_no_python_of_their_own():
+    """ruff formats Python in documents: it would make a tuple of a line that belongs into one."""
+    for section in SECTIONS.values():
+        for before, language, content in blocks(section):
+            assert not INSERTION.search(before) or language == "text", content
+
+
 def test_every_example_is_tested():
     examples = {title for title, text in SECTIONS.items() if "```" in text}
     assert examples == {*RUNS, "An energy"}
