@@ -103,6 +103,9 @@ def test_an_example_of_extending_runs_as_written(title, extended, tmp_path):
     assert rows and all(row["status"] == "ok" for row in rows)
     if title == "A scene":
         assert {row["scene"] for row in rows} == {"curtain"}
+        # The section on energies gives the curtain its wind, which does work on it.
+        wind = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/wind"}
+        assert wind.keys() == {"simulation", "newton-1"} and max(wind.values()) < 0.0
     if title == "A method":
         total = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/total"}
         # In n frames backward Euler falls (n + 1) / n times as far.
@@ -119,6 +122,13 @@ def test_an_example_of_extending_runs_as_written(title, extended, tmp_path):
 
 def test_the_example_of_an_energy_runs_as_written(extended):
     commands(extended, "An energy")
+
+
+def test_lines_to_insert_are_no_python_of_their_own():
+    """ruff formats Python in documents: it would make a tuple of a line that belongs into one."""
+    for section in SECTIONS.values():
+        for before, language, content in blocks(section):
+            assert not INSERTION.search(before) or language == "text", content
 
 
 def test_every_example_is_tested():
