@@ -48,7 +48,7 @@ METRICS = (
     ),
     Metric(
         name="gap/energy", unit="J", title="Energy gap", table="speed", lower_is_better=True,
-        definition="the same in joules, mean over sampled frames",
+        definition="the same in joules, mean over sampled frames; a wrong past does not show in either",
     ),
     Metric(
         name="gap/local", unit="1", title="Local gap", lower_is_better=True,
