@@ -90,6 +90,9 @@ def test_presets_grow():
     assert choose_suites([]) == choose_suites(["all"])
 
 
+TRAININGS = {"snug", "snug.recipe", "snug.recipe_deviations"}
+
+
 def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
     out = tmp_path / "run"
     words = ["--preset", "smoke", "--scenes", "hanging_sheet", "--methods", "simulation,newton-1"]
@@ -100,7 +103,7 @@ def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(t
         loaded = set(record["outcome"]["result"]["modules"])  # by the process of the cell
         assert "reference_sim.energies.stretch_stvk" in loaded  # the list is not empty by mistake
         # Names of trainings stand in the list of methods.
-        assert {name for name in loaded if name.startswith("snug")} <= {"snug", "snug.recipe"}
+        assert {name for name in loaded if name.startswith("snug")} <= TRAININGS
         for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
             assert name not in loaded, f"{name} was loaded"
     text = (out / "results.csv").read_text()
