@@ -9,7 +9,7 @@ from .methods import METHODS
 from .performance.microbenchmark import SUITE
 from .performance.registry import MICROBENCHMARKS
 from .presets import PRESETS, find_preset
-from .scenes import GARMENT_SCENES, SCENES
+from .scenes import FURTHER, GARMENT_SCENES, SCENES
 from .selection import default_suites
 from .suites import SUITES
 from .validation.registry import CASES
@@ -28,7 +28,11 @@ def listing() -> str:
         ("suites", ((s.name, s.description) for s in SUITES)),
         (
             f"scenes; of a dressed body also its liveliest part, as {dressed[0][0]}@clip",
-            [*((s.name, s.description) for s in SCENES), *dressed],
+            [
+                *((s.name, s.description) for s in SCENES),
+                *dressed,
+                *((s.name, s.description) for s in FURTHER),
+            ],
         ),
         (
             "methods, and the suites in which they take part without being named",

@@ -84,7 +84,7 @@ def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
 
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
 def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
-    found, _ = choose(Request(suites=("validation",), preset=preset, motions=Motions()))
+    found = choose(Request(suites=("validation",), preset=preset, motions=Motions()))[0]
     sizes = preset.dependence
     assert {cell.scene.name for cell in found} == {
         *(f"dependence/mesh/{count}" for count in sizes.meshes),

@@ -212,7 +212,7 @@ def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_
         entry = find_method(method)
         group.roll_outs.append(RollOut(group, entry, trajectory, status=status, suites=("speed",)))
     with np.errstate(all="ignore"):
-        found, curves = zip(*(measured(roll_out) for roll_out in group.roll_outs))
+        found, curves, _ = zip(*(measured(roll_out) for roll_out in group.roll_outs))
     found, curves = dict(zip(lost, found)), dict(zip(lost, curves))
     assert np.isfinite(list(found["simulation"].values())).all() and found["newton-4"] == {}
     assert found["newton-1"]["distance/rms"] == 0.0 and np.isfinite(found["newton-1"]["gap/energy"])

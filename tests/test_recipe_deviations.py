@@ -42,7 +42,7 @@ def test_every_deviation_has_its_line_and_changes_nothing_else():
 def chosen(*methods, **changes):
     words = {"suites": ("garments", "extremes"), "preset": find_preset("paper")} | changes
     motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
-    cells, _ = choose(Request(motions=motions, methods=methods, **words))
+    cells = choose(Request(motions=motions, methods=methods, **words))[0]
     return {cell.method for cell in cells}
 
 

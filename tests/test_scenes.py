@@ -17,7 +17,7 @@ from benchmarks.methods import find_method
 from benchmarks.plan import network_of
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.run import main
-from benchmarks.scenes import SCENES, all_scenes
+from benchmarks.scenes import FURTHER, SCENES, all_scenes
 from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
@@ -49,7 +49,9 @@ def test_the_terms_are_those_of_the_descriptions():
 
 def test_scene_names_are_unique_and_a_dressed_scene_needs_assets():
     scenes = all_scenes(["walk", "run"], ["twist_stop"])
-    assert len(scenes) == len(SCENES) + 2 * 3 + 2 * 2  # each motion whole and as a clip
+    assert (
+        len(scenes) == len(SCENES) + 2 * 3 + 2 * 2 + len(FURTHER) + 1
+    )  # each motion whole, as a clip; one long
     assert scenes["tshirt/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
     assert scenes["tshirt/walk"].dressed and not scenes["flag"].dressed
     with pytest.raises(ValueError, match="needs assets"):
@@ -88,6 +90,9 @@ def test_presets_grow():
     assert choose_suites([]) == choose_suites(["all"])
 
 
+TRAININGS = {"snug", "snug.recipe", "snug.recipe_deviations"}
+
+
 def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
     out = tmp_path / "run"
     words = ["--preset", "smoke", "--scenes", "hanging_sheet", "--methods", "simulation,newton-1"]
@@ -98,7 +103,7 @@ def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(t
         loaded = set(record["outcome"]["result"]["modules"])  # by the process of the cell
         assert "reference_sim.energies.stretch_stvk" in loaded  # the list is not empty by mistake
         # Names of trainings stand in the list of methods.
-        assert {name for name in loaded if name.startswith("snug")} <= {"snug", "snug.recipe"}
+        assert {name for name in loaded if name.startswith("snug")} <= TRAININGS
         for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
             assert name not in loaded, f"{name} was loaded"
     text = (out / "results.csv").read_text()

@@ -10,7 +10,7 @@ import pytest
 from benchmarks import source
 from benchmarks.methods import METHODS
 from benchmarks.metrics import MODULES
-from benchmarks.scenes import SCENES
+from benchmarks.scenes import FURTHER, SCENES
 from benchmarks.source import code_of, data_of, digest, packages_of
 
 FILES = {
@@ -146,7 +146,7 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
         "selection.py", "suites.py", "plan.py", "schedule.py", "validation/registry.py",
     )}  # fmt: skip
     modules = [f"benchmarks.tasks.{name}" for name in ("cell", "ground_truth", "training", "case")]
-    modules += [entry.module for entry in (*SCENES, *METHODS)]
+    modules += [entry.module for entry in (*SCENES, *FURTHER, *METHODS)]
     modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets"]
     modules += [f"benchmarks.metrics.{name}" for name in MODULES]
     assert {name: found for name in modules if (found := lists & set(code_of(name)))} == {}

@@ -59,7 +59,7 @@ def test_a_run_without_a_network_has_no_windows_to_look_at(tmp_path):
     def kinds(**words):
         suites = words.pop("suites", ("garments",))
         motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
-        cells, _ = choose(Request(suites=suites, preset=SMOKE, motions=motions, **words))
+        cells = choose(Request(suites=suites, preset=SMOKE, motions=motions, **words))[0]
         plan = Plan(
             preset=SMOKE, suites=suites, cells=cells, cases=(), motions=motions, seeds=(0,), device="cpu",
             folder=tmp_path, command="",

@@ -1,4 +1,4 @@
-"""The visible tuple of scenes: one line each. Nothing is imported until a scene is built."""
+"""The visible tuples of scenes: one line each. Nothing is imported until a scene is built."""
 
 from __future__ import annotations
 
@@ -43,6 +43,8 @@ SCENES = (
         module="benchmarks.scenes.free_fall",
         sizes=SHEET,
     ),
+)
+FURTHER = (
     *OUT_OF_DISTRIBUTION,
     *{scene.name: scene for preset in PRESETS for scene in meshes_and_steps(preset.dependence)}.values(),
 )
@@ -50,7 +52,7 @@ SCENES = (
 
 def find_scene(name: str) -> Scene:
     """The scene of that name, of those that hang on no motion of the run. Raises KeyError."""
-    return {scene.name: scene for scene in SCENES}[name]
+    return {scene.name: scene for scene in (*SCENES, *FURTHER)}[name]
 
 
 @dataclass(frozen=True)
@@ -104,4 +106,4 @@ def all_scenes(motions: Iterable[str], dynamic_motions: Iterable[str]) -> dict[s
         for motion in chosen[scenes.dynamic]
         for part in ("whole", "clip")
     ]
-    return {scene.name: scene for scene in (*SCENES, *dressed, *long)}
+    return {scene.name: scene for scene in (*SCENES, *dressed, *long, *FURTHER)}
