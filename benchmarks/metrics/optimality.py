@@ -43,8 +43,8 @@ ALIKE = 1e-9  # of the denominator: minima this near are one
 METRICS = (
     Metric(
         name="gap/relative", unit="1", title="Energy gap", table="speed", lower_is_better=True,
-        definition="how far frames lie above the minimum of their own time step, as a share of what skinning, "
-        "or the first guess, lies above it",
+        definition="how far frames lie above the minimum of their own time step, as a share of what "
+        "skinning, or the first guess, lies above it",
     ),
     Metric(
         name="gap/energy", unit="J", title="Energy gap", table="speed", lower_is_better=True,
