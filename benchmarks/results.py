@@ -140,6 +140,11 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def model_path(models: Path, kind: str, seed: int) -> Path:
+    """Where the model of that kind and seed lies."""
+    return models / f"{kind}-seed{seed}.safetensors"
+
+
 class RunFolder:
     """The files of one run under `path`. Making the object creates nothing."""
 

@@ -9,9 +9,8 @@ from tasks_by_hand import assets_of, context, training
 
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
-from benchmarks.methods.network import model_path
 from benchmarks.presets import PRESETS, find_preset
-from benchmarks.results import RunFolder
+from benchmarks.results import RunFolder, model_path
 from benchmarks.run import make_parser, make_plan
 from benchmarks.suites import SUITES
 from snug.recipe import ABLATIONS, RECIPES, TERMS, TRAININGS

@@ -11,10 +11,10 @@ from dressing import swaying, tube_dress
 
 from benchmarks.assets import Assets
 from benchmarks.methods import find_method
-from benchmarks.methods.network import model_path
 from benchmarks.metric import RollOut, SceneRollOuts, skinned
 from benchmarks.metrics import roll_out as metric
 from benchmarks.metrics.roll_out import cloth_energy
+from benchmarks.results import model_path
 from benchmarks.scenes import find_scene, long_motion
 from benchmarks.scenes.further import there_and_back
 from benchmarks.scenes.long_motion import ENDS, EVERY, FRAMES, LOOP_BLEND

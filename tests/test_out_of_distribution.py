@@ -10,12 +10,11 @@ import pytest
 
 from benchmarks.assets import Assets
 from benchmarks.methods import METHODS, find_method
-from benchmarks.methods.network import model_path
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import extrapolation
 from benchmarks.plan import Motions, Plan
 from benchmarks.presets import find_preset
-from benchmarks.results import RunFolder
+from benchmarks.results import RunFolder, model_path
 from benchmarks.rows import rows_of_cell
 from benchmarks.scenes import find_scene, out_of_distribution
 from benchmarks.scenes.further import ORDINARY, OUT_OF_DISTRIBUTION, SMALL

@@ -159,7 +159,7 @@ def test_cloth_is_painted_over_the_body_on_white(made, tmp_path):
 def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, capsys):
     run = RunFolder(tmp_path)
     run.write_rows(all_rows())
-    run.write_config({})
+    run.config_path.write_text("{}", encoding="utf-8")
     assert build.main([str(tmp_path)]) == 2
     assert "run the benchmark again" in capsys.readouterr().err
     run.write_config({"format": FORMAT})

@@ -10,8 +10,8 @@ import numpy as np
 from reference_sim import Trajectory
 
 from ..method import Method
+from ..results import model_path
 from ..scene import BuiltScene
-from .network import model_path
 
 WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
 

@@ -11,12 +11,8 @@ import numpy as np
 from reference_sim.trajectory import Trajectory
 
 from ..method import Method
+from ..results import model_path
 from ..scene import BuiltScene
-
-
-def model_path(models: Path, kind: str, seed: int) -> Path:
-    """Where the model of that kind and seed lies."""
-    return models / f"{kind}-seed{seed}.safetensors"
 
 
 @dataclass

@@ -19,8 +19,8 @@ from reference_sim import Potential, Trajectory
 from reference_sim.minimise import Minimiser, Result, make_minimiser
 
 from ..method import Method
+from ..results import model_path
 from ..scene import BuiltScene
-from .network import model_path
 from .simulation import Simulation
 
 SKINNING = "skinning"

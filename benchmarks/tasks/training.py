@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..methods.network import model_path
-from ..results import RunFolder
+from ..results import RunFolder, model_path
 from .task import Context, Outcome, Task, TaskId
 
 LOG_EVERY = 20  # training steps between two reports of progress
