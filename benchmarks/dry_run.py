@@ -5,8 +5,9 @@ from __future__ import annotations
 from .cache import STATES, Cache, Found
 from .plan import Plan, runs
 from .results import RunFolder
-from .runner import Runner
+from .runner import LEFT_OUT, Runner
 from .schedule import tasks_of
+from .tasks.task import Outcome
 
 
 def describe(plan: Plan) -> str:
@@ -15,14 +16,14 @@ def describe(plan: Plan) -> str:
     runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=only))
     lines, wanted, cached = _head(plan), list[Found](), 0
     stage = ""
-    for task, found, skip in runner.preview():
+    for task, found, outcome in runner.preview():
         if task.stage != stage:
             stage = task.stage
             lines.append(stage)
-        lines.append(f"  {task.title}: {_verdict(found, skip)}")
-        if not skip and found.wanted:
+        lines.append(f"  {task.title}: {_verdict(found, outcome)}")
+        if outcome is None:
             wanted.append(found)
-        cached += not skip and not found.wanted and found.outcome is not None
+        cached += outcome is not None and outcome is found.outcome
     known = [found.outcome.seconds for found in wanted if found.outcome and found.outcome.seconds]
     times = f", about {sum(known):.0f} s for the {len(known)} whose time is known" if known else ""
     return "\n".join([*lines, f"{len(wanted)} tasks to run{times}; {cached} cached"])
@@ -46,13 +47,11 @@ def _head(plan: Plan) -> list[str]:
     return [*lines, counts + more]
 
 
-def _verdict(found: Found, skip: str) -> str:
-    if skip:
-        return f"skip ({skip})"
+def _verdict(found: Found, outcome: Outcome | None) -> str:
     why = f" ({found.state}{': ' * bool(found.why)}{found.why})"
-    if found.wanted:
+    if outcome is None:
         took = f", {found.outcome.seconds:.1f} s last time" if found.outcome and found.outcome.seconds else ""
         return f"run{why}{took}"
-    if found.outcome is None:
-        return f"left out{why}"
-    return "cached" + (why if found.state != "finished" else "")
+    if outcome is found.outcome:
+        return "cached" + (why if found.state != "finished" else "")
+    return f"left out{why}" if outcome.reason == LEFT_OUT else f"skip ({outcome.reason})"

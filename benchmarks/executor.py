@@ -15,7 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any, Protocol
 
 from .assets import Assets
-from .process import IsolatedProcess, WorkerDied
+from .process import IsolatedProcess
 from .results import RunFolder
 from .tasks.task import Context, Outcome, Task, TaskId, failure, tell_nobody
 
@@ -56,22 +56,27 @@ class LocalExecutor:
         for worker in crew:
             idle.put(worker)
 
-        def done(batch: Sequence[Task], needed: Needed) -> list[Done]:
+        finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
+
+        def do(batch: Sequence[Task], needed: Needed) -> None:
             worker = idle.get()
             try:
-                return list(zip(batch, worker.do(batch, needed)))
+                for done in worker.do(batch, needed):
+                    finished.put(done)
             finally:
                 idle.put(worker)
 
         with ThreadPoolExecutor(max(count, 1)) as threads:  # one waits for each worker
-            left = {threads.submit(done, *batch) for batch in batches}
+            left = {threads.submit(do, *batch) for batch in batches}
             try:
                 while left:
                     ended, left = wait(left, timeout=POLL, return_when=FIRST_COMPLETED)
                     for worker in crew:
                         worker.report(bar)
                     for future in ended:
-                        yield from future.result()
+                        future.result()
+                    while not finished.empty():
+                        yield finished.get()
             except BaseException:
                 _end(left)
                 raise
@@ -83,7 +88,7 @@ class LocalExecutor:
         if process is None:
             context = Context(self.folder, task.assets(self.assets))
             process = self._named[task.process] = IsolatedProcess(_begin, context)
-        return _called(process, [task], needed)[0]
+        return _called(process, _perform, task, needed, seconds=task.deadline)
 
     def release(self, process: str) -> None:
         if process in self._named:
@@ -107,20 +112,25 @@ class _Worker:
         self.process = IsolatedProcess(_begin, self.context, self.progress)
         self.warm: set[tuple[str, str]] = set()
 
-    def do(self, batch: Sequence[Task], needed: Needed) -> list[Outcome]:
-        first = batch[0]
-        try:
-            if (first.kind, first.modules[0]) not in self.warm:
-                self.process.call(first.warm_up, seconds=COMPILING)
-                self.warm.add((first.kind, first.modules[0]))
+    def do(self, batch: Sequence[Task], needed: Needed) -> Iterator[Done]:
+        """The tasks one after another; what one leaves in the memo is there for the next."""
+        if self.process.alive:
             self.process.call(_forget, seconds=None)
-        except Exception as error:
-            self._renew()
-            return [failure(error) for _ in batch]
-        outcomes = _called(self.process, batch, needed)
-        if not self.process.alive:
-            self._renew()
-        return outcomes
+        for task in batch:
+            outcome = self._warm(task) or _called(
+                self.process, _perform, task, dict(needed), seconds=task.deadline
+            )
+            if not self.process.alive:
+                self._renew()
+            yield task, outcome
+
+    def _warm(self, task: Task) -> Outcome | None:
+        """What went wrong before the process could do its first task of this kind and module."""
+        if (task.kind, task.modules[0]) in self.warm:
+            return None
+        outcome = _called(self.process, task.warm_up, seconds=COMPILING)
+        self.warm.add((task.kind, task.modules[0]))
+        return outcome
 
     def report(self, bar: Any) -> None:
         """Hand on what the process has told."""
@@ -129,16 +139,13 @@ class _Worker:
             bar.update(min(progress.get(), bar.total - bar.n))
 
 
-def _called(process: IsolatedProcess, batch: Sequence[Task], needed: Needed) -> list[Outcome]:
-    """Outcomes of a batch in that process, which is ended at the deadline. Raises nothing but interrupts."""
+def _called(process: IsolatedProcess, function: Callable[..., Any], *arguments: Any, seconds: Any) -> Any:
+    """function(*arguments) in that process, which is ended at the deadline; what goes wrong is an outcome."""
     clock = time.perf_counter()
     try:
-        return process.call(_perform, batch, needed, seconds=batch[0].deadline)
-    except WorkerDied as death:
-        ended = Outcome(death.status, str(death), failed=True, seconds=time.perf_counter() - clock)
-        return [ended] * len(batch)
+        return process.call(function, *arguments, seconds=seconds)
     except Exception as error:
-        return [failure(error)] * len(batch)
+        return dataclasses.replace(failure(error), seconds=time.perf_counter() - clock)
 
 
 def _end(futures: set[Future[Any]]) -> None:
@@ -167,16 +174,10 @@ def _forget() -> None:
     _context.memo.clear()
 
 
-def _perform(batch: Sequence[Task], needed: Needed) -> list[Outcome]:
-    found: list[Outcome] = []
+def _perform(task: Task, needed: Needed) -> Outcome:
     clock = time.perf_counter()
     try:
-        for outcome in type(batch[0]).run_together(batch, _context, needed):
-            seconds = time.perf_counter() - clock
-            found.append(dataclasses.replace(outcome, seconds=seconds))
-            clock += seconds
+        outcome = task.run(_context, needed)
     except Exception as error:
-        seconds = time.perf_counter() - clock
-        lost = dataclasses.replace(failure(error), seconds=seconds)
-        found += [lost] * (len(batch) - len(found))
-    return found
+        outcome = failure(error)
+    return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)

@@ -68,7 +68,7 @@ class RollOut(Kept):
 
     Attributes:
         group: the roll-outs of the scene.
-        entry, seed: the method.
+        entry: the method.
         status: of its cell; suites: those that report it.
         trajectory: as the method gave it; positions: (T,V,3) [m] of it that are finite.
         quasi_static: (T,V,3) [m] its own answer to poses held still, or None.
@@ -81,14 +81,13 @@ class RollOut(Kept):
         entry: MethodEntry,
         trajectory: Trajectory,
         *,
-        seed: int = 0,
         status: str = "ok",
         suites: tuple[str, ...] = (),
         quasi_static: np.ndarray | None = None,
         counterpart: np.ndarray | None = None,
     ) -> None:
         super().__init__()
-        self.group, self.entry, self.seed = group, entry, seed
+        self.group, self.entry = group, entry
         self.status, self.suites, self.trajectory = status, suites, trajectory
         self.quasi_static, self.counterpart = quasi_static, counterpart
         self.positions = finite_frames(trajectory.positions)

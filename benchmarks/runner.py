@@ -5,6 +5,7 @@ Dry run, resume, failures, what an interrupt leaves and exclusive timing are dec
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from itertools import groupby
@@ -12,7 +13,7 @@ from typing import Any, Protocol
 
 from .cache import Cache, Found
 from .executor import Executor
-from .tasks.task import Outcome, Task, TaskId
+from .tasks.task import Outcome, Task, TaskId, failure
 
 BLOCKED = "blocked"  # in the result of a task whose needs had failed
 LEFT_OUT = "not asked for: --only names other states"
@@ -99,26 +100,30 @@ class Runner:
         """Whether the task is to be run now; where not, its outcome is known."""
         if task.id in self.outcomes:
             return False
-        needed = self._needed(task)
-        lacking = next((id for id in task.needs if id not in needed), None)
-        if lacking is None and (reason := task.skip(needed)):
-            self.outcomes[task.id] = Outcome("skipped", reason)
-            return False
-        found = self.cache.find(task, self.found)
-        freed = lacking is None and found.outcome is not None and BLOCKED in found.outcome.result
-        if (found.wanted or freed) and lacking is None:
+        outcome, found = self._verdict(task)
+        if outcome is None:
             return True
-        if found.wanted and lacking is not None:
-            outcome = self._blocked(lacking)
-            if outcome.failed:
-                self._keep(task, outcome)
-            self.outcomes[task.id] = outcome
-        elif found.outcome is None:
-            self.outcomes[task.id] = Outcome("skipped", LEFT_OUT)
-        else:
-            self.found[task.id], self.outcomes[task.id] = found, found.outcome
+        self.outcomes[task.id] = outcome
+        if outcome is found.outcome:
+            self.found[task.id] = found
             self.reused.append(task.title)
+        elif outcome.failed:
+            self._keep(task, outcome)
         return False
+
+    def _verdict(self, task: Task) -> tuple[Outcome | None, Found]:
+        """The outcome that it has without being run, None where it is to be run; what the folder holds."""
+        needed = self._needed(task)
+        if reason := task.skip(needed):
+            return Outcome("skipped", reason), Found("missing", wanted=False)
+        found = self.cache.find(task, self.found)
+        lacking = next((id for id in task.needs if id not in needed), None)
+        if lacking is not None and found.wanted:
+            return self._blocked(lacking), found
+        freed = lacking is None and found.outcome is not None and BLOCKED in found.outcome.result
+        if found.wanted or freed:
+            return None, found
+        return found.outcome or Outcome("skipped", LEFT_OUT), found
 
     def _blocked(self, lacking: TaskId) -> Outcome:
         """Of a task that cannot be run. It is done as soon as nothing blocks it, whatever --only says."""
@@ -137,20 +142,25 @@ class Runner:
         return {id: o for id, o in known.items() if not (o.failed or o.remark or o.status == "skipped")}
 
     def _keep(self, task: Task, outcome: Outcome) -> None:
-        self.found[task.id] = self.cache.keep(task, outcome, self.found)
+        try:
+            self.found[task.id] = self.cache.keep(task, outcome, self.found)
+        except (TypeError, ValueError, OSError) as error:  # a result that is no plain value, a file not there
+            outcome = failure(error)
+            self.found[task.id] = self.cache.keep(task, outcome, self.found)
         self.outcomes[task.id] = outcome
 
     # --- without running -----------------------------------------------------------------------------------
 
-    def preview(self) -> Iterator[tuple[Task, Found, str]]:
-        """Of each task what the folder holds of it, and why it would be skipped, or empty. Writes nothing."""
+    def preview(self) -> Iterator[tuple[Task, Found, Outcome | None]]:
+        """Of each task what the folder holds of it, and the outcome that it would have without being run.
+
+        What would be run is taken to succeed. Writes nothing.
+        """
         for task in self.tasks:
-            found = self.found[task.id] = self.cache.find(task, self.found)
-            if found.outcome is not None and found.state != "stale":
-                self.outcomes[task.id] = found.outcome
-            needed = self._needed(task)
-            ready = all(id in needed for id in task.needs)
-            yield task, found, task.skip(needed) if ready else ""
+            outcome, found = self._verdict(task)
+            self.outcomes[task.id] = outcome or Outcome()
+            self.found[task.id] = dataclasses.replace(found, wanted=True) if outcome is None else found
+            yield task, found, outcome
 
     def known(self) -> dict[TaskId, Outcome]:
         """The outcomes so far, and of tasks that were not reached those that the folder holds up to date."""

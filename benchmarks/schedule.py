@@ -159,12 +159,9 @@ class Schedule:
 
     def metrics(self, cell: Cell) -> MeasureCell:
         scene, plan = cell.scene, self.plan
-        compared = tuple(
-            (place, other)
-            for place, other in enumerate(plan.cells)
-            if other.scene == scene and other.entry.role in ("reference", "reference-variant") and runs(other)
-        )
-        reads = tuple(("cell", other.name) for _, other in compared if other != cell)
+        cells = tuple(other for other in plan.cells if other.scene == scene and runs(other))
+        compared = (other for other in cells if other.entry.role in ("reference", "reference-variant"))
+        reads = tuple(("cell", other.name) for other in compared if other != cell)
         quasi_static, counterpart = None, None
         if scene.dynamic:
             quasi_static = self.quasi_static(scene).id
@@ -184,8 +181,8 @@ class Schedule:
         if scene.dressed:
             inputs["recipe"] = dataclasses.asdict(DEFAULT)  # of the skinning that gaps are a share of
         return MeasureCell(
-            name=cell.name, label=cell.label, cell=cell, place=plan.cells.index(cell),
-            compared=compared, gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
+            name=cell.name, label=cell.label, cell=cell, cells=cells,
+            gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
             counterpart=counterpart, needs=(("cell", cell.name),), reads=reads, batch=scene.name,
             **of_scene | {"inputs": of_scene["inputs"] | inputs},
         )  # fmt: skip

@@ -52,5 +52,9 @@ def find_metric(name: str) -> Metric:
     if name in metrics:
         return metrics[name]
     family, _, last = name.rpartition("/")
-    metric = metrics[f"{family}/*"]
+    metric = metrics.get(f"{family}/*")
+    if metric is None:
+        raise KeyError(
+            f"no module of benchmarks.metrics declares {name}: name it in METRICS of the one that measures it"
+        )
     return replace(metric, name=name, title=metric.title.format(last.replace("_", " ").capitalize()))

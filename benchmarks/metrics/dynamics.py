@@ -40,9 +40,10 @@ def measure(roll_out: RollOut) -> dict[str, float]:
         own = roll_out.group.quasi_static
     found = {}
     if own is not None:
-        found["dynamics/quasi_static_difference"] = rms(x, own[: len(x)])
+        frames = min(len(x), len(own))
+        found["dynamics/quasi_static_difference"] = rms(x[:frames], own[:frames])
     hem = roll_out.group.kept(hem_motion)
-    if hem is not None and (own is None or np.isfinite(own).all()):
+    if hem is not None and (own is None or (len(own) >= len(x) and np.isfinite(own).all())):
         found |= hem.measure(x, own)
     return found
 

@@ -103,14 +103,20 @@ class SimulateQuasiStatic(Task):
     scene: Scene
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        import numpy as np
+
         from reference_sim import simulate
 
         scene = built(self.scene, context)
         path = context.folder.quasi_static_path(scene.name, "simulation")
         path.parent.mkdir(parents=True, exist_ok=True)
-        simulate(
+        trajectory = simulate(
             scene.cloth, scene.energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,
             start=scene.start, quasi_static=True, tolerance=TOLERANCE, pin_positions=scene.pin_positions,
-        ).save(path)  # fmt: skip
+        )  # fmt: skip
         context.tell(self.units)
+        if trajectory.frames < scene.frames or not np.isfinite(trajectory.positions).all():
+            reason = f"ended after {trajectory.frames} of {scene.frames} frames: {trajectory.reason}"
+            return Outcome("diverged", reason, failed=True)
+        trajectory.save(path)
         return Outcome(files=(context.folder.relative(path),))

@@ -1,15 +1,17 @@
-"""Metrics of finished cells, from their files: a new metric needs no new run."""
+"""Metrics of finished cells, from their files: a new metric runs no cell again."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from reference_sim.trajectory import Trajectory, replace_frame_fields
+
 from ..metric import RollOut, SceneRollOuts
-from ..metrics import modules, names_of
+from ..metrics import find_metric, modules, names_of
 from .cell import Cell, built
 from .task import Context, Outcome, Task, TaskId
 
@@ -18,7 +20,7 @@ from .task import Context, Outcome, Task, TaskId
 class MeasureCell(Task):
     """What is measured of a cell's trajectory, beside those of the reference and its variants.
 
-    compared: all cells that it may be compared with, in the order in which their roll-outs are measured;
+    cells: all of the scene, in the order of their roll-outs; those that `reads` names are compared with.
     quasi_static: the simulator's answer to poses held still; counterpart: the same method in another scene.
     """
 
@@ -26,39 +28,40 @@ class MeasureCell(Task):
     stage = "metrics"
     unit = "cell"
     cell: Cell
-    place: int
-    compared: tuple[tuple[int, Cell], ...]
+    cells: tuple[Cell, ...]
     gap_samples: int
     quasi_static: TaskId | None = None
     counterpart: Cell | None = None
 
-    @classmethod
-    def run_together(
-        cls, tasks: Sequence[Task], context: Context, needed: Mapping[TaskId, Outcome]
-    ) -> Iterator[Outcome]:
-        """The cells of one scene beside each other: they share search trees, and the energies of references.
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """The energies of each frame, and other curves, are added to the trajectory file."""
+        if "roll-outs" not in context.memo:
+            context.memo["roll-outs"] = self._roll_outs(context, needed)
+        roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
+        if self.counterpart is not None and ("cell", self.counterpart.name) in needed:
+            roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
+        metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics)
+        _add_curves(self.cell.trajectory(folder), curves, roll_out.trajectory.frames)
+        context.tell(self.units)
+        return Outcome(status, reason, result=metrics)
 
-        The energies of each frame, and other curves, are added to the trajectory files.
-        """
-        own = {task.cell: task for task in tasks if isinstance(task, MeasureCell)}
-        first, folder = next(iter(own.values())), context.folder
-        scene = built(first.cell.scene, context)
-        group = SceneRollOuts(scene, gap_samples=first.gap_samples)
-        if first.quasi_static in needed:
-            group.quasi_static = _positions(folder.quasi_static_path(scene.name, "simulation"))
-        places = {cell: place for task in own.values() for place, cell in task.compared}
-        places |= {cell: task.place for cell, task in own.items()}
+    def _roll_outs(self, context: Context, needed: Mapping[TaskId, Outcome]) -> dict[Cell, RollOut]:
+        """Those of the batch beside each other: they share search trees, and the energies of references."""
+        folder = context.folder
+        group = SceneRollOuts(built(self.cell.scene, context), gap_samples=self.gap_samples)
+        if self.quasi_static in needed:
+            group.quasi_static = _positions(folder.quasi_static_path(self.cell.scene.name, "simulation"))
         found = {}
-        for cell in sorted(places, key=lambda cell: places[cell]):
+        for cell in self.cells:
             outcome = needed.get(("cell", cell.name))
             if outcome is not None and outcome.files:
-                found[cell] = _roll_out(group, cell, outcome, own.get(cell), context)
+                found[cell] = RollOut(
+                    group, cell.entry, Trajectory.load(cell.trajectory(folder)), status=outcome.status,
+                    suites=cell.suites,
+                    quasi_static=_positions(cell.quasi_static(folder)) if len(outcome.files) > 1 else None,
+                )  # fmt: skip
                 group.roll_outs.append(found[cell])
-        for cell, task in own.items():
-            metrics, curves, (status, reason) = measured(found[cell], cell.scene.metrics)
-            _add_curves(cell.trajectory(folder), curves, found[cell].trajectory.frames)
-            context.tell(task.units)
-            yield Outcome(status, reason, result=metrics)
+        return found
 
 
 def measured(
@@ -74,15 +77,13 @@ def measured(
         suites = getattr(module, "SUITES", roll_out.suites)
         if any(suite in suites for suite in roll_out.suites):
             values = module.measure(roll_out)
-            metrics |= values
+            metrics |= {find_metric(name).name: float(value) for name, value in values.items()}
             curves |= module.series(roll_out) if hasattr(module, "series") else {}
             ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
     return metrics, curves, ended
 
 
 def _add_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
-    from reference_sim.trajectory import replace_frame_fields
-
     padded = {
         name: np.pad(curve, (0, frames - len(curve)), constant_values=np.nan)
         for name, curve in curves.items()
@@ -90,24 +91,5 @@ def _add_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> No
     replace_frame_fields(path, padded, family="energy/")
 
 
-def _roll_out(
-    group: SceneRollOuts, cell: Cell, outcome: Outcome, task: MeasureCell | None, context: Context
-) -> RollOut:
-    from reference_sim import Trajectory
-
-    folder, counterpart = context.folder, None
-    if task is not None and task.counterpart is not None:
-        path = task.counterpart.trajectory(folder)
-        counterpart = _positions(path) if path.is_file() else None
-    return RollOut(
-        group, cell.entry, Trajectory.load(cell.trajectory(folder)), seed=cell.seed, status=outcome.status,
-        suites=cell.suites,
-        quasi_static=_positions(cell.quasi_static(folder)) if len(outcome.files) > 1 else None,
-        counterpart=counterpart,
-    )  # fmt: skip
-
-
 def _positions(path: Path) -> np.ndarray:
-    from reference_sim import Trajectory
-
     return Trajectory.load(path).positions

@@ -6,9 +6,11 @@ runner alone asks the cache, runs tasks in their processes, keeps outcomes and g
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
+
+from ..process import WorkerDied
 
 if TYPE_CHECKING:
     from ..assets import Assets
@@ -107,14 +109,6 @@ class Task:
         """The rows of what came of it, skips aside; their commit and remark are filled in later."""
         return []
 
-    @classmethod
-    def run_together(
-        cls, tasks: Sequence[Task], context: Context, needed: Mapping[TaskId, Outcome]
-    ) -> Iterator[Outcome]:
-        """The outcomes of the tasks of one batch."""
-        for task in tasks:
-            yield task.run(context, needed)
-
 
 def one_line(error: BaseException) -> str:
     """What was raised, in one line."""
@@ -122,7 +116,11 @@ def one_line(error: BaseException) -> str:
 
 
 def failure(error: BaseException) -> Outcome:
-    """The outcome of a task that raised. torch's allocator on a CPU raises a plain RuntimeError."""
+    """The outcome of a task that raised, or whose process died. torch's allocator on a CPU raises a plain
+    RuntimeError.
+    """
+    if isinstance(error, WorkerDied):
+        return Outcome(error.status, str(error), failed=True)
     memory = isinstance(error, MemoryError) or type(error).__name__ == "OutOfMemoryError"
     memory = memory or "DefaultCPUAllocator" in str(error)
     return Outcome("out-of-memory" if memory else "failed", one_line(error), failed=True)
