@@ -128,9 +128,10 @@ class _Worker:
         """What went wrong before the process could do its first task of this kind and module."""
         if (task.kind, task.modules[0]) in self.warm:
             return None
-        outcome = _called(self.process, task.warm_up, seconds=COMPILING)
-        self.warm.add((task.kind, task.modules[0]))
-        return outcome
+        trouble = _called(self.process, task.warm_up, seconds=COMPILING)
+        if trouble is None:
+            self.warm.add((task.kind, task.modules[0]))
+        return trouble
 
     def report(self, bar: Any) -> None:
         """Hand on what the process has told."""

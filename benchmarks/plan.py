@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from snug.recipe import learns_from_simulation
+from snug.recipes import learns_from_simulation
 
 from .presets import Preset
 from .scene import Scene
@@ -26,7 +26,7 @@ class PlanError(ValueError):
 
 @dataclass(frozen=True)
 class Network:
-    """A network that some cell needs: its name in snug.recipe.TRAININGS, its seed, the garment it is for."""
+    """A network that some cell needs: its name in snug.recipes.TRAININGS, its seed, the garment it is for."""
 
     name: str
     seed: int

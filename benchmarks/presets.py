@@ -53,7 +53,7 @@ class Preset:
     further: bool = False
 
     def steps_of(self, training: str, kind: str) -> int:
-        """Optimiser steps of that training of snug.recipe, by its kind; 0 for an untrained network."""
+        """Optimiser steps of that training of snug.recipes, by its kind; 0 for an untrained network."""
         return self.steps.get(training, self.steps.get(kind, 0))
 
 

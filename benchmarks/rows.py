@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from snug.recipe import learns_from_simulation
+from snug.recipes import learns_from_simulation
 
 from .methods import find_method
 from .metrics import declared, find_metric
@@ -144,7 +144,8 @@ def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
         return
     for row in task.rows(outcome):
         reason = "; ".join(filter(None, (row.reason, outcome.remark)))
-        yield dataclasses.replace(row, commit=outcome.commit, reason=reason)
+        unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
+        yield dataclasses.replace(row, commit=outcome.commit, reason=reason, unit=unit)
 
 
 def remarked(rows: Iterable[Row]) -> list[Row]:

@@ -6,20 +6,24 @@ Loads nothing heavy: a dry run asks for the same tasks as a run.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
-from snug.recipe import DEFAULT, TRAININGS
+from snug.recipe import TERMS
+from snug.recipes import TRAININGS
 
 from . import provenance
+from .cache import dependencies
+from .methods import find_method
 from .metrics import names_of
 from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
 from .scene import Scene
 from .scenes import GARMENT_SCENES, find_scene, of_garment
-from .source import code_of, digest
+from .source import digest, digest_of_file
 from .tasks.case import RunCase
 from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
 from .tasks.ground_truth import SettleStart, SimulateMotion, SimulateQuasiStatic
@@ -82,27 +86,25 @@ class Schedule:
         )  # fmt: skip
 
     def network(self, network: Network) -> TrainNetwork:
-        training, motions = TRAININGS.get(network.name), self._train(network.garment)
-        kind = training.kind if training else network.name
-        steps = self.preset.steps_of(network.name, kind)
-        modules = (f"{TASKS}.training", ASSETS)
-        inputs = self._inputs() | self._of_body(network.garment) | {
-            "training": [network.name, kind],
+        chosen, motions = TRAININGS.get(network.name), self._train(network.garment)
+        steps = self.preset.steps_of(network.name, chosen.kind if chosen else network.name)
+        inputs = self._inputs(self.plan.device) | self._of_body(network.garment) | {
+            "training": [network.name, chosen],
             "seed": network.seed,
             "steps": steps,
-            "device": self.plan.device,
-            "recipe": dataclasses.asdict(training.recipe if training else DEFAULT),
             "motions": {name: self._motion(name) for name in motions},
         }  # fmt: skip
         simulated: dict[str, TaskId] = {}
-        if training and training.simulated:
+        if chosen and chosen.simulated:
             simulated = {motion: self.data(motion, network.garment).id for motion in motions}
-        return TrainNetwork(
+        energies = _modules_of(chosen.recipe.terms) if chosen else ()
+        return _keyed(TrainNetwork(
             name=f"{network.garment}/{network.name}-seed{network.seed}", label=network.label,
-            inputs=inputs, modules=modules, reads=tuple(simulated.values()), units=max(steps, 1),
-            training=network.name, seed=network.seed, garment=network.garment, steps=steps, motions=motions,
-            simulated=simulated, device=self.plan.device, key=digest([inputs, code_of(*modules)]),
-        )  # fmt: skip
+            inputs=inputs, modules=(f"{TASKS}.training", ASSETS, *energies), reads=tuple(simulated.values()),
+            units=max(steps, 1), training=network.name, chosen=chosen, seed=network.seed,
+            garment=network.garment, steps=steps, motions=motions, simulated=simulated,
+            device=self.plan.device,
+        ))  # fmt: skip
 
     # --- cells ---------------------------------------------------------------------------------------------
 
@@ -128,10 +130,6 @@ class Schedule:
         inputs = of_scene["inputs"] | {"method": _declared(cell.entry)}
         if cell.entry.seeded:
             inputs["seed"] = cell.seed
-        if cell.entry.package:
-            inputs["package"] = provenance.package_version(cell.entry.package)
-        if cell.entry.needs_body:
-            inputs["recipe"] = dataclasses.asdict(DEFAULT)
         needs = (self.start(cell.scene).id,) if cell.scene.simulated else ()
         if network := network_of(cell):
             needs = (*needs, self.network(network).id)
@@ -177,9 +175,8 @@ class Schedule:
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,
             "method": [cell.entry.role, cell.entry.family, cell.entry.level, cell.entry.conserving],
+            "metrics": scene.metrics,
         }
-        if scene.dressed:
-            inputs["recipe"] = dataclasses.asdict(DEFAULT)  # of the skinning that gaps are a share of
         return MeasureCell(
             name=cell.name, label=cell.label, cell=cell, cells=cells,
             gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
@@ -190,7 +187,8 @@ class Schedule:
     def windows(self, network: Network) -> CompareWindows:
         training = self.network(network)
         return CompareWindows(
-            name=training.name, label=training.label, training=training, inputs=training.inputs,
+            name=training.name, label=training.label, training=training, entry=find_method(network.name),
+            inputs=training.inputs,
             modules=(f"{TASKS}.training_windows", *training.modules), needs=(training.id,),
         )  # fmt: skip
 
@@ -203,34 +201,36 @@ class Schedule:
 
     def microbenchmark(self, benchmark: Microbenchmark) -> RunMicrobenchmark:
         name, method = flat(benchmark.label.replace(" ", "-")), benchmark.method
-        inputs = self._inputs() | {"declared": _declared(benchmark)}
-        modules = (benchmark.module, "benchmarks.performance.microbenchmark", f"{TASKS}.microbenchmark")
-        settings = Settings(method=method, repeats=benchmark.repeats)
+        chosen = TRAININGS.get(method)
+        inputs: dict[str, Any] = {"declared": _declared(benchmark), "training": chosen}
+        settings = Settings(method=method, repeats=benchmark.repeats, chosen=chosen)
         if benchmark.trains:
-            device, steps = self.plan.device, self.preset.steps_of(method, method)
-            inputs |= {"device": device, "steps": steps}
-            key = digest([inputs, code_of(*modules)])
-            settings = dataclasses.replace(settings, device=device, steps=steps, key=key)
-        return RunMicrobenchmark(
-            name=name, label=benchmark.label, inputs=inputs, modules=modules, benchmark=benchmark,
-            settings=settings, process=name,
-        )  # fmt: skip
+            steps = self.preset.steps_of(method, method)
+            settings = dataclasses.replace(settings, device=self.plan.device, steps=steps)
+            inputs["steps"] = steps
+        return _keyed(RunMicrobenchmark(
+            name=name, label=benchmark.label, inputs=self._inputs(settings.device) | inputs,
+            modules=(benchmark.module, "benchmarks.performance.microbenchmark", f"{TASKS}.microbenchmark"),
+            benchmark=benchmark, entry=find_method(method), settings=settings, process=name,
+        ))  # fmt: skip
 
     # --- inputs --------------------------------------------------------------------------------------------
 
-    @cached_property
-    def _machine(self) -> dict[str, Any]:
-        """Times of another machine are not reused."""
-        facts = provenance.hardware(self.plan.device)
-        names = ("processor", "cores", "python", "device", "accelerator")
-        return {name: facts[name] for name in names if name in facts} | {"threads": 1}
+    def _inputs(self, device: str = "cpu") -> dict[str, Any]:
+        """Times of another machine are not reused. device: of what trains; nothing else uses another."""
+        facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
+        names = ("processor", "cores", "python", "accelerator")
+        return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
 
-    def _inputs(self) -> dict[str, Any]:
-        return {"machine": self._machine}
+    @cached_property
+    def _hardware(self) -> dict[str, Any]:
+        return provenance.hardware(self.plan.device)
 
     def _of_scene(self, scene: Scene, *modules: str) -> dict[str, Any]:
-        """inputs and modules of a task that builds the scene."""
-        inputs = self._inputs() | {"scene": _declared(scene)}
+        """inputs and modules of a task that builds the scene; what is measured in it is no part of it."""
+        said = _declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
+        del said["metrics"], said["counterpart"]
+        inputs = self._inputs() | {"scene": said}
         if not scene.dressed:
             return {"inputs": inputs, "modules": (*modules, scene.module)}
         inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
@@ -241,7 +241,9 @@ class Schedule:
     def _of_body(self, garment: str) -> dict[str, Any]:
         """What the assets are made from."""
         sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
-        return {"assets": sizes} | ({"body": self.plan.body.digest} if self.plan.body else {})
+        files = {name: digest_of_file(Path(name)) for name in of_garment(garment).files}
+        own = {"body": self.plan.body.digest} if self.plan.body else {}
+        return {"assets": sizes} | own | ({"files": files} if files else {})
 
     def _motion(self, name: str) -> str:
         """Of a file its content; an embedded one is made by code, looked at by itself."""
@@ -263,3 +265,20 @@ def _declared(entry: Any) -> dict[str, Any]:
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
     return {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
+
+
+def _keyed(task: Any) -> Any:
+    """The task with a key of all that it depends on: what was interrupted goes on where that is the same."""
+    key = digest(dependencies(task))
+    if isinstance(task, RunMicrobenchmark):
+        return dataclasses.replace(task, settings=dataclasses.replace(task.settings, key=key))
+    return dataclasses.replace(task, key=key)
+
+
+def _modules_of(terms: Iterable[str]) -> tuple[str, ...]:
+    """Modules of energies that a recipe names beside the usual ones: they are found by name, not imported."""
+    if set(terms) <= set(TERMS):
+        return ()
+    from reference_sim.energies import MODULE_OF
+
+    return tuple(f"reference_sim.energies.{module}" for module in sorted(set(MODULE_OF.values())))

@@ -1,18 +1,14 @@
-"""Recipe: every choice of a training run in one frozen place, each deviation from the paper by name.
+"""Recipe: every choice of a training run in one frozen place. The named ones are in snug.recipes.
 
-Recipes are named: `default` is what trains well on a CPU in minutes, `paper` is the paper's text but for its
-contact (below), the ablations are the default with one thing changed. None holds a balancing weight between
-the energies: there is none (`pca_dynamics` of `dynamic` weighs what a simulation teaches). Imports nothing
-heavy, so that a command can list recipes without loading torch.
+No recipe holds a balancing weight between the energies: there is none (`pca_dynamics` of `dynamic` weighs
+what a simulation teaches). Imports nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from typing import Any
-
-from snug.recipe_deviations import with_and_without
 
 TERMS = ("strain", "bending", "gravity", "inertia", "collision")
 
@@ -155,122 +151,3 @@ class Recipe:
 
 
 DEFAULT = Recipe()
-# Three things are not the text's: d(x) is taken to cached points of the skin, which walk with the cloth
-# and of which `contact_refresh` searches a few anew in a step (the text computes it anew; searching all 48
-# frames would take several times as long as the rest of a step); only to skin that the rule of regions
-# allows; and the garment that the offsets are added to follows the shape of the body.
-PAPER = Recipe(
-    name="paper",
-    pose_input="axis_angle",
-    velocity_frame="world",
-    smoothing=0,
-    zero_last_layer=False,
-    output_scale=1.0,
-    learning_rate=1e-3,
-    weight_decay=0.0,
-    schedule="epochs",
-    h0_sigma=0.1,
-    remembered=False,
-    window_stride=3,
-    even=1,
-    shape_range=3.0,
-    contact_samples="vertices",
-    contact_stiffness=250.0,
-    contact_margin=0.002,
-    mixed=0.0,
-    spike=1e6,
-)
-# Vertices of a simulation depend on more than two frames before: longer windows follow them better (7 mm
-# instead of 13 on the training motions at 500 vertices), and there is no energy that a window could cheat.
-# Rate and decay are the default's: 40.3 mm off the simulation on three held-out motions, 40.9 without decay,
-# and then 41.8 at half of the rate.
-SUPERVISED = replace(
-    DEFAULT,
-    name="supervised",
-    window=16,
-    batch=6,
-    h0_sigma=0.1,
-    remembered=False,
-    mixed=0.0,
-)
-# A constant shape needs no recurrence of its own: the fit is a mean drape, see santesteban2019.
-SANTESTEBAN2019 = replace(SUPERVISED, name="santesteban2019", learning_rate=1e-3)
-# One frame knows nothing of its past, so windows of one; Adam, rate and batch as its authors train it.
-TAILORNET = replace(
-    SUPERVISED,
-    name="tailornet",
-    window=1,
-    batch=32,
-    learning_rate=1e-4,
-    weight_decay=0.0,
-    schedule="constant",
-    output_scale=1.0,
-    terms=(),
-)
-PBNS_SPRINGS = replace(DEFAULT, name="pbns-springs", material="pbns", contact_samples="vertices")
-
-# Mixed motions cost it dynamics. The energy of the components begins at joules, which are no divergence.
-DYNAMIC = replace(
-    DEFAULT,
-    name="dynamic",
-    learning_rate=1e-3,
-    weight_decay=0.0,
-    h0_sigma=0.3,
-    remembered=False,
-    mixed=0.0,
-    detached=True,
-    pca_dynamics=0.3,
-    spike=20.0,
-)
-
-
-def _without(term: str) -> Recipe:
-    return replace(DEFAULT, name=f"no-{term}", terms=tuple(name for name in TERMS if name != term))
-
-
-# Longer windows get smaller batches, so that a step sees 48 frames in each.
-ABLATIONS = (
-    *(_without(term) for term in ("bending", "strain", "gravity", "inertia")),
-    replace(DEFAULT, name="no-noise", h0_sigma=0.0, remembered=False),
-    replace(DEFAULT, name="noise-alone", h0_sigma=0.1, remembered=False),  # as the paper has it
-    replace(DEFAULT, name="window6", window=6, batch=8),
-    replace(DEFAULT, name="window12", window=12, batch=4),
-    replace(DEFAULT, name="springs", material="springs"),
-)
-RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER, PBNS_SPRINGS, *ABLATIONS)}
-
-
-@dataclass(frozen=True)
-class Training:
-    """How a named model comes to be. kind: one of snug.trained_model.KINDS. simulated: needs trajectories."""
-
-    kind: str
-    recipe: Recipe
-    simulated: bool = False
-
-
-TRAININGS = {
-    "snug": Training("snug", DEFAULT),
-    "pbns": Training("pbns", DEFAULT),
-    "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    "supervised": Training("supervised", SUPERVISED, simulated=True),
-    "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, simulated=True),
-    "tailornet": Training("tailornet", TAILORNET, simulated=True),
-    "snug-dynamic": Training("dynamic", DYNAMIC, simulated=True),
-    **{
-        f"snug-{recipe.name}": Training("snug", recipe)
-        for recipe in (PAPER, *ABLATIONS, *with_and_without(DEFAULT, PAPER))
-    },
-}
-
-
-def learns_from_simulation(model: str) -> bool:
-    """Whether the model of that name needs simulated motions to be trained."""
-    return model in TRAININGS and TRAININGS[model].simulated
-
-
-def find_recipe(name: str) -> Recipe:
-    """The recipe of that name. Raises RecipeError naming the known ones."""
-    if name not in RECIPES:
-        raise RecipeError(f"unknown recipe {name!r}: use one of {', '.join(RECIPES)}")
-    return RECIPES[name]

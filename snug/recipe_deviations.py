@@ -6,12 +6,8 @@ Together the deviations name every option in which the two recipes differ. Impor
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-Recipe = TypeVar("Recipe", bound="DataclassInstance")  # a snug.recipe.Recipe, which imports this module
+from snug.recipe import Recipe
 
 
 @dataclass(frozen=True)

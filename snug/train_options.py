@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from snug.recipe import RECIPES
+from snug.recipes import RECIPES
 
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
@@ -13,7 +13,7 @@ EXAMPLES = """examples:
   python -m snug.train --model pbns --steps 8000         the static baseline
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
   python -m snug.train --validation bow --patience 10    stop when a held-out motion gets no better
-  python -m snug.train --recipe paper --vertices 4400    the paper's text (but see snug.recipe on contact)
+  python -m snug.train --recipe paper --vertices 4400    the paper's text (but see snug.recipes on contact)
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
   torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
 

@@ -37,7 +37,7 @@ MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction 
 
 
 class Trainer:
-    """See `snug.train.train` for the arguments. Everything random comes from `seed`; no decision from a
+    """See `snug.training.train` for the arguments. Everything random comes from `seed`; no decision from a
     clock. Random numbers are drawn on the CPU whatever the device, so that every device sees the same.
     """
 

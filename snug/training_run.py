@@ -26,15 +26,17 @@ Log = Callable[[dict[str, float]], None]
 class Saving:
     """Where checkpoints go and how often: after `steps` steps or `minutes` minutes, 0 for never.
 
-    resume: go on from the file, when there is one. Whoever has written the finished model down calls `done`:
-    until then the checkpoint is all there is. When a checkpoint is written changes no number, so minutes of a
-    clock do no harm.
+    resume: go on from the file, when there is one. key: what else a caller knows that the run depends on, as
+    the version of the code: a checkpoint that has another key, or cannot be read, is then replaced. Whoever
+    has written the finished model down calls `done`: until then the checkpoint is all there is. When a
+    checkpoint is written changes no number, so minutes of a clock do no harm.
     """
 
     path: Path
     steps: int = 0
     minutes: float = 5.0
     resume: bool = False
+    key: str = ""
 
     def done(self) -> None:
         """Delete the checkpoint, if there is one."""
@@ -86,7 +88,7 @@ class TrainingRun:
 
         trainer = self.trainer
         if self.saving and self.saving.resume and self.saving.path.is_file():
-            self._resume(self.saving.path)
+            self._resume(self.saving)
         self._started = self._saved = time.perf_counter()
         with tqdm(
             total=trainer.steps, initial=self.done, desc=f"train {trainer.kind}", unit="step",
@@ -154,6 +156,7 @@ class TrainingRun:
         tensors.update({f"best.{name}": tensor for name, tensor in self.best.items()})
         header = {
             "format": FORMAT,
+            "key": self.saving.key,
             "of": self._identity(),
             "done": self.done,
             "seconds": self.seconds + time.perf_counter() - self._started,
@@ -194,8 +197,16 @@ class TrainingRun:
             ],
         }
 
-    def _resume(self, path: Path) -> None:
-        tensors, header = read_tensors(path)
+    def _resume(self, saving: Saving) -> None:
+        path = saving.path
+        try:
+            tensors, header = read_tensors(path)
+        except TensorFileError:
+            if saving.key:
+                return
+            raise
+        if saving.key and header.get("key") != saving.key:
+            return
         if header.get("format") != FORMAT:
             raise TensorFileError(f"{path}: no checkpoint of this version, give another name or delete it")
         mine, there = self._identity(), header["of"]

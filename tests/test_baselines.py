@@ -13,11 +13,12 @@ from reference_sim.energies.energy import Energy
 from snug.baselines.springs import SquaredContact, spring_terms
 from snug.baselines.tailornet import DROPOUT, FrequencyMixture, smoothed
 from snug.loss import PhysicsLoss
-from snug.recipe import ABLATIONS, DEFAULT, TRAININGS
+from snug.recipe import DEFAULT
+from snug.recipes import ABLATIONS, TRAININGS
 from snug.rollout import roll_out
 from snug.skinning import skin, unposed
-from snug.train import train
 from snug.trained_model import TrainedModel, make_network
+from snug.training import train
 
 TAUGHT = ("supervised", "santesteban2019", "tailornet")
 

@@ -15,10 +15,11 @@ from dressing import swaying, tube_dress
 from reference_sim import Material
 from snug import tensor_file, training_run
 from snug.dressed_body import DressedBody
-from snug.recipe import DEFAULT, DYNAMIC, PAPER, SANTESTEBAN2019, SUPERVISED, TAILORNET
+from snug.recipe import DEFAULT
+from snug.recipes import DYNAMIC, PAPER, SANTESTEBAN2019, SUPERVISED, TAILORNET
 from snug.tensor_file import TensorFileError, read_tensors
-from snug.train import train
 from snug.trained_model import TrainedModel
+from snug.training import train
 from snug.training_run import Interrupted, Saving
 from snug.validation import Validation
 

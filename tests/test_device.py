@@ -15,7 +15,8 @@ from snug.batched_kernels import batched_kernel
 from snug.contact import PARTS, ContactCache, Patch
 from snug.device import CPU, DeviceError, find_device
 from snug.loss import STATIC, on_device
-from snug.recipe import DEFAULT, PAPER
+from snug.recipe import DEFAULT
+from snug.recipes import PAPER
 from snug.skinning import skin
 from snug.tensor_contact_cache import TensorContactCache
 from snug.trainer import Trainer

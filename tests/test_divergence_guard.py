@@ -8,7 +8,8 @@ import torch
 from dressing import swaying, tube_dress
 
 from snug.divergence_guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
-from snug.recipe import DEFAULT, PAPER
+from snug.recipe import DEFAULT
+from snug.recipes import PAPER
 from snug.trainer import Trainer
 from snug.training_run import TrainingRun
 from snug.training_set import TrainingError

@@ -14,8 +14,8 @@ from snug.recipe import DEFAULT
 from snug.rollout import roll_out
 from snug.stopwatch import PARTS
 from snug.tensorboard_log import TensorBoardError, TensorBoardLog
-from snug.train import train
 from snug.trainer import Trainer
+from snug.training import train
 from snug.training_run import TrainingRun
 from snug.training_set import TrainingError
 from snug.validation import Validation, Validator

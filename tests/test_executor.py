@@ -78,10 +78,17 @@ def test_what_cannot_be_made_ready_is_a_failure(tmp_path):
 
 
 def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
-    batch = [add("one"), add("two"), add("bad", terms=(1, "x")), add("lost")]
+    batch = [add("one"), add("two"), add("bad", terms=(1, "x")), add("four")]
     found, _ = together(tmp_path, batch, [add("three")])
     assert found["two"].result["memo"] == ["one", "two"] and found["three"].result["memo"] == ["three"]
-    assert found["bad"].failed and found["lost"].failed  # what raises takes the rest of its batch along
+    assert found["bad"].failed and found["four"].result["memo"] == ["one", "two", "bad", "four"]
+
+
+def test_what_hangs_in_a_batch_costs_the_others_nothing(tmp_path):
+    batch = [add("one"), add("hangs", how="hang", deadline=0.5), add("after", deadline=60.0)]
+    found, bar = together(tmp_path, batch)
+    assert found["hangs"].status == "timeout" and found["one"].result["sum"] == 3
+    assert found["after"].result["memo"] == ["after"] and bar.n == 2
 
 
 def test_a_named_process_is_kept_until_it_is_released(tmp_path):

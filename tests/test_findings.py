@@ -7,7 +7,7 @@ from report_folder import SCENES, row, run_of
 
 from reports.paper import CLAIMS, PRINTED, findings
 from reports.tables import make_tables
-from snug.recipe import TRAININGS
+from snug.recipes import TRAININGS
 
 
 def told(rows):

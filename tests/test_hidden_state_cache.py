@@ -10,7 +10,8 @@ import torch
 from dressing import swaying, tube_dress
 
 from snug.hidden_state_cache import HiddenStateCache
-from snug.recipe import DEFAULT, SUPERVISED
+from snug.recipe import DEFAULT
+from snug.recipes import SUPERVISED
 from snug.trainer import Trainer
 
 RECIPE = replace(DEFAULT, mixed=0.0, h0_sigma=0.0)

@@ -13,7 +13,8 @@ from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results import RunFolder, model_path
 from benchmarks.run import make_parser, make_plan
 from benchmarks.suites import SUITES
-from snug.recipe import ABLATIONS, RECIPES, TERMS, TRAININGS
+from snug.recipe import TERMS
+from snug.recipes import ABLATIONS, RECIPES, TRAININGS
 from snug.trained_model import TrainedModel
 
 
@@ -66,6 +67,9 @@ def test_what_is_cleaned_up_is_a_row_of_its_own_over_the_same_network(tmp_path):
     assert [(n.name, n.seed) for n in chosen.networks] == [("snug", 0), ("snug", 1)]
 
 
+CHECKPOINT = ".snug-seed0.checkpoint.safetensors"
+
+
 def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.tasks.training.CHECKPOINT_MINUTES", 1e-9)
     dressed, motion = tube_dress(), swaying(30)
@@ -87,13 +91,15 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         told.clear()
         with pytest.raises(KeyboardInterrupt):
             trained(tmp_path, key, killed)
-        assert [path.name for path in models.iterdir()] == [f".snug-seed0.{key}.checkpoint.safetensors"]
+        assert told == [20, 20] and [path.name for path in models.iterdir()] == [CHECKPOINT]
     result = trained(tmp_path, "now", went_on.append).result
     assert sum(went_on) == result["steps"] == 60 and len(went_on) < 3  # of three reports
-    trained(tmp_path / "unbroken", "now", print)
+    (tmp_path / "damaged" / "models").mkdir(parents=True)
+    (tmp_path / "damaged" / "models" / CHECKPOINT).write_bytes(b"half")
+    trained(tmp_path / "damaged", "now", print)
     one, other = (
         TrainedModel.load(model_path(RunFolder(folder).models, "snug", 0)).network.state_dict()
-        for folder in (tmp_path, tmp_path / "unbroken")
+        for folder in (tmp_path, tmp_path / "damaged")
     )
     assert all(torch.equal(one[name], other[name]) for name in one)
     assert [path.name for path in models.iterdir()] == ["snug-seed0.safetensors"]

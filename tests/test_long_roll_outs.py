@@ -23,7 +23,7 @@ from benchmarks.tasks.cell import judge
 from benchmarks.timing import Reading
 from snug.motion_library import make_motion
 from snug.rollout import roll_out
-from snug.train import untrained_model
+from snug.training import untrained_model
 
 SMOKE = PRESETS[0]
 

@@ -10,7 +10,8 @@ from dressing import swaying, tube_dress
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
 from snug.contact import EXACT, PARTS, ContactCache, Patch, quantised
 from snug.loss import PhysicsLoss, make_contact, summed
-from snug.recipe import DEFAULT, PAPER, PBNS_SPRINGS, Recipe
+from snug.recipe import DEFAULT, Recipe
+from snug.recipes import PAPER, PBNS_SPRINGS
 from snug.skinning import skin
 
 DT = 1 / 30

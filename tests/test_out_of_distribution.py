@@ -30,8 +30,8 @@ from snug.garments import find_template
 from snug.motion_library import make_motion
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions, rotation_matrices
-from snug.train import untrained_model
 from snug.trained_model import TrainedModel
+from snug.training import untrained_model
 
 SMOKE = find_preset("smoke")
 CASES = [scene for scene in OUT_OF_DISTRIBUTION if not scene.networks_only and scene.name != ORDINARY]

@@ -12,7 +12,8 @@ from dressing import swaying, tube_dress
 
 from snug.device import find_device
 from snug.parallel import ALONE, Group, GroupError, join_group
-from snug.recipe import DEFAULT, PAPER
+from snug.recipe import DEFAULT
+from snug.recipes import PAPER
 from snug.tensor_file import read_tensors, write_tensors
 from snug.trainer import Trainer
 

@@ -15,13 +15,14 @@ from snug.loss import PhysicsLoss
 from snug.motion import Motion
 from snug.motion_inputs import RATED, motion_rates
 from snug.pca_dynamics import DynamicsSupervision
-from snug.recipe import DEFAULT, DYNAMIC, TRAININGS
+from snug.recipe import DEFAULT
+from snug.recipes import DYNAMIC, TRAININGS
 from snug.rollout import roll_out
 from snug.skeleton import axis_angles, rotation_matrices
 from snug.skinning import unposed
-from snug.train import train
 from snug.trained_model import TrainedModel, make_network
 from snug.trainer import Trainer
+from snug.training import train
 from snug.training_set import TrainingSet
 
 SMALL = replace(DYNAMIC, pca_components=6, pretraining=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import dataclasses
 import functools
 import math
 import os
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 from dressing import swaying, tube_dress
 
-import snug.train
+import snug.training
 from benchmarks import execution, provenance, run
 from benchmarks.methods import find_method
 from benchmarks.metrics import find_metric
@@ -35,6 +34,7 @@ from reports.convergence import main as draw
 from reports.data import run_data
 from reports.tables import make_tables
 from snug.motion_library import TEST, TRAIN
+from snug.recipes import TRAININGS
 from snug.trained_model import TrainedModel
 
 SMOKE, QUICK = find_preset("smoke"), find_preset("quick")
@@ -45,7 +45,7 @@ SMALL_SHEET = Microbenchmark(
 
 
 def settings(method="simulation", **changes):
-    return Settings(**{"method": method, "repeats": 1} | changes)
+    return Settings(**{"method": method, "repeats": 1, "chosen": TRAININGS.get(method)} | changes)
 
 
 def plan_of(folder, *benchmarks, device="cpu", preset=SMOKE):
@@ -265,7 +265,9 @@ def lines(path: Path):
 
 @pytest.mark.parametrize("network", ["snug", "supervised", "pbns"])
 def test_a_step_has_a_time_and_parts(small, network):
-    found = values(training_step.measure(dataclasses.replace(small, method=network), vertices=150))
+    found = values(
+        training_step.measure(settings(network, repeats=2, steps=6, files=small.files), vertices=150)
+    )
     assert 0 < found["training_step_least"] <= found["training_step"]
     parts = {name.partition("/")[2] for name in found if name.startswith("training_step/")}
     assert found["training_step/backward"] > 0 and ("energies" in parts) == (network != "supervised")
@@ -290,17 +292,16 @@ def test_a_killed_convergence_goes_on_to_the_same_curve(small, monkeypatch):
     assert 0 < float(whole[-1]["seconds"]) < model.history[-1]["seconds"]
 
     curve.unlink()
-    stale = model_path.with_name(".snug-150.before.checkpoint.safetensors")
-    stale.write_text("of other code")
+    model_path.with_name(".snug-150.checkpoint.safetensors").write_text("of other code")
     asked = iter([False, False, False, True])
-    stopped = functools.partial(snug.train.train, stop=lambda: next(asked))
+    stopped = functools.partial(snug.training.train, stop=lambda: next(asked))
     with monkeypatch.context() as patch:
-        patch.setattr(snug.train, "train", stopped)
+        patch.setattr(snug.training, "train", stopped)
         with pytest.raises(Exception, match="stopped after step 4"):
             convergence.measure(small, vertices=150)
     begun = []
-    step_of = snug.train.train
-    monkeypatch.setattr(snug.train, "train", lambda *a, **k: step_of(*a, log=begun.append, **k))
+    step_of = snug.training.train
+    monkeypatch.setattr(snug.training, "train", lambda *a, **k: step_of(*a, log=begun.append, **k))
     convergence.measure(small, vertices=150)
     assert [row["step"] for row in begun] == [6]  # only what was left
     again = lines(curve)

@@ -13,8 +13,9 @@ from benchmarks.plan import Motions, PlanError
 from benchmarks.presets import find_preset
 from benchmarks.selection import Request, choose, choose_motions
 from snug.motion_library import TEST, TRAIN
-from snug.recipe import DEFAULT, PAPER, TRAININGS, Recipe
+from snug.recipe import DEFAULT, Recipe
 from snug.recipe_deviations import DEVIATIONS
+from snug.recipes import PAPER, TRAININGS
 
 HELD_OUT = ("brisk_walk", "torso_twist", "lunge")  # those of the command in the help
 NAMES = {

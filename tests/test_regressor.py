@@ -9,7 +9,8 @@ from snug import fast_network
 from snug.baselines.pbns import PoseSpaceDeformation
 from snug.garments import smooth_weights
 from snug.motion import Motion
-from snug.recipe import DEFAULT, PAPER, RECIPES, Recipe, RecipeError, find_recipe
+from snug.recipe import DEFAULT, Recipe, RecipeError
+from snug.recipes import PAPER, RECIPES, find_recipe
 from snug.regressor import Regressor, parameter_megabytes
 from snug.skeleton import axis_angles, rotation_matrices
 from snug.trained_model import make_network

@@ -107,7 +107,7 @@ def test_what_ended_early_moves_nobody_elses_picture(tmp_path):
 
 def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
     write_model(tmp_path / "snug-seed0.safetensors", "snug", strain=0.1)
-    write_model(tmp_path / ".pbns-seed0.0123.checkpoint.safetensors", "pbns", strain=0.1)
+    write_model(tmp_path / ".pbns-seed0.checkpoint.safetensors", "pbns", strain=0.1)
     run, read = run_of([row(), row(method="pbns")]), []
     monkeypatch.setattr(training, "read_history", read.append)
     assert training.training_curves(tmp_path, run, tmp_path, []) == []

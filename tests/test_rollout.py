@@ -8,10 +8,11 @@ import pytest
 import torch
 from dressing import swaying, tube_dress
 
-from snug.recipe import DEFAULT, PAPER
+from snug.recipe import DEFAULT
+from snug.recipes import PAPER
 from snug.rollout import RollOutError, predictions, roll_out
-from snug.train import untrained_model
 from snug.trained_model import TrainedModel, make_network
+from snug.training import untrained_model
 
 
 def test_zero_offsets_give_skinning_alone():

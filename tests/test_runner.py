@@ -102,7 +102,7 @@ def test_what_a_killed_run_was_writing_is_removed(tmp_path):
 def test_a_fresh_run_goes_on_from_no_training_that_was_stopped(tmp_path):
     models = tmp_path / "models" / "tunic"
     models.mkdir(parents=True)
-    stopped = models / ".snug-seed0.0123.checkpoint.safetensors"
+    stopped = models / ".snug-seed0.checkpoint.safetensors"
     stopped.write_bytes(b"half")
     plan = plan_of(tmp_path)
     execution.RunLog(plan)

@@ -20,8 +20,8 @@ from snug.garments import GarmentError, tailor_skirt, tailor_tshirt
 from snug.motion_library import make_motion
 from snug.recipe import DEFAULT
 from snug.rollout import roll_out
-from snug.train import train, untrained_model
 from snug.trained_model import TrainedModel
+from snug.training import train, untrained_model
 
 TINY = dataclasses.replace(find_preset("smoke"), garment_vertices=300, frames=10, clip_frames=8)
 

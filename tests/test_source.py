@@ -10,6 +10,7 @@ import pytest
 from benchmarks import source
 from benchmarks.methods import METHODS
 from benchmarks.metrics import MODULES
+from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.scenes import FURTHER, SCENES
 from benchmarks.source import code_of, data_of, digest, packages_of
 
@@ -145,11 +146,15 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
         "scenes/__init__.py", "methods/__init__.py", "methods/solvers.py", "methods/learned.py", "presets.py",
         "selection.py", "suites.py", "plan.py", "schedule.py", "validation/registry.py",
     )}  # fmt: skip
-    modules = [f"benchmarks.tasks.{name}" for name in ("cell", "ground_truth", "training", "case")]
+    lists.add("snug/recipes.py")
+    names = ("cell", "ground_truth", "training", "training_windows", "metrics", "case", "microbenchmark")
+    modules = [f"benchmarks.tasks.{name}" for name in names]
     modules += [entry.module for entry in (*SCENES, *FURTHER, *METHODS)]
     modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets"]
     modules += [f"benchmarks.metrics.{name}" for name in MODULES]
     assert {name: found for name in modules if (found := lists & set(code_of(name)))} == {}
+    lists -= {"benchmarks/presets.py", "benchmarks/scenes/__init__.py"}  # a shirt of preset quick is measured
+    assert not any(lists & set(code_of(benchmark.module)) for benchmark in MICROBENCHMARKS)
 
 
 def test_the_packages_that_move_a_number_are_known():

@@ -14,12 +14,13 @@ from snug.baselines.supervised import TargetError, vertex_loss
 from snug.motion import Motion, arm_clearance
 from snug.motion_augmentation import lap_clearance, mirrored, mixed_for, mixed_motions
 from snug.motion_library import make_motion
-from snug.recipe import DEFAULT, PAPER, Recipe
+from snug.recipe import DEFAULT, Recipe
+from snug.recipes import PAPER
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions
-from snug.train import train, untrained_model
 from snug.trained_model import ModelFileError, TrainedModel
 from snug.trainer import Trainer
+from snug.training import train, untrained_model
 from snug.training_set import TrainingError, TrainingSet
 
 PLAIN = replace(DEFAULT, mixed=0.0)

@@ -13,8 +13,8 @@ from dressing import swaying, tube_dress
 from reference_sim import energies
 from snug.loss import PhysicsLoss, has_kernel
 from snug.recipe import TERMS, Recipe, RecipeError
-from snug.train import train
 from snug.trainable_energies import find_energy
+from snug.training import train
 
 # What a user writes: a definition, and no derivative.
 SOURCE = """

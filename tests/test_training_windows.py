@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from dressing import swaying, tube_dress
+from tasks_by_hand import training as training_task
 
 from benchmarks.assets import Assets
+from benchmarks.methods import find_method
 from benchmarks.plan import Motions, Plan
 from benchmarks.presets import find_preset
 from benchmarks.results import RunFolder
 from benchmarks.schedule import tasks_of
 from benchmarks.selection import Request, choose
 from benchmarks.tasks.task import Context, Outcome
-from benchmarks.tasks.training import TrainNetwork
 from benchmarks.tasks.training_windows import CompareWindows, _loss, both_losses
 from snug.recipe import DEFAULT
 from snug.skinning import skin
-from snug.train import train, untrained_model
 from snug.trainer import Trainer
+from snug.training import train, untrained_model
 
 SMOKE = find_preset("smoke")
 MOTIONS = [swaying(30), swaying(24, name="slow", degrees=10.0)]
@@ -89,16 +91,14 @@ def test_what_was_judged_before_leaves_no_trace(monkeypatch):
 def done(tmp_path, motions, name, model, seed=0):
     """The rows of a network in the folder of a run, and their task."""
     dressed, folder = tube_dress(), RunFolder(tmp_path)
-    training = TrainNetwork(
-        name=f"tshirt/{name}-seed{seed}", label=name, inputs={}, modules=(), training=name, seed=seed,
-        garment="tshirt", steps=1, motions=tuple(m.name for m in motions), simulated={}, device="cpu", key="",
-    )  # fmt: skip
+    training = dataclasses.replace(training_task(name, *(m.name for m in motions), steps=1), seed=seed)
     model.save(training.path(folder))
     known = {motion.name: motion for motion in motions}
     context = Context(folder, Assets(dressed.body, {"tshirt": dressed.garment}, known, {}))
     task = CompareWindows(
-        name=training.name, label=name, inputs={}, modules=("x",), needs=(training.id,), training=training
-    )
+        name=training.name, label=name, inputs={}, modules=("x",), needs=(training.id,), training=training,
+        entry=find_method(name),
+    )  # fmt: skip
     return task.rows(task.run(context, {})), task
 
 

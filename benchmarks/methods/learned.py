@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from snug.recipe import ABLATIONS
 from snug.recipe_deviations import DEVIATIONS
+from snug.recipes import ABLATIONS
 
 from ..method import MethodEntry
 from .solvers import warm_started

@@ -26,18 +26,15 @@ COLUMNS = ("step", "seconds", "loss", "validation", "strain", "bending", "gravit
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Train; when the value on the held-out motion came close to its last one, and for good."""
-    from snug.recipe import TRAININGS
-    from snug.train import train
+    from snug.training import train
     from snug.training_run import Saving
     from snug.validation import Validation
 
     curve_path, path = settings.files
     path.parent.mkdir(parents=True, exist_ok=True)
-    checkpoint = path.with_name(f".{path.stem}.{settings.key}.checkpoint.safetensors")
-    for other in set(path.parent.glob(f".{path.stem}.*.checkpoint.safetensors")) - {checkpoint}:
-        other.unlink()  # of code or settings that nobody asks for any more
-    saving = Saving(path=checkpoint, resume=True)
-    chosen, every = TRAININGS[settings.method], max(1, settings.steps // POINTS)
+    checkpoint = path.with_name(f".{path.stem}.checkpoint.safetensors")
+    saving = Saving(path=checkpoint, resume=True, key=settings.key)
+    chosen, every = settings.chosen, max(1, settings.steps // POINTS)
     dressed, motions = dressed_body(vertices), training_motions()
     held_out = [motion for motion in motions if motion.name == HELD_OUT]
     model = train(

@@ -23,10 +23,9 @@ if TYPE_CHECKING:
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Median, 95 % and least time over all frames of roll-outs; memory and file of the network."""
-    from snug.recipe import TRAININGS
-    from snug.train import untrained_model
+    from snug.training import untrained_model
 
-    chosen = TRAININGS[settings.method]
+    chosen = settings.chosen
     dressed, motions = dressed_body(vertices), training_motions()
     model = untrained_model(chosen.kind, dressed, motions, seed=0, recipe=chosen.recipe)
     _frame_seconds(model, dressed, motions[0])

@@ -17,12 +17,13 @@ SUITE = "performance"
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a function is told. device, steps: of a training; files: to be left behind; key: equal where an
-    interrupted training may go on.
+    """What a function is told. chosen: kind and recipe of the network; device, steps: of its training; files:
+    to be left behind; key: equal where an interrupted training may go on.
     """
 
     method: str
     repeats: int
+    chosen: Any = None
     device: str = "cpu"
     steps: int = 0
     files: tuple[Path, ...] = ()

@@ -28,10 +28,9 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     import torch
 
     from snug.device import find_device
-    from snug.recipe import TRAININGS
     from snug.trainer import Trainer
 
-    chosen, device = TRAININGS[settings.method], find_device(settings.device)
+    chosen, device = settings.chosen, find_device(settings.device)
     dressed, motions = dressed_body(vertices), training_motions()
     targets = {motion.name: dressed.skinned(motion) for motion in motions} if chosen.simulated else None
     steps = WARM_UP + BLOCK * settings.repeats

@@ -59,12 +59,14 @@ def find_scene(name: str) -> Scene:
 class GarmentScenes:
     """A garment of snug.garments: its scenes are "<garment>/<motion>", and "<garment>/<motion>@clip".
 
-    dynamic: whether its motions are those that stop within a frame, instead of the run's own.
+    dynamic: whether its motions are those that stop within a frame, instead of the run's own. files: paths of
+    what the garment is read from, so that a run knows when one has changed.
     """
 
     garment: str
     words: str
     dynamic: bool = False
+    files: tuple[str, ...] = ()
 
     def scene(self, motion: str, part: str = "whole") -> Scene:
         """A body in this garment doing that motion, or its liveliest part."""

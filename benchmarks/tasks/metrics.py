@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from reference_sim.trajectory import Trajectory, replace_frame_fields
-
 from ..metric import RollOut, SceneRollOuts
 from ..metrics import find_metric, modules, names_of
 from .cell import Cell, built
@@ -47,6 +45,8 @@ class MeasureCell(Task):
 
     def _roll_outs(self, context: Context, needed: Mapping[TaskId, Outcome]) -> dict[Cell, RollOut]:
         """Those of the batch beside each other: they share search trees, and the energies of references."""
+        from reference_sim import Trajectory
+
         folder = context.folder
         group = SceneRollOuts(built(self.cell.scene, context), gap_samples=self.gap_samples)
         if self.quasi_static in needed:
@@ -84,6 +84,8 @@ def measured(
 
 
 def _add_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
+    from reference_sim.trajectory import replace_frame_fields
+
     padded = {
         name: np.pad(curve, (0, frames - len(curve)), constant_values=np.nan)
         for name, curve in curves.items()
@@ -92,4 +94,6 @@ def _add_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> No
 
 
 def _positions(path: Path) -> np.ndarray:
+    from reference_sim import Trajectory
+
     return Trajectory.load(path).positions

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..method import MethodEntry
 from ..performance.microbenchmark import SUITE, Settings
 from ..results import Row, RunFolder
 from .cell import peak_memory
@@ -25,6 +26,7 @@ class RunMicrobenchmark(Task):
     stage = SUITE
     unit = "case"
     benchmark: Microbenchmark
+    entry: MethodEntry
     settings: Settings
 
     def clear(self, folder: RunFolder) -> None:
@@ -47,13 +49,11 @@ class RunMicrobenchmark(Task):
 
     def rows(self, outcome: Outcome) -> list[Row]:
         """One for each number; where the process died, one that says so."""
-        from ..methods import find_method
-        from ..metrics import find_metric
         from ..performance.metrics import PROCESS_MEMORY
 
-        benchmark, entry = self.benchmark, find_method(self.benchmark.method)
+        benchmark, entry = self.benchmark, self.entry
         base = Row(
-            suite=SUITE, scene=benchmark.name, method=entry.name, seed=0, metric=PROCESS_MEMORY, unit="MB",
+            suite=SUITE, scene=benchmark.name, method=entry.name, seed=0, metric=PROCESS_MEMORY, unit="",
             status="failed", reason=outcome.reason, dtype=entry.dtype, family=entry.family or entry.name,
             level=entry.level, role=entry.role, base=entry.base,
         )  # fmt: skip
@@ -62,8 +62,5 @@ class RunMicrobenchmark(Task):
             status, reason = outcome.status, outcome.reason
             if not math.isfinite(value):
                 status, reason, value = "failed", reason or f"{name} is not finite", None
-            unit = find_metric(name).unit
-            rows.append(
-                dataclasses.replace(base, metric=name, unit=unit, value=value, status=status, reason=reason)
-            )
+            rows.append(dataclasses.replace(base, metric=name, value=value, status=status, reason=reason))
         return rows or [dataclasses.replace(base, status=outcome.status)]

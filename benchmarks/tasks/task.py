@@ -106,7 +106,7 @@ class Task:
         """What a process does before its first task of this kind and module, without the deadline."""
 
     def rows(self, outcome: Outcome) -> list[Row]:
-        """The rows of what came of it, skips aside; their commit and remark are filled in later."""
+        """The rows of what came of it, skips aside; unit, commit and remark are filled in later."""
         return []
 
 

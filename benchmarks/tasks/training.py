@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..results import RunFolder, model_path
+from ..source import digest
 from .task import Context, Outcome, Task, TaskId
+
+if TYPE_CHECKING:
+    from snug.recipes import Training
 
 LOG_EVERY = 20  # training steps between two reports of progress
 CHECKPOINT_MINUTES = 5.0  # between two checkpoints: a training of preset quick is over before the first
@@ -15,11 +20,12 @@ CHECKPOINT_MINUTES = 5.0  # between two checkpoints: a training of preset quick 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrainNetwork(Task):
-    """A network of snug.recipe.TRAININGS (or an untrained one), in the folder of its garment's networks.
+    """A network, or an untrained one, in the folder of its garment's networks.
 
-    training: its name there. motions: what it learns from; simulated: motion -> the task that simulates it,
-    where it learns from simulations. device: cpu or cuda, for every part of a step. key: a training of the
-    same key that was killed goes on from its last checkpoint, and ends as it would have.
+    training: its name in snug.recipes.TRAININGS, or "untrained"; chosen: what stands there. motions: what it
+    learns from; simulated: motion -> the task that simulates it, where it learns from simulations. device:
+    cpu or cuda, for every part of a step. key: with equal simulations, a training of the same key that was
+    killed goes on from its last checkpoint, and ends as it would have.
     """
 
     kind = "network"
@@ -27,62 +33,56 @@ class TrainNetwork(Task):
     stage = "training"
     unit = "step"
     training: str
+    chosen: Training | None
     seed: int
     garment: str
     steps: int
     motions: tuple[str, ...]
     simulated: Mapping[str, TaskId]
     device: str
-    key: str
+    key: str = ""
 
     def path(self, folder: RunFolder) -> Path:
         return model_path(folder.models_of(self.garment), self.training, self.seed)
 
     def clear(self, folder: RunFolder) -> None:
-        """Its model, and checkpoints of trainings that nobody asks for any more."""
-        path = self.path(folder)
-        path.unlink(missing_ok=True)
-        for other in set(path.parent.glob(f".{path.stem}.*.checkpoint.safetensors")) - {
-            self._checkpoint(path)
-        }:
-            other.unlink()
-
-    def _checkpoint(self, path: Path) -> Path:
-        return path.with_name(f".{path.stem}.{self.key}.checkpoint.safetensors")
+        self.path(folder).unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import torch
 
         from reference_sim.trajectory import Trajectory
         from snug.dressed_body import DressedBody
-        from snug.recipe import TRAININGS
-        from snug.train import train, untrained_model
+        from snug.training import train, untrained_model
         from snug.training_run import Saving
 
         torch.set_num_threads(1)
         assets, run = context.assets, context.folder
         assert assets is not None
         path = self.path(run)
-        saving = Saving(path=self._checkpoint(path), minutes=CHECKPOINT_MINUTES, resume=True)
         dressed = DressedBody(assets.body, assets.garments[self.garment])
-        if self.training == "untrained":
-            model = untrained_model("snug", dressed, assets.named(self.motions), seed=self.seed)
+        motions, targets = self.motions, None
+        if self.simulated:
+            whole = {m: needed[id] for m, id in self.simulated.items() if self._is_whole(needed.get(id))}
+            motions = tuple(whole)
+            targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
+        saving = Saving(
+            path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
+            resume=True, key=digest([self.key, targets]),
+        )  # fmt: skip
+        told = 0
+
+        def log(row: dict[str, float]) -> None:
+            nonlocal told
+            context.tell(int(row["step"]) - told)
+            told = int(row["step"])
+
+        if self.chosen is None:
+            model = untrained_model("snug", dressed, assets.named(motions), seed=self.seed)
         else:
-            training, motions, targets = TRAININGS[self.training], self.motions, None
-            if training.simulated:
-                whole = {m: needed[id] for m, id in self.simulated.items() if self._is_whole(needed.get(id))}
-                motions = tuple(whole)
-                targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
-            told = 0
-
-            def log(row: dict[str, float]) -> None:
-                nonlocal told
-                context.tell(int(row["step"]) - told)
-                told = int(row["step"])
-
             model = train(
-                training.kind, dressed, assets.named(motions), steps=self.steps, seed=self.seed,
-                trajectories=targets, recipe=training.recipe, log=log, progress=False, every=LOG_EVERY,
+                self.chosen.kind, dressed, assets.named(motions), steps=self.steps, seed=self.seed,
+                trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False, every=LOG_EVERY,
                 device=self.device, saving=saving,
             )  # fmt: skip
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -90,6 +90,7 @@ class TrainNetwork(Task):
         saving.done()
         result = {
             "recipe": model.recipe.name,
+            "left_out": [motion for motion in self.motions if motion not in motions],
             "seconds": model.seconds,
             "setup_seconds": model.setup_seconds,
             "megabytes": model.megabytes,

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from snug.recipe import DEFAULT
 
-from ..methods import find_method
-from ..metrics import find_metric
+from ..method import MethodEntry
 from ..results import Row
 from .task import Context, Outcome, Task, TaskId, one_line
 from .training import TrainNetwork
@@ -41,6 +40,7 @@ class CompareWindows(Task):
     stage = "training windows"
     unit = "network"
     training: TrainNetwork
+    entry: MethodEntry
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         from snug.dressed_body import DressedBody
@@ -75,14 +75,14 @@ class CompareWindows(Task):
         return [self._row(name, value, "skipped", outcome.reason) for name, value in outcome.result.items()]
 
     def _row(self, metric: str, value: float | None, status: str, reason: str) -> Row:
-        training, entry = self.training, find_method(self.training.training)
+        training, entry = self.training, self.entry
         if value is not None:
             finite = math.isfinite(value)
             status, reason = ("ok", "") if finite else ("diverged", f"its mean is {value}")
             value = value if finite else None
         return Row(
             suite=SUITE, scene=SCENE, method=entry.name, seed=training.seed, metric=metric,
-            unit=find_metric(metric).unit, value=value, status=status, reason=reason, dtype=entry.dtype,
+            unit="", value=value, status=status, reason=reason, dtype=entry.dtype,
             garment=training.garment, family=entry.family or entry.name, role=entry.role, base=entry.base,
             seeded=entry.seeded, pairing_group=entry.pairing_group,
         )  # fmt: skip
