@@ -21,6 +21,7 @@ from .tasks.task import Outcome, Task, TaskId
 
 STATES = ("finished", "failed", "stale", "missing")
 DEFAULT_ONLY = ("stale", "missing")
+NOWHERE: Mapping[str, Any] = {}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,17 +48,19 @@ def dependencies(task: Task) -> dict[str, str]:
 
 
 class Cache:
-    """The entries of one run's folder. only: the states whose tasks are done again."""
+    """The entries of one run's folder. only: the states whose tasks are done again; origin: see Outcome."""
 
-    def __init__(self, folder: RunFolder, *, only: Iterable[str] = DEFAULT_ONLY, commit: str = "") -> None:
-        self.folder, self.only, self.commit = folder, frozenset(only), commit
+    def __init__(
+        self, folder: RunFolder, *, only: Iterable[str] = DEFAULT_ONLY, origin: Mapping[str, Any] = NOWHERE
+    ) -> None:
+        self.folder, self.only, self.origin = folder, frozenset(only), dict(origin)
 
     def find(self, task: Task, others: Mapping[TaskId, Found]) -> Found:
         """Whether the task is done, and what came of it. others: what is known of those that it reads."""
         state, why, entry = self._state(task, others)
         outcome = None
         if entry:
-            outcome = Outcome(**entry["outcome"], files=tuple(entry["files"]), commit=entry["commit"])
+            outcome = Outcome(**entry["outcome"], files=tuple(entry["files"]), origin=entry["origin"])
             if state == "stale":
                 outcome = dataclasses.replace(outcome, remark=f"kept though {why} changed")
         gone = state == "missing"
@@ -72,7 +75,7 @@ class Cache:
             "parts": dependencies(task),
             "needs": _needs(task, others),
             "written": datetime.now().astimezone().isoformat(timespec="seconds"),
-            "commit": self.commit,
+            "origin": self.origin,
             "files": {name: digest_of_file(self.folder.path / name) for name in names},
             "outcome": {name: getattr(outcome, name) for name in _KEPT},
         }
@@ -95,7 +98,7 @@ class Cache:
         try:
             entry = json.loads(self.path(task).read_text(encoding="utf-8"))
             parts, files, needs = dict(entry["parts"]), dict(entry["files"]), dict(entry["needs"])
-            outcome = Outcome(**entry["outcome"], commit=entry["commit"])
+            outcome = Outcome(**entry["outcome"], origin=entry["origin"])
         except FileNotFoundError:
             return "missing", "", {}
         except (ValueError, KeyError, TypeError):

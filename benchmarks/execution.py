@@ -24,6 +24,8 @@ from .tasks.task import one_line
 if TYPE_CHECKING:
     from .assets import Assets
 
+OF_TRAINING = ("cost/setup", "cost/train")
+
 
 def execute(plan: Plan) -> int:
     """Run the plan. Returns 0 when all ended well, 1 when something failed or there is no report."""
@@ -73,8 +75,10 @@ class RunLog:
         self.plan = plan
         self.folder = RunFolder(plan.folder)
         self.hardware = provenance.hardware(plan.device)
-        self.commit = provenance.commit()
-        self.cache = Cache(self.folder, only=plan.only, commit=self.commit)
+        # Only training uses an accelerator: its rows name it, see write_rows.
+        hardware = provenance.hardware_line(self.hardware | {"accelerator": None})
+        self.origin = {"commit": provenance.commit(), "preset": plan.preset.name, "hardware": hardware}
+        self.cache = Cache(self.folder, only=plan.only, origin=self.origin)
         self.rows: list[Row] = []
         self.stages: list[dict[str, Any]] = []
         self.config: dict[str, Any] = {
@@ -90,7 +94,7 @@ class RunLog:
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
-            "commit": self.commit,
+            "commit": self.origin["commit"],
             "started": now(),
             "finished": None,
             "hardware": self.hardware,
@@ -169,13 +173,11 @@ class RunLog:
         self.folder.write_config(self.config)
 
     def write_rows(self, rows: Sequence[Row]) -> None:
-        """results.csv, and what run.json says of them. Only training uses an accelerator."""
+        """results.csv, and what run.json says of them."""
         everything = provenance.hardware_line(self.hardware)
-        processor = provenance.hardware_line(self.hardware | {"accelerator": None})
-        of_training = ("cost/setup", "cost/train")
         self.rows = [
-            dataclasses.replace(row, hardware=everything if row.metric in of_training else processor)
-            for row in with_provenance(rows, preset=self.plan.preset.name, commit=self.commit)
+            dataclasses.replace(row, hardware=everything) if row.metric in OF_TRAINING else row
+            for row in with_provenance(rows, **self.origin)
         ]
         self.folder.write_rows(self.rows)
         self.config |= described(self.plan, self.rows)

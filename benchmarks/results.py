@@ -270,9 +270,9 @@ class RunFolder:
 def with_provenance(rows: Iterable[Row], **provenance: Any) -> list[Row]:
     """The rows with their provenance columns (preset, commit, hardware, ...) filled in.
 
-    A row that names its commit was measured by an earlier run and keeps it.
+    What an earlier run measured names its own, and keeps it.
     """
     return [
-        dataclasses.replace(row, **provenance | ({"commit": row.commit} if row.commit else {}))
+        dataclasses.replace(row, **{name: getattr(row, name) or value for name, value in provenance.items()})
         for row in rows
     ]

@@ -59,6 +59,7 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
                 costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
                 metrics |= {**costs, **model_costs(cell, schedule, outcomes)}
                 reason = reason or remark
+            reason = reason or not_learned(cell, schedule, outcomes)
     batch = outcomes.get(("batch", cell.name), Outcome())
     if batch.reason.startswith(UNBELIEVABLE):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
@@ -73,7 +74,7 @@ def _rows(
     base = Row(
         suite=suite, scene=scene.name, method=cell.method, seed=cell.seed, metric="cost/frame", unit="ms",
         status=status if status != "ok" else "failed", reason=reason, terms=outcome.result.get("terms", ""),
-        dtype=entry.dtype, commit=outcome.commit, garment=scene.garment, motion=scene.motion, part=scene.part,
+        dtype=entry.dtype, **outcome.origin, garment=scene.garment, motion=scene.motion, part=scene.part,
         family=entry.family or entry.name, level=entry.level, role=entry.role, base=entry.base,
         seeded=entry.seeded, pairing_group=entry.pairing_group,
     )  # fmt: skip
@@ -137,6 +138,15 @@ def model_costs(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str,
     return {"cost/data": sum(outcome.seconds for outcome in data)} | costs
 
 
+def not_learned(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> str:
+    """A remark where the simulation of a motion failed, so that the cell's network learned without it."""
+    network = network_of(cell)
+    trained = outcomes.get(schedule.network(network).id) if network else None
+    if trained is None or not trained.result.get("left_out"):
+        return ""
+    return f"its network learned without {', '.join(trained.result['left_out'])}: no simulation is whole"
+
+
 def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
     """The rows that a task gives by itself; one that --only leaves out has none."""
     outcome = outcomes.get(task.id)
@@ -145,7 +155,7 @@ def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
     for row in task.rows(outcome):
         reason = "; ".join(filter(None, (row.reason, outcome.remark)))
         unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
-        yield dataclasses.replace(row, commit=outcome.commit, reason=reason, unit=unit)
+        yield dataclasses.replace(row, **outcome.origin, reason=reason, unit=unit)
 
 
 def remarked(rows: Iterable[Row]) -> list[Row]:

@@ -241,7 +241,7 @@ class Schedule:
     def _of_body(self, garment: str) -> dict[str, Any]:
         """What the assets are made from."""
         sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
-        files = {name: digest_of_file(Path(name)) for name in of_garment(garment).files}
+        files = {name: _content(Path(name), garment) for name in of_garment(garment).files}
         own = {"body": self.plan.body.digest} if self.plan.body else {}
         return {"assets": sizes} | own | ({"files": files} if files else {})
 
@@ -265,6 +265,13 @@ def _declared(entry: Any) -> dict[str, Any]:
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
     return {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
+
+
+def _content(path: Path, garment: str) -> str:
+    """Digest of a file. Raises ValueError where there is none."""
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; garment {garment} is read from it")
+    return digest_of_file(path)
 
 
 def _keyed(task: Any) -> Any:

@@ -92,7 +92,7 @@ def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_pat
     assert "reference_sim.energies.stretch_stvk" in result["modules"] and "numba" in result["modules"]
     snug = {name for name in result["modules"] if name.startswith("snug")}
     # Names of trainings, which the list of methods holds.
-    assert snug <= {"snug", "snug.recipe", "snug.recipe_deviations"}
+    assert snug <= {"snug", "snug.recipe", "snug.recipes", "snug.recipe_deviations"}
     for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
         assert name not in result["modules"], f"{name} was loaded"
     costs, remark = clock_costs(plan.cells[0], 1, {("cell", plan.cells[0].name): outcome})
@@ -111,7 +111,11 @@ def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
     files = {
         name: name.replace(".", "/") for name in loaded if name.split(".")[0] in ("reference_sim", "snug")
     }
-    for name in ("snug.recipe", "snug.recipe_deviations"):  # names of trainings, in the list of methods
+    for name in (
+        "snug.recipe",
+        "snug.recipes",
+        "snug.recipe_deviations",
+    ):  # names of trainings, in the list of methods
         files.pop(name, None)
     missing = [n for n, stem in files.items() if f"{stem}.py" not in known and not (ROOT / stem).is_dir()]
     assert missing == [] and len(files) > 10

@@ -183,7 +183,7 @@ def test_one_that_dies_or_raises_is_a_row_and_exit_1(function, reason, tmp_path,
 def test_a_number_that_is_none_fails_and_the_others_stand(tmp_path):
     (task,) = tasks_of(plan := plan_of(tmp_path, SMALL_SHEET))
     result = {"performance/iteration": math.nan, "performance/vertices": 16}
-    rows = rows_of(plan, [task], {task.id: Outcome(result=result, commit="abc")})
+    rows = rows_of(plan, [task], {task.id: Outcome(result=result, origin={"commit": "abc"})})
     assert [(row.value, row.status, row.commit) for row in rows] == [
         (None, "failed", "abc"),
         (16, "ok", "abc"),

@@ -122,9 +122,10 @@ def test_provenance_is_filled_in():
     assert {row.commit for row in with_provenance(ROWS, commit="abc")} == {"abc"}
 
 
-def test_a_row_of_an_earlier_run_keeps_its_commit():
-    earlier = [dataclasses.replace(row, commit="old") for row in ROWS]
-    assert {row.commit for row in with_provenance(earlier, commit="new", preset="quick")} == {"old"}
+def test_a_row_of_an_earlier_run_keeps_where_it_comes_from():
+    earlier = [dataclasses.replace(row, commit="old", hardware="another") for row in ROWS]
+    filled = with_provenance(earlier, commit="new", preset="quick", hardware="this")
+    assert {(row.commit, row.preset, row.hardware) for row in filled} == {("old", "quick", "another")}
 
 
 def test_the_module_is_light():

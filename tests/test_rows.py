@@ -189,6 +189,11 @@ def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_
         schedule.data("walk", "tshirt").id: Outcome(seconds=3.0),
         schedule.data("run", "tshirt").id: Outcome(seconds=4.0),
     }  # fmt: skip
-    costs = {row.metric: row.value for row in rows_of(plan, (), outcomes)}
+    rows = rows_of(plan, (), outcomes)
+    assert {row.reason for row in rows} == {""}
+    costs = {row.metric: row.value for row in rows}
     assert costs["cost/data"] == data and costs["cost/train"] == 120.0
     assert costs["cost/setup"] == 20.0 and costs["cost/memory"] == 9.0
+    lacking = dataclasses.replace(trained, result={**trained.result, "left_out": ["run"]})
+    rows = rows_of(plan, (), outcomes | {schedule.network(plan.networks[0]).id: lacking})
+    assert all("learned without run" in row.reason for row in rows)

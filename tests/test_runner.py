@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from misbehaving import interrupt_at
 from test_cell_tasks import TINY, NoLog, found_of, of_session, outcome_of, plan_of
@@ -222,6 +223,55 @@ def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, m
     monkeypatch.setattr(execution, "tasks_of", lambda plan: [task("lame", dies=True)])
     assert execution.execute(plan_of(tmp_path)) == 1
     assert "network lame: out-of-memory: the process was killed" in capsys.readouterr().err
+
+
+def test_a_dry_run_decides_as_the_run_does(tmp_path):
+    """What fails cannot be foreseen; everything else can."""
+
+    def planned_and_done(dies: bool, *only: str) -> tuple[set[str], set[str]]:
+        tasks = (
+            task("first", dies=dies), task("second", needs=(("network", "first"),)),
+            task("third", reads=(("network", "first"),)), task("fourth"),
+        )  # fmt: skip
+        preview = Runner(tasks, Cache(RunFolder(tmp_path), only=only)).preview()
+        planned = {task.name for task, _, outcome in preview if outcome is None}
+        runner = run_tasks(tmp_path, *tasks, only=only)
+        blocked = "failed: cannot be run"
+        ran = {name for (_, name), found in runner.found.items() if not found.why.startswith(blocked)}
+        return planned, ran - {title.removeprefix("network ") for title in runner.reused}
+
+    planned, done = planned_and_done(True, "stale", "missing")
+    assert planned - done == {"second"} and done == {"first", "third", "fourth"}
+    assert planned_and_done(True, "stale", "missing") == (set(), set())
+    (tmp_path / "cache" / "network" / "second.json").unlink()
+    assert planned_and_done(True, "missing") == (set(), set())
+    (tmp_path / "fourth.txt").unlink()
+    assert planned_and_done(False, "failed") == ({"first", "second"}, {"first", "second"})
+    assert planned_and_done(False, "stale", "missing") == ({"third", "fourth"}, {"third", "fourth"})
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Unkept(Task):
+    """Its outcome cannot be written down."""
+
+    kind = "unkept"
+    stage = "writing"
+    outcome: Outcome
+
+    def run(self, context, needed):
+        return self.outcome
+
+
+@pytest.mark.parametrize(
+    ("outcome", "word"),
+    [(Outcome(result={"x": np.float32(1)}), "float32"), (Outcome(files=("nowhere.npy",)), "nowhere.npy")],
+)
+def test_what_cannot_be_kept_has_failed_and_the_others_go_on(outcome, word, tmp_path):
+    bad = Unkept(name="bad", label="bad", inputs={}, modules=("benchmarks.results",), outcome=outcome)
+    runner = run_tasks(tmp_path, bad, task("good"))
+    assert runner.outcomes["unkept", "bad"].failed and word in runner.outcomes["unkept", "bad"].reason
+    assert runner.outcomes["network", "good"].status == "ok"
+    assert run_tasks(tmp_path, bad, task("good")).reused == ["unkept bad", "network good"]
 
 
 # --- out of date -----------------------------------------------------------------------------------------

@@ -24,8 +24,9 @@ class Outcome:
     """What came of a task.
 
     status and reason: in the words of a result row. failed: whether there is nothing to build upon. result:
-    plain values. files: what it has left, by their names in the run's folder. seconds: wall time. commit: of
-    the code, where an earlier run did it. remark: what has changed since, where it is kept all the same.
+    plain values. files: what it has left, by their names in the run's folder. seconds: wall time. origin:
+    commit, preset and hardware, where an earlier run did it. remark: what has changed since, where it is kept
+    all the same.
     """
 
     status: str = "ok"
@@ -34,7 +35,7 @@ class Outcome:
     result: Mapping[str, Any] = field(default_factory=dict)
     files: tuple[str, ...] = ()
     seconds: float = 0.0
-    commit: str = ""
+    origin: Mapping[str, Any] = field(default_factory=dict)
     remark: str = ""
 
 

@@ -1,0 +1,77 @@
+"""The tasks of a plan, and what makes two of them different."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+from tasks_by_hand import dressed_scene
+from test_cell_tasks import plan_of
+
+from benchmarks import provenance
+from benchmarks.methods import find_method
+from benchmarks.plan import Motions, Network
+from benchmarks.scenes import GarmentScenes
+from benchmarks.schedule import Schedule, tasks_of
+from benchmarks.tasks.cell import Cell
+from benchmarks.tasks.task import Task
+from snug.recipe import DEFAULT, TERMS
+from snug.recipes import TRAININGS, Training
+
+MOTIONS = Motions(train=("walk",), test=("kick",))
+
+
+def network(plan, name: str = "snug") -> Task:
+    return Schedule(plan).network(Network(name, 0, "tshirt"))
+
+
+def test_the_key_of_a_training_is_that_of_all_it_depends_on(tmp_path, monkeypatch):
+    plan = plan_of(tmp_path, motions=MOTIONS)
+    before = network(plan).key
+    assert before and network(plan).key == before
+    monkeypatch.setattr("benchmarks.source._version", lambda package: "another")
+    assert network(plan).key != before
+
+
+def test_an_energy_that_a_recipe_names_is_part_of_the_training(tmp_path, monkeypatch):
+    terms = (*TERMS, "spring")
+    monkeypatch.setitem(TRAININGS, "mine", Training("snug", dataclasses.replace(DEFAULT, terms=terms)))
+    plan = plan_of(tmp_path, motions=MOTIONS)
+    assert "reference_sim.energies.stretch_spring" in network(plan, "mine").modules
+    assert not any(module.startswith("reference_sim") for module in network(plan).modules)
+
+
+def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path, monkeypatch):
+    mesh = tmp_path / "cape.obj"
+    monkeypatch.setattr("benchmarks.scenes.GARMENT_SCENES", (GarmentScenes("cape", "", files=(str(mesh),)),))
+    schedule = Schedule(plan_of(tmp_path, motions=MOTIONS))
+    with pytest.raises(ValueError, match=r"cape\.obj"):
+        schedule.data("walk", "cape")
+    seen = []
+    for text in ("v 0 0 0", "v 0 0 1"):
+        mesh.write_text(text)
+        seen.append(dict(schedule.data("walk", "cape").inputs))
+    assert seen[0] != seen[1] and seen[0].keys() == seen[1].keys()
+
+
+def test_only_what_trains_depends_on_the_accelerator(tmp_path, monkeypatch):
+    facts = {"processor": "a processor", "cores": 2, "python": "3", "accelerator": "a GPU"}
+    hardware = {"cpu": facts | {"accelerator": None}, "cuda": facts}
+    monkeypatch.setattr(provenance, "hardware", lambda device: hardware[device])
+    cell = Cell(dressed_scene("kick"), find_method("snug"), 0, ("garments",))
+    plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
+    there = dataclasses.replace(plan, device="cuda")
+    own, other = ({task.id: task.inputs for task in tasks_of(p)} for p in (plan, there))
+    assert own.keys() == other.keys()
+    assert {id[0] for id in own if own[id] != other[id]} == {"network", "windows"}
+
+
+def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(tmp_path):
+    cell = Cell(dressed_scene("kick"), find_method("simulation"), 0, ("garments",))
+    plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
+    some = dataclasses.replace(cell.scene, metrics=("energy", "cost", "dynamics"))
+    fewer = dataclasses.replace(cell, scene=some)
+    own, other = (
+        {t.kind: t.inputs for t in tasks_of(dataclasses.replace(plan, cells=(c,)))} for c in (cell, fewer)
+    )
+    assert {kind for kind in own if own[kind] != other[kind]} == {"metrics"}
