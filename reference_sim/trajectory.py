@@ -37,7 +37,7 @@ class Trajectory:
         positions: (T, V, 3) [m].
         faces: (F, 3).
         times: (T,) [s].
-        frame_seconds: (T,) time on the clock for each frame [s]; nan where none was taken.
+        frame_seconds: (T,) time on the clock for each frame [s]; nan where none was taken, as by default.
         status: "converged", or the first failure among the frames (stalled, max_iterations, diverged,
             timeout); "ok" for a method that does not minimise.
         reason: one line in words.
@@ -48,11 +48,15 @@ class Trajectory:
     positions: np.ndarray
     faces: np.ndarray
     times: np.ndarray
-    frame_seconds: np.ndarray
+    frame_seconds: np.ndarray = field(default_factory=lambda: np.empty(0))
     status: str = "ok"
     reason: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
     frame_fields: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not len(self.frame_seconds):
+            object.__setattr__(self, "frame_seconds", np.full(self.frames, np.nan))
 
     @property
     def frames(self) -> int:

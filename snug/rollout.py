@@ -109,7 +109,6 @@ def _trajectory(
         positions=positions,
         faces=np.asarray(dressed.garment.faces),
         times=np.arange(len(positions)) / motion.fps,
-        frame_seconds=np.full(len(positions), np.nan),
         status="ok" if finite else "diverged",
         reason="" if finite else "the network gave a position that is not finite",
         provenance={

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 import itertools
 
 import numpy as np
@@ -60,6 +61,7 @@ def run(tmp_path_factory):
         plan_of(folder.path), preset=TINY, cells=cells, motions=Motions((TRAIN,), (TEST,))
     )
     assets = open_assets(TINY, embedded_motions([TRAIN, TEST]), ["tshirt"])
+    gc.freeze()  # each timed run collects first, and all that pytest holds is no garbage of it
     runner = Runner(tasks_of(plan), Cache(folder))
     executor = InProcess(folder, assets)
     runner.run(executor, NoLog())

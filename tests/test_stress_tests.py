@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from meshes import grid
 
+from benchmarks.tasks.case import RunCase
+from benchmarks.tasks.task import Outcome
 from benchmarks.validation import convergence_check, stress_tests
-from benchmarks.validation.case import timed_out
 from benchmarks.validation.convergence_check import lbfgs_then_newton, solve_and_check
 from benchmarks.validation.initial_conditions import INITIAL_POSITIONS, VELOCITIES
 from benchmarks.validation.registry import STRESS_TESTS
@@ -48,7 +49,8 @@ def test_a_point_of_a_map_counts_iterations_and_names_its_place():
     row = case.run()
     assert row.status == "ok" and row.value == solve_and_check(sheet(), lbfgs_then_newton).iterations
     assert (row.scene, row.metric, row.unit) == ("map_sheet", "map/1/0.0333", "iterations")
-    ended = timed_out(case, "no answer within 60 s")
+    task = RunCase(name=case.name, label=case.name, case=case, inputs={}, modules=(case.module,))
+    (ended,) = task.rows(Outcome("timeout", "no answer within 60 s", failed=True))
     assert (ended.status, ended.value, ended.unit, ended.scene) == ("failed", None, "iterations", "map_sheet")
 
 

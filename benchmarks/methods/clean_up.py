@@ -53,7 +53,6 @@ class CleanedNetwork(Method):
             positions=positions,
             faces=np.asarray(self.dressed.garment.faces),
             times=np.arange(len(positions)) / self.motion.fps,
-            frame_seconds=np.full(len(positions), np.nan),
             status="ok" if finite else "diverged",
             reason="" if finite else "the network gave a position that is not finite",
             provenance={"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN},

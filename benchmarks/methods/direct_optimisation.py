@@ -114,7 +114,6 @@ class DirectOptimisation(Method):
             positions=x.reshape(frames, -1, 3),
             faces=np.asarray(self.scene.cloth.faces),
             times=np.arange(frames) * self.scene.dt,
-            frame_seconds=np.full(frames, np.nan),
             status=status,
             reason=reason,
             provenance={"method": "direct-optimisation", "sums_J": [float(value) for value in self.sums]},

@@ -97,7 +97,6 @@ class NewtonSolver(Method):
             positions=np.array(positions),
             faces=scene.cloth.faces,
             times=scene.dt * np.arange(len(positions)),
-            frame_seconds=np.full(len(positions), np.nan),
             status=status,
             reason=reason,
             provenance=self._provenance(),

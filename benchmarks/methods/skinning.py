@@ -50,7 +50,6 @@ class Skinning(Method):
             positions=posed + self.pelvis[:, None],
             faces=self.faces,
             times=np.arange(frames) / self.motion.fps,
-            frame_seconds=np.full(frames, np.nan),
             status="ok",
             reason="",
             provenance={"method": "skinning"},

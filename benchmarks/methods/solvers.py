@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..method import MethodEntry
 
 _SIMULATION = "benchmarks.methods.simulation"
-_LBFGS = "benchmarks.methods.truncated_lbfgs"
+# Newton: every iteration is a factorisation of the true Hessian, or several. L-BFGS: the preconditioner
+# (mass over dt^2, a cotangent Laplacian, contacts) is factorised once a step; an iteration then costs one
+# evaluation of the energies and three triangular solves. Without memory it is preconditioned gradient
+# descent, in the manner of projective dynamics: one constant matrix, a line search, nothing learned from one
+# iteration to the next.
+_NEWTON: dict[str, Any] = {"module": _SIMULATION, "counted": "max_iterations", "method": "newton"}
+_LBFGS: dict[str, Any] = {
+    "module": _SIMULATION,
+    "counted": "max_iterations",
+    "method": "lbfgs",
+    "finish": False,
+}
 
 
 def _truncated(
-    family: str, label: str, unit: str, description: str, module: str, counts: tuple[int, ...], **options
-) -> tuple[MethodEntry, ...]:
-    """One entry for each number of iterations."""
+    family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *, module: str,
+    counted: str = "iterations", **options: Any,
+) -> tuple[MethodEntry, ...]:  # fmt: skip
+    """One entry for each number of iterations, which is the option `counted` of the module."""
     return tuple(
         MethodEntry(
             name=f"{family}-{count}",
             label=f"{label}, {_counted(count, unit)}",
             description=description.format(_counted(count, unit)),
             module=module,
-            options={"iterations": count, **options},
+            options={counted: count, **options},
             truncated=True,
             role="solver",
             family=family,
@@ -96,23 +110,23 @@ SOLVERS = (
     ),
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
-        "benchmarks.methods.truncated_newton", (1, 2, 4, 8),
+        (1, 2, 4, 8), **_NEWTON,
     ),
     *_truncated(
-        "lbfgs", "L-BFGS", "iteration", "L-BFGS, factored preconditioner, stopped after {}", _LBFGS,
-        (5, 10, 20, 40),
+        "lbfgs", "L-BFGS", "iteration", "L-BFGS, factored preconditioner, stopped after {}",
+        (5, 10, 20, 40), **_LBFGS, memory=10,
     ),
     *_truncated(
         "gradient-descent", "Gradient descent", "iteration",
-        "preconditioned gradient descent, stopped after {}", _LBFGS, (10, 40), memory=0,
+        "preconditioned gradient descent, stopped after {}", (10, 40), **_LBFGS, memory=0,
     ),
     *_truncated(
         "vbd", "Vertex block descent", "sweep", "vertex block descent on our energies, {} a step",
-        "benchmarks.methods.vertex_block_descent", (5, 20, 80),
+        (5, 20, 80), module="benchmarks.methods.vertex_block_descent",
     ),
     *_truncated(
         "xpbd", "XPBD", "sweep", "position-based dynamics with our energies, {} a step",
-        "benchmarks.methods.xpbd", (10, 40, 160),
+        (10, 40, 160), module="benchmarks.methods.xpbd",
     ),
     *(
         MethodEntry(

@@ -32,8 +32,9 @@ class RunCase(Task):
         return Outcome(row.status, row.reason, failed=row.status != "ok", result=dataclasses.asdict(row))
 
     def rows(self, outcome: Outcome) -> list[Row]:
-        """A case that died, or that hung, has a row too."""
-        from ..validation.case import timed_out
-
-        died = not outcome.result
-        return [timed_out(self.case, outcome.reason) if died else Row(**outcome.result)]
+        """A case that died, or that hung, has a row too. A hang and a crash are failures of the solver: only
+        one that ends by itself may call it a timeout.
+        """
+        if outcome.result:
+            return [Row(**outcome.result)]
+        return [self.case.row(status="failed", reason=outcome.reason)]

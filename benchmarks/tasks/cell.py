@@ -160,9 +160,10 @@ class BatchCell(CellTask):
         method = context.memo.get("method") or self.ready(context)
         positions, reading = clocked(method.batch(BATCH), of=lambda made: made)
         seconds = reading.seconds / (positions.shape[0] * positions.shape[1])
+        result = {"seconds": seconds, "complaint": reading.complaint}
         if reading.complaint:
-            return Outcome("failed", UNBELIEVABLE + reading.complaint, result={"seconds": seconds})
-        return Outcome(result={"seconds": seconds})
+            return Outcome("failed", UNBELIEVABLE + reading.complaint, result=result)
+        return Outcome(result=result)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -56,7 +56,6 @@ def write_body(run: RunFolder, scene: BuiltScene) -> None:
         positions=scene.obstacle.positions.astype(np.float32),  # for the eye: half the size
         faces=scene.obstacle.faces,
         times=np.arange(scene.frames) * scene.dt,
-        frame_seconds=np.full(scene.frames, np.nan),
         provenance={"what": "the body of this scene"},
     ).save(run.trajectory_path(scene.name, "body"))
 

@@ -108,14 +108,6 @@ class Case:
         return getattr(importlib.import_module(self.module), *name_and_default)
 
 
-def timed_out(case: Case, reason: str, status: str = "failed") -> Row:
-    """The row of a case whose process died or was ended at its deadline.
-
-    A hang and a crash are failures of the solver. Only a solver that ends by itself may call it a timeout.
-    """
-    return case.row(status=status, reason=reason)
-
-
 def known_answer(
     name: str, description: str, module: str, function: str, *, smoke: bool = True, **declared: Any
 ) -> Case:
