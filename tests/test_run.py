@@ -14,11 +14,14 @@ from misbehaving import interrupt_at
 
 from benchmarks import methods, run
 from benchmarks.methods import METHODS
-from benchmarks.plan import PlanError
+from benchmarks.plan import Motions, PlanError
+from benchmarks.presets import PRESETS
 from benchmarks.results import RunFolder
+from benchmarks.suites import SUITES, Extent
 from benchmarks.validation.registry import KNOWN_ANSWERS
 from benchmarks.validation.stress_tests import MAPS, STEPS
 from reference_sim import Trajectory
+from snug.motion_library import DYNAMIC_TEST, TEST
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -75,6 +78,17 @@ def test_the_list_names_everything(capsys):
     names += [c.name for c in STEPS] + [f"{name}/*" for name in MAPS]
     for name in [*names, "tshirt/", "garments", "paper", "walk"]:
         assert name in words
+
+
+@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
+def test_the_list_names_every_scene_that_a_suite_has(preset, capsys):
+    motions = Motions(test=TEST, dynamic_test=DYNAMIC_TEST)
+    extents = [Extent(preset, motions, full=wide, further=wide) for wide in (False, True)]
+    asked = {name for suite in SUITES for extent in extents for name in suite.scenes(extent)}
+    assert run.main(["--list"]) == 0
+    listed = {line.split()[0] for line in capsys.readouterr().out.splitlines() if line.strip()}
+    assert "tshirt/there_and_back" in asked
+    assert not {name.removesuffix("@clip") for name in asked} - listed
 
 
 # --- wrong words -----------------------------------------------------------------------------------------
