@@ -60,7 +60,7 @@ class Preset:
 PRESETS = (
     Preset(
         name="smoke",
-        description="everything once, tiny: about 2 minutes on 2 cores; its numbers mean nothing",
+        description="everything once, tiny: 2 to 3 minutes on 2 cores; its numbers mean nothing",
         garment_vertices=350,
         train_motions=1,
         test_motions=1,
@@ -87,7 +87,7 @@ PRESETS = (
     ),
     Preset(
         name="quick",
-        description="garments of 1000 vertices, all embedded motions; by default under 15 minutes on 2 cores",
+        description="garments of 1000 vertices, all embedded motions; by default about 15 minutes on 2 cores",
         garment_vertices=1000,
         train_motions=None,
         test_motions=None,

@@ -27,7 +27,7 @@ PROGRAM = "benchmarks.run"
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 EXAMPLES = """examples:
   python -m benchmarks.run                                    the quick run: every suite's quick subset
-  python -m benchmarks.run --preset smoke                     everything once, tiny, about 2 minutes
+  python -m benchmarks.run --preset smoke                     everything once, tiny, 2 to 3 minutes
   python -m benchmarks.run --suite garments -o reports/runs/mine
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
   python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2
@@ -49,7 +49,7 @@ a folder that holds a run is gone on with: what is finished there for the same i
   as it is, the rest is done. A run that was killed is so taken up again. --only failed does again what
   failed, --fresh everything.
 
-exit status: 0 when every cell ended as ok or as an explained skip (in extremes an honest failure with
+exit status: 0 when every cell ended as ok or as an explained skip (in extremes a failure reported with
   its reason is an accepted outcome); 1 when a cell, a training or a simulation failed: a line says why
   and the rest went on; 2 when the request cannot be met, also where another run is going on in the
   folder: one line says why and nothing is left behind; 130 when it was interrupted: what had ended is

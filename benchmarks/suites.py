@@ -145,8 +145,8 @@ SUITES = (
     ),
     Suite(
         name="extremes",
-        description="stiff, huge and degenerate input; methods on a walk made hard: converged, or an honest "
-        "failure",
+        description="stiff, huge and degenerate input; methods on a walk made hard: converged, or a "
+        "reported failure",
         scenes=_out_of_distribution,
         methods=lambda extent: ["simulation", *FAST],
         more_methods=tuple(entry.name for entry in LEARNED if entry.batched),

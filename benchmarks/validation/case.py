@@ -1,4 +1,4 @@
-"""A case: one row whose answer is known before anything is computed, or that has to end honestly."""
+"""A case: one row whose answer is known before anything is computed, or whose failure has to be reported."""
 
 from __future__ import annotations
 
