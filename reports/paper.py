@@ -80,7 +80,10 @@ def findings(run: Run) -> list[Table]:
         Column("apart", "Apart", "%", digits=2, trim=True),
         Column("status", "Here", text=True, width="1.2fr"),
     )
-    caption = "Findings of the paper: which method has less of what, and whether that came out here."
+    caption = (
+        "Findings of the paper: which method has less of what, and whether that came out here. "
+        "Apart: of geometric means where several seeds are compared and all values are positive."
+    )
     return table("findings", columns, rows, caption)
 
 
