@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from tasks_by_hand import dressed_scene
 
-from benchmarks import schedule
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.cache import dependencies
 from benchmarks.clips import clip, joint_speeds
@@ -90,7 +89,7 @@ def test_presets_grow():
     assert (*choose_suites([]), "performance") == choose_suites(["all"])  # that one only where it is named
 
 
-TRAININGS = {"snug", "snug.recipe", "snug.recipe_deviations"}
+TRAININGS = {"snug", "snug.recipe", "snug.recipes", "snug.recipe_deviations"}
 
 
 def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
@@ -134,16 +133,12 @@ def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes
     assert len(keys) == 4
 
 
-def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not(monkeypatch):
-    plan = planned("--scenes", "tshirt/kick,hanging_sheet", "--methods", "simulation")
-
-    def keys():
-        tasks = [t for cell in plan.cells for t in (Schedule(plan).cell(cell), Schedule(plan).metrics(cell))]
-        return {(task.kind, task.cell.scene.name): key_of(task) for task in tasks}
-
-    before = keys()
-    monkeypatch.setattr(schedule, "DEFAULT", dataclasses.replace(schedule.DEFAULT, smoothing=7))
-    assert {name for name, key in keys().items() if key != before[name]} == {("metrics", "tshirt/kick")}
+def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not():
+    plan = planned("--scenes", "tshirt/kick,hanging_sheet", "--methods", "simulation,skinning")
+    tasks = [t for cell in plan.cells for t in (Schedule(plan).cell(cell), Schedule(plan).metrics(cell))]
+    smoothed = {task.title for task in tasks if "snug/recipe.py" in dependencies(task)}
+    measured = {task.title for task in tasks if task.kind == "metrics"}
+    assert smoothed == measured | {task.title for task in tasks if task.cell.method == "skinning"}
 
 
 def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_networks():

@@ -15,7 +15,7 @@ from snug.motion import Motion, arm_clearance
 from snug.motion_augmentation import lap_clearance, mirrored, mixed_for, mixed_motions
 from snug.motion_library import make_motion
 from snug.recipe import DEFAULT, Recipe
-from snug.recipes import PAPER
+from snug.recipes import PAPER, SUPERVISED
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions
 from snug.trained_model import ModelFileError, TrainedModel
@@ -136,7 +136,7 @@ def test_supervised_learns_what_it_is_shown():
     dressed, motion = tube_dress(), swaying(30)
     target = dressed.skinned(motion, smoothing=20)
     target[:, :, 1] -= 0.02
-    model = short("supervised", steps=150, recipe=None, motions=[motion], trajectories={"sway": target})
+    model = short("supervised", steps=150, recipe=SUPERVISED, motions=[motion], trajectories={"sway": target})
     assert model.recipe.window == 16 and model.recipe.mixed == 0
     start = vertex_loss(torch.as_tensor(target - [0, -0.02, 0]), torch.as_tensor(target)).mean()
     assert start == pytest.approx(4.0, rel=1e-3)  # 2 cm, squared
