@@ -43,15 +43,21 @@ class Executor(Protocol):
 
 
 class LocalExecutor:
-    """Single-threaded processes of this machine, at most `workers` side by side."""
+    """Single-threaded processes of this machine, at most `workers` side by side.
+
+    Workers stay for the next stage, which then loads and compiles nothing again; none is there beside a timed
+    task.
+    """
 
     def __init__(self, folder: RunFolder, assets: Assets | None, workers: int) -> None:
         self.folder, self.assets, self.workers = folder, assets, workers
         self._named: dict[str, IsolatedProcess] = {}
+        self._crew: list[_Worker] = []
 
     def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
         count = min(self.workers, len(batches))
-        crew = [_Worker(self.folder, self.assets) for _ in range(count)]
+        self._crew += [_Worker(self.folder, self.assets) for _ in range(count - len(self._crew))]
+        crew = self._crew[:count]
         idle: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
         for worker in crew:
             idle.put(worker)
@@ -79,11 +85,11 @@ class LocalExecutor:
                         yield finished.get()
             except BaseException:
                 _end(left)
+                self._crew.clear()
                 raise
-        for worker in crew:
-            worker.process.close()
 
     def alone(self, task: Task, needed: Needed) -> Outcome:
+        self._dismiss()
         process = self._named.get(task.process)
         if process is None:
             context = Context(self.folder, task.assets(self.assets))
@@ -95,8 +101,13 @@ class LocalExecutor:
             self._named.pop(process).close()
 
     def close(self) -> None:
+        self._dismiss()
         for name in list(self._named):
             self.release(name)
+
+    def _dismiss(self) -> None:
+        while self._crew:
+            self._crew.pop().process.close()
 
 
 class _Worker:

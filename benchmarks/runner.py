@@ -48,16 +48,21 @@ class Runner:
 
     def run(self, executor: Executor, log: Log) -> None:
         """All tasks, stage by stage."""
-        for stage, group in groupby(self.tasks, key=lambda task: task.stage):
-            tasks = list(group)
-            with log.stage(stage):
-                if tasks[0].process:
-                    self._alone(tasks, executor)
-                while tasks and not tasks[0].process:  # those that need one another, one after another
-                    left = {task.id for task in tasks}
-                    later = [task for task in tasks if left & {*task.needs, *task.reads}]
-                    self._together([task for task in tasks if task not in later], executor)
-                    tasks = later
+        try:
+            for stage, group in groupby(self.tasks, key=lambda task: task.stage):
+                with log.stage(stage):
+                    self._stage(list(group), executor)
+        finally:
+            executor.close()
+
+    def _stage(self, tasks: Sequence[Task], executor: Executor) -> None:
+        if tasks[0].process:
+            self._alone(tasks, executor)
+        while tasks and not tasks[0].process:  # those that need one another, one after another
+            left = {task.id for task in tasks}
+            later = [task for task in tasks if left & {*task.needs, *task.reads}]
+            self._together([task for task in tasks if task not in later], executor)
+            tasks = later
 
     def _together(self, tasks: Sequence[Task], executor: Executor) -> None:
         wanted = [task for task in tasks if self.decide(task)]
@@ -77,17 +82,14 @@ class Runner:
             bar.update(bar.total - bar.n)
 
     def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
-        try:
-            with _bar(tasks[0], len(tasks)) as bar:
-                for place, task in enumerate(tasks):
-                    if self.decide(task):
-                        task.clear(self.cache.folder)
-                        self._keep(task, executor.alone(task, self._needed(task)))
-                    if not any(self._comes(other, task.process) for other in tasks[place + 1 :]):
-                        executor.release(task.process)
-                    bar.update()
-        finally:
-            executor.close()
+        with _bar(tasks[0], len(tasks)) as bar:
+            for place, task in enumerate(tasks):
+                if self.decide(task):
+                    task.clear(self.cache.folder)
+                    self._keep(task, executor.alone(task, self._needed(task)))
+                if not any(self._comes(other, task.process) for other in tasks[place + 1 :]):
+                    executor.release(task.process)
+                bar.update()
 
     def _comes(self, task: Task, process: str) -> bool:
         """Whether the task will want that process."""
