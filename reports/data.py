@@ -17,7 +17,6 @@ ROLES = (
     "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
     "warm-started", "",
 )  # fmt: skip
-CELL = ["scene", "method", "seed", "metric"]
 
 
 @dataclass(frozen=True)
@@ -60,11 +59,11 @@ class Run:
     def suite(self, *names: str) -> pd.DataFrame:
         return self.frame[self.frame["suite"].isin(names)]
 
-    def cells(self, first: str) -> pd.DataFrame:
-        """The rows of garments and speed, each cell once: one that both report is taken from `first`."""
-        kept = self.suite("garments", "speed")
-        order = (kept["suite"] != first).sort_values(kind="stable").index
-        return kept.loc[order].drop_duplicates(CELL).sort_index()
+    def cells(self, *suites: str) -> pd.DataFrame:
+        """The rows of these suites that are no case, each cell once: from the first suite that reports it."""
+        kept = self.suite(*suites)
+        kept = kept[kept["case"] == ""].sort_values("suite", key=lambda s: s.map(suites.index), kind="stable")
+        return kept.drop_duplicates(["scene", "method", "seed", "metric"])
 
     @property
     def worn(self) -> pd.DataFrame:
