@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -115,6 +116,8 @@ def _text(run: Run, column: Column, cell: Cell) -> str:
         return (run.label(value) if column.name in METHODS else value) or DASH
     if isinstance(value, int):
         return str(value)
+    if value == math.inf:  # tolerances away from a number that must be exact
+        return "∞"
     if column.unit == "s":
         return duration(value)
     small = column.digits > 3 and value is not None and abs(value) < NOISE
