@@ -1,6 +1,6 @@
 """python -m reports.build RUN_DIR: the tables, figures and PDF of a finished run.
 
-Reads run.json, results.csv, trajectories and training histories in RUN_DIR, and nothing else; writes
+Reads run.json, results.csv, trajectories and histories of trainings in RUN_DIR, and nothing else; writes
 tables/*.csv, figures/*.svg and *.png, and report.pdf there. Run twice, it writes the same bytes twice.
 """
 
@@ -67,6 +67,7 @@ def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
     """Every figure that the run holds something for."""
     from reports import figures, training
     from reports.break_even import break_even
+    from reports.convergence import convergence_curve
     from reports.profile import performance_profile
     from reports.stability import stability_maps
     from reports.work_precision import error_against_time
@@ -77,7 +78,8 @@ def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
         stability_maps,
     ):  # fmt: skip
         pictures += make(folder.figures, run)
-    return pictures + training.training_curves(folder, run, problems)
+    pictures += training.training_curves(folder, run, problems)
+    return pictures + convergence_curve(folder, problems)
 
 
 def draw_trajectories(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
