@@ -25,9 +25,10 @@ COLUMNS = (
     "tolerance", "preset", "commit", "hardware", "dtype", "threads", "terms", "garment", "motion", "part",
     "family", "level", "role", "base", "seeded", "pairing_group",
 )  # fmt: skip
+# In this order methods stand in a report.
 ROLES = (
-    "reference", "reference-variant", "solver", "external", "warm-started", "network", "ablation", "baseline",
-    "bound", "",
+    "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
+    "warm-started", "",
 )  # fmt: skip
 
 

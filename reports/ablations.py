@@ -18,7 +18,10 @@ SHOWN = (
 # A term that is left out of the loss is of course larger; the total is the base's own loss, curvature error
 # (the paper's measure) is nobody's.
 JUDGED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
-HEAD = (Column("garment", "Garment", text=True), Column("method", "Method", text=True, width="1fr"))
+HEAD = (
+    Column("garment", "Garment", text=True),
+    Column("method", "Method", text=True, method=True, width="1fr"),
+)
 
 
 def ablations(run: Run) -> list[Table]:

@@ -109,8 +109,8 @@ def crossings(run: Run) -> list[Table]:
             lines.append((garment, network.method, rival.method, why[rival.method], rounded, total))
     columns = (
         Column("garment", "Garment", text=True),
-        Column("method", "Network", text=True, width="1fr"),
-        Column("solver", "Overtakes", text=True, width="1.3fr"),
+        Column("method", "Network", text=True, method=True, width="1fr"),
+        Column("solver", "Overtakes", text=True, method=True, width="1.3fr"),
         Column("as_good", "As good by", text=True),
         Column("crossing", "From frames on", digits=2, trim=True),
         Column("total_time", "Total time by then", "s"),

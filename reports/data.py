@@ -8,15 +8,10 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.results import COLUMNS, Row
+from benchmarks.results import COLUMNS, ROLES, Row
 
 USABLE = ("ok", "stalled")
 SUITES = ("garments", "speed", "validation", "extremes", "performance")
-# Methods stand in this order of their roles, and within a role as they are declared.
-ROLES = (
-    "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
-    "warm-started", "",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -73,7 +68,7 @@ class Run:
 
     def garments(self, frame: pd.DataFrame) -> dict[str, list[str]]:
         """Garment -> its scenes among these rows, in the order in which run.json declares them."""
-        declared = {name: place for place, name in enumerate(self.config.get("scenes_declared", ()))}
+        declared = {name: place for place, name in enumerate(self.config.get("scenes") or ())}
         pairs = frame[frame["garment"] != ""][["garment", "scene"]].drop_duplicates()
         found: dict[str, list[str]] = {}
         for garment, scene in sorted(pairs.itertuples(index=False), key=lambda p: declared.get(p[1], 0)):
@@ -126,9 +121,7 @@ def run_data(config: Mapping[str, Any], rows: Sequence[Row]) -> Run:
     frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
     frame["case"] = _cases(frame, config.get("cases") or {})
     methods = _methods(frame, config.get("methods") or {})
-    scenes = config.get("scenes")
-    own = {**config, "scenes_declared": list(scenes) if isinstance(scenes, dict) else ()}
-    return Run(own, frame, metrics, methods)
+    return Run(config, frame, metrics, methods)
 
 
 def _metric(name: str, unit: str, said: Mapping[str, Any]) -> Metric:

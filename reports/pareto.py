@@ -74,14 +74,15 @@ def fastest(points: Iterable[Point], error: float) -> Point | None:
     return min(reached, key=lambda p: (p.time, p.error, p.method)) if reached else None
 
 
+def of_one_problem(run: Run, points: Iterable[Point]) -> list[Point]:
+    """Those that solve what the reference solves, from where it starts."""
+    return [p for p in points if run.methods[p.method].family not in (PERTURBED, SMALLER_STEPS)]
+
+
 def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
     """Solvers alone, truncated or to a tolerance, with nothing learned, of the reference's own problem."""
     kept = set(run.with_role("reference", "solver", "reference-variant"))
-    return [
-        p
-        for p in points
-        if p.method in kept and run.methods[p.method].family not in (PERTURBED, SMALLER_STEPS)
-    ]
+    return [p for p in of_one_problem(run, points) if p.method in kept]
 
 
 def truncated(run: Run, points: Iterable[Point]) -> list[Point]:

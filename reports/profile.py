@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from reports.data import Run
-from reports.pareto import PERTURBED, SMALLER_STEPS, Point, fastest, points_of
+from reports.pareto import Point, fastest, of_one_problem, points_of
 from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, new_figure, power_text, save
 from reports.styles import family_style
 
@@ -57,10 +57,8 @@ def times_to_reach(run: Run, scenes: Sequence[str], target: float) -> dict[str, 
     found: dict[str, dict[str, float]] = {}
     for scene in scenes:
         families: dict[str, list[Point]] = {}
-        for point in points_of(run, frame, [scene], METRIC):
-            family = run.methods[point.method].family
-            if family not in (PERTURBED, SMALLER_STEPS):
-                families.setdefault(family, []).append(point)
+        for point in of_one_problem(run, points_of(run, frame, [scene], METRIC)):
+            families.setdefault(run.methods[point.method].family, []).append(point)
         times = {name: best.time for name, points in families.items() if (best := fastest(points, target))}
         if times:
             found[scene] = times

@@ -24,14 +24,15 @@ Cell = float | int | str | Mean | None
 class Column:
     """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
 
-    text: words, set from the left. width: "auto", or a share of the page's width as "1fr". digits: of its
-    numbers; trim: without zeros at their end.
+    text: words, set from the left; method: names of methods, printed by their labels. width: "auto", or a
+    share of the page's width as "1fr". digits: of its numbers; trim: without zeros at their end.
     """
 
     name: str
     title: str
     unit: str = ""
     text: bool = False
+    method: bool = False
     width: str = "auto"
     digits: int = 3
     trim: bool = False

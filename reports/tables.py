@@ -22,7 +22,7 @@ from reports.pareto import ERRORS, TIME
 from reports.table import Cell, Column, Table, metric_column, table
 
 BY_SCENE = ("suite", "scene")  # what groups the lines of a table that is not averaged over scenes
-METHOD = Column("method", "Method", text=True, width="1fr")
+METHOD = Column("method", "Method", text=True, method=True, width="1fr")
 GARMENT, SCENE, SUITE = (Column(name, name.capitalize(), text=True) for name in ("garment", "scene", "suite"))
 REASON = Column("reason", "Reason", text=True, width="2fr")
 
@@ -168,7 +168,7 @@ def extremes(run: Run) -> list[Table]:
     unit = rows["unit"].iloc[0] if len(rows) else ""
     columns = (
         Column("case", "Case", text=True, width="1fr"),
-        Column("method", "Method", text=True),
+        Column("method", "Method", text=True, method=True),
         Column("outcome", "Outcome", text=True),
         Column("gradient", "Largest gradient", unit, digits=2, trim=True),
         Column("reason", "In words", text=True, width="2fr"),
@@ -202,7 +202,8 @@ def unfinished(run: Run) -> list[Table]:
     rows = run.frame[(run.frame["status"] != "ok") & ~judged_elsewhere]
     names = ["suite", "scene", "method", "seed", "status", "reason"]
     lines = rows[names].drop_duplicates().itertuples(index=False)
-    columns = (SUITE, Column("scene", "Scene", text=True, width="1fr"), Column("method", "Method", text=True),
+    columns = (SUITE, Column("scene", "Scene", text=True, width="1fr"),
+        Column("method", "Method", text=True, method=True),
         Column("seed", "Seed", text=True), Column("status", "Status", text=True), REASON)  # fmt: skip
     cells = [(*line[:5], line[5] or "no reason given") for line in lines]
     return table("unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each.")

@@ -93,19 +93,12 @@ def metric_against_metric(folder: Path, run: Run, x: str, y: str, scenes: Sequen
 
 def _errors(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """The points of one panel. The reference's own error is zero by construction: it is drawn as a line."""
-    scenes = list(dict.fromkeys(rows["scene"]))
-    found = []
-    for point in points_of(run, rows, scenes, metric):
-        method = run.methods[point.method]
-        other_problem = method.family == SMALLER_STEPS and metric in OWN_STEP
-        if (
-            point.time > 0.0
-            and method.role != "reference"
-            and method.family != PERTURBED
-            and not other_problem
-        ):
-            found.append(point)
-    return found
+    points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric)
+    # Smaller steps have errors of the garment, but none of the reference's own step.
+    left_out = (PERTURBED, SMALLER_STEPS) if metric in OWN_STEP else (PERTURBED,)
+    reference = run.with_role("reference")
+    kept = [p for p in points if run.methods[p.method].family not in left_out and p.method not in reference]
+    return [p for p in kept if p.time > 0.0]
 
 
 def _draw_errors(
