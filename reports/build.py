@@ -120,7 +120,7 @@ def read_trajectory(folder: RunFolder, path: Path, problems: list[str]) -> Traje
     return None
 
 
-def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Path:
+def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Picture:
     """Any metric against any other, into figures/. Raises ResultsError for a name that no row has."""
     run = read_run(folder)
     asked = scenes.split(",") if scenes else []
@@ -135,7 +135,7 @@ def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Path:
     if picture is None:
         where = ", ".join(asked) or "every scene"
         raise ResultsError(f"{folder.rows_path}: fewer than two methods have both {x} and {y} on {where}")
-    return picture.path
+    return picture
 
 
 def most_shared(run: Run, x: str, y: str) -> list[str]:
@@ -194,7 +194,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.axes:
             x, y = options.axes
-            print(draw_axes(RunFolder(options.run_dir), x, y, options.scenes))
+            picture = draw_axes(RunFolder(options.run_dir), x, y, options.scenes)
+            print(picture.caption, picture.path, sep="\n")
             return 0
         path, problems = build_report(options.run_dir)
     except ResultsError as error:

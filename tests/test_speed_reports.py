@@ -313,6 +313,7 @@ def test_any_metric_against_any_other(tmp_path, capsys):
     run.write_rows([*all_rows(), *far])
     assert build.main([str(tmp_path), "--axes", "motion/strain", "motion/offset"]) == 0
     assert (tmp_path / "figures/motion-offset_against_motion-strain.svg").is_file()
+    assert "Left out, for motion/strain is zero: Skinning alone." in capsys.readouterr().out
     run.write_rows([*all_rows(), row("sheet", "newton-1", "curvature/error", 1.0)])
     assert build.main([str(tmp_path), "--axes", "cost/frame", "curvature/error"]) == 0
     run.write_rows([*all_rows(), row(SCENES[0], "newton-1", "lag", -1.0), row(SCENES[0], "snug", "lag", 1.0)])
