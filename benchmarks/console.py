@@ -66,7 +66,8 @@ def _groups(suite: str, rows: list[Row]) -> list[tuple[str, list[Row]]]:
         return [(f"speed, {scene}", own) for scene, own in groups.items()]
     titled = []
     for garment, own in groups.items():
-        count = len({row.scene for row in own})
+        # Not those of long roll-outs and trainings, whose numbers have other names.
+        count = len({row.scene for row in own if row.metric == "energy/total"}) or 1
         of = f", {garment}" if len(groups) > 1 else ""
         titled.append((f"garments{of}, mean of {count} scene{'s' * (count > 1)}", own))
     return titled

@@ -25,9 +25,10 @@ COLUMNS = (
     "tolerance", "preset", "commit", "hardware", "dtype", "threads", "terms", "garment", "motion", "part",
     "family", "level", "role", "base", "seeded", "pairing_group",
 )  # fmt: skip
+# In this order methods stand in a report.
 ROLES = (
-    "reference", "reference-variant", "solver", "external", "warm-started", "network", "ablation", "baseline",
-    "bound", "",
+    "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
+    "warm-started", "",
 )  # fmt: skip
 
 
@@ -45,7 +46,7 @@ class Row:
     Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
     Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
     that number; base, the method that it varies or starts from; seeded, whether another seed gives another
-    answer; pairing_group, shared by methods that begin with the same weights and draws when seeds are equal.
+    answer; pairing_group, of variants of one method, which share the seed and are compared seed by seed.
 
     Raises ResultsError for an unknown status, a non-finite value called ok, or a skip without a reason.
     """

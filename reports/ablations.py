@@ -1,4 +1,4 @@
-"""Methods less one ingredient each, beside the full recipe: what leaving it out makes worse, and better."""
+"""Variants of a method beside their base: what the variation makes worse, and better."""
 
 from __future__ import annotations
 
@@ -9,30 +9,31 @@ import pandas as pd
 from reports.data import Run
 from reports.means import mean_of, pair
 from reports.significance import difference
-from reports.table import Cell, Column, Table, table
+from reports.table import Cell, Column, Table, metric_column, table
 
 SHOWN = (
     "energy/strain", "energy/bending", "energy/gravity", "energy/inertia", "energy/collision", "energy/total",
     "curvature/error", "penetration/vertices", "dynamics/amplitude", "dynamics/correlation", "roll_out/drift",
 )  # fmt: skip
-# A term that is left out of the loss is of course larger; the total is the full recipe's own loss, curvature
-# error (the paper's measure) is nobody's.
+# A term that is left out of the loss is of course larger; the total is the base's own loss, curvature error
+# (the paper's measure) is nobody's.
 JUDGED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
-HEAD = (Column("garment", "Garment", text=True), Column("method", "Method", text=True, width="1fr"))
+HEAD = (
+    Column("garment", "Garment", text=True),
+    Column("method", "Method", text=True, method=True, width="1fr"),
+)
 
 
 def ablations(run: Run) -> list[Table]:
-    """The numbers of each full recipe and of its ablations that ran, by garment."""
+    """The numbers of each base and of its ablations that ran, by garment."""
     metrics = [run.metrics[name] for name in SHOWN if name in run.metrics]
     lines: list[tuple[Cell, ...]] = [
         (garment, method, *(mean_of(rows, method, metric.name) for metric in metrics))
         for garment, base, below, rows in _families(run)
         for method in (base, *below)
     ]
-    columns = [
-        Column(metric.name, metric.title, "" if metric.unit == "1" else metric.unit) for metric in metrics
-    ]
-    caption = "Ablations: the full recipe first, then less one ingredient each."
+    columns = [metric_column(metric) for metric in metrics]
+    caption = "Ablations: the base first, then its variants."
     return table("ablations", (*HEAD, *columns), lines, caption, grouped_by=("garment",))
 
 
@@ -49,14 +50,14 @@ def ablations_judged(run: Run) -> list[Table]:
             lines.append((garment, method, ", ".join(ways[1]), ", ".join(ways[-1])))
     words = [Column(way, f"{way.capitalize()} in", text=True, width="1fr") for way in ("worse", "better")]
     caption = (
-        "Where each ablation is worse or better than the full recipe by more than seeds scatter, over the "
+        "Where each variant is worse or better than its base by more than seeds scatter, over the scenes "
+        "that both have."
     )
-    caption += "scenes that both have."
     return table("ablations_judged", (*HEAD, *words), lines, caption, grouped_by=("garment",))
 
 
 def _families(run: Run) -> Iterator[tuple[str, str, list[str], pd.DataFrame]]:
-    """Garment, full recipe, the ablations that ran beside it, and the rows of the garment."""
+    """Garment, base, the ablations that ran beside it, and the rows of the garment."""
     for garment in run.garments(run.worn):
         rows = run.worn[run.worn["garment"] == garment]
         usable = rows[rows["usable"]]["method"]

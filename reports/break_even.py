@@ -72,11 +72,16 @@ def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str], network: str = 
 
 
 def compared_scenes(run: Run, frame: pd.DataFrame, network: str = NETWORK) -> dict[str, list[str]]:
-    """Garment -> the scenes in which the network was timed beside a truncated solver."""
+    """Garment -> the scenes in which the network was timed beside a truncated solver.
+
+    Those of suite speed where there are any: whole motions have no energy gap.
+    """
     timed = frame[frame["usable"] & (frame["metric"] == TIME) & (frame["garment"] != "")]
     levels = {name for name, method in run.methods.items() if method.level is not None}
     both = set(timed[timed["method"] == network]["scene"]) & set(timed[timed["method"].isin(levels)]["scene"])
-    return run.garments(timed[timed["scene"].isin(both)])
+    rows = timed[timed["scene"].isin(both)]
+    of_speed = rows[rows["suite"] == "speed"]
+    return run.garments(of_speed if len(of_speed) else rows)
 
 
 def compared_costs(
@@ -86,14 +91,14 @@ def compared_costs(
     rows = frame[frame["scene"].isin(list(scenes))]
     training = rows[rows["usable"] & (rows["metric"] == "cost/train") & (rows["value"] > 0.0)]["method"]
     alone = [m for m in training if run.methods[m].role in ("network", "ablation", "baseline")]
-    found = ([cost_of(rows, m, scenes) for m in methods] for methods in (leading(run, alone), against))
+    found = ([cost_of(rows, m, scenes) for m in methods] for methods in (run.ordered(alone), against))
     networks, others = ([cost for cost in costs if cost is not None] for costs in found)
     return networks, others
 
 
 def crossings(run: Run) -> list[Table]:
     """From how many frames on each trained network is cheaper than the solvers it competes with."""
-    frame = run.cells("speed")
+    frame = run.cells("speed", "garments")
     lines: list[tuple[Cell, ...]] = []
     for garment, scenes in compared_scenes(run, frame).items():
         why = rivals(run, frame, scenes)
@@ -104,8 +109,8 @@ def crossings(run: Run) -> list[Table]:
             lines.append((garment, network.method, rival.method, why[rival.method], rounded, total))
     columns = (
         Column("garment", "Garment", text=True),
-        Column("method", "Network", text=True, width="1fr"),
-        Column("solver", "Overtakes", text=True, width="1.3fr"),
+        Column("method", "Network", text=True, method=True, width="1fr"),
+        Column("solver", "Overtakes", text=True, method=True, width="1.3fr"),
         Column("as_good", "As good by", text=True),
         Column("crossing", "From frames on", digits=2, trim=True),
         Column("total_time", "Total time by then", "s"),
@@ -119,9 +124,11 @@ def crossings(run: Run) -> list[Table]:
 
 def break_even(folder: Path, run: Run) -> list[Picture]:
     """One figure: total time of N frames for each trained network and for the solvers it competes with."""
-    frame = run.cells("speed")
+    frame = run.cells("speed", "garments")
     scenes = next(iter(compared_scenes(run, frame).values()), [])
     trained, others = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
+    shown = leading(run, (cost.method for cost in trained))
+    trained = [cost for cost in trained if cost.method in shown]
     costs = [*others, *trained]
     if not trained or len(costs) < 2:
         return []

@@ -1,6 +1,6 @@
 """python -m reports.build RUN_DIR: the tables, figures and PDF of a finished run.
 
-Reads run.json, results.csv, trajectories and training histories in RUN_DIR, and nothing else; writes
+Reads run.json, results.csv, trajectories and histories of trainings in RUN_DIR, and nothing else; writes
 tables/*.csv, figures/*.svg and *.png, and report.pdf there. Run twice, it writes the same bytes twice.
 """
 
@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from reports.plotting import Picture
 
 TEMPLATE = Path(__file__).parent / "report.typ"
+# Names of what draw() makes.
+FIGURES = (
+    "break_even.*", "convergence.*", "energy_series_*", "error_against_time*", "frames_*", "hem_*",
+    "performance_profile.*", "stability_maps.*", "throughput.*", "training_*", "training.*",
+)  # fmt: skip
 
 
 def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
@@ -35,7 +40,8 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     from reports.tables import make_tables
 
     tables = make_tables(run)
-    for old in folder.tables.glob("*.csv"):  # of other suites, asked for in this folder before
+    # Of other suites, asked for in this folder before. What --axes drew stays.
+    for old in [*folder.tables.glob("*.csv"), *(p for kind in FIGURES for p in folder.figures.glob(kind))]:
         old.unlink()
     for table in tables.values():
         table.write_csv(folder.tables)
@@ -61,6 +67,7 @@ def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
     """Every figure that the run holds something for."""
     from reports import figures, training
     from reports.break_even import break_even
+    from reports.convergence import convergence_curve
     from reports.profile import performance_profile
     from reports.stability import stability_maps
     from reports.work_precision import error_against_time
@@ -71,7 +78,8 @@ def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
         stability_maps,
     ):  # fmt: skip
         pictures += make(folder.figures, run)
-    return pictures + training.training_curves(folder.figures, run, folder.models, problems)
+    pictures += training.training_curves(folder, run, problems)
+    return pictures + convergence_curve(folder, problems)
 
 
 def draw_trajectories(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
@@ -112,7 +120,7 @@ def read_trajectory(folder: RunFolder, path: Path, problems: list[str]) -> Traje
     return None
 
 
-def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Path:
+def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Picture:
     """Any metric against any other, into figures/. Raises ResultsError for a name that no row has."""
     run = read_run(folder)
     asked = scenes.split(",") if scenes else []
@@ -127,12 +135,15 @@ def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Path:
     if picture is None:
         where = ", ".join(asked) or "every scene"
         raise ResultsError(f"{folder.rows_path}: fewer than two methods have both {x} and {y} on {where}")
-    return picture.path
+    return picture
 
 
 def most_shared(run: Run, x: str, y: str) -> list[str]:
     """The scenes in which most methods have both metrics, the same methods in each."""
-    rows = run.frame[run.frame["usable"] & run.frame["metric"].isin((x, y))]
+    from reports.data import SUITES
+
+    rows = run.cells(*SUITES)
+    rows = rows[rows["usable"] & rows["metric"].isin((x, y))]
     count = rows.groupby(["scene", "method"])["metric"].nunique()
     both = count[count == len({x, y})].reset_index().groupby("scene")["method"].agg(frozenset)
     most: frozenset[str] = max(both, key=len, default=frozenset())
@@ -167,7 +178,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "names it), 2 when RUN_DIR is no run folder.",
     )
     parser.add_argument("run_dir", metavar="RUN_DIR", help="folder with run.json and results.csv")
-    parser.add_argument("--no-opengl", action="store_true", help="changes nothing: no picture needs OpenGL")
     parser.add_argument(
         "--axes",
         nargs=2,
@@ -178,13 +188,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--scenes",
         metavar="NAME,...",
-        help="of --axes, of suites garments and speed (default: those in which most methods have both)",
+        help="of --axes (default: those in which most methods have both)",
     )
     options = parser.parse_args(arguments)
     try:
         if options.axes:
             x, y = options.axes
-            print(draw_axes(RunFolder(options.run_dir), x, y, options.scenes))
+            picture = draw_axes(RunFolder(options.run_dir), x, y, options.scenes)
+            print(picture.caption, picture.path, sep="\n")
             return 0
         path, problems = build_report(options.run_dir)
     except ResultsError as error:

@@ -11,7 +11,7 @@ import pandas as pd
 from reports.numbers import DASH, duration, number
 
 # What the rows mean, not how they were made: the tables say it.
-DECLARED = ("format", "metrics", "scenes_declared", "cases")
+DECLARED = ("format", "metrics", "cases")
 UNITS = {" gb": "GB", " mb": "MB", " seconds": "s"}  # endings of names
 
 

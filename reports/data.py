@@ -8,16 +8,10 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.results import COLUMNS, Row
+from benchmarks.results import COLUMNS, ROLES, Row
 
 USABLE = ("ok", "stalled")
 SUITES = ("garments", "speed", "validation", "extremes", "performance")
-# Methods stand in this order of their roles, and within a role as they are declared.
-ROLES = (
-    "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
-    "warm-started", "",
-)  # fmt: skip
-CELL = ["scene", "method", "seed", "metric"]
 
 
 @dataclass(frozen=True)
@@ -60,11 +54,11 @@ class Run:
     def suite(self, *names: str) -> pd.DataFrame:
         return self.frame[self.frame["suite"].isin(names)]
 
-    def cells(self, first: str) -> pd.DataFrame:
-        """The rows of garments and speed, each cell once: one that both report is taken from `first`."""
-        kept = self.suite("garments", "speed")
-        order = (kept["suite"] != first).sort_values(kind="stable").index
-        return kept.loc[order].drop_duplicates(CELL).sort_index()
+    def cells(self, *suites: str) -> pd.DataFrame:
+        """The rows of these suites that are no case, each cell once: from the first suite that reports it."""
+        kept = self.suite(*suites)
+        kept = kept[kept["case"] == ""].sort_values("suite", key=lambda s: s.map(suites.index), kind="stable")
+        return kept.drop_duplicates(["scene", "method", "seed", "metric"])
 
     @property
     def worn(self) -> pd.DataFrame:
@@ -74,7 +68,7 @@ class Run:
 
     def garments(self, frame: pd.DataFrame) -> dict[str, list[str]]:
         """Garment -> its scenes among these rows, in the order in which run.json declares them."""
-        declared = {name: place for place, name in enumerate(self.config.get("scenes_declared", ()))}
+        declared = {name: place for place, name in enumerate(self.config.get("scenes") or ())}
         pairs = frame[frame["garment"] != ""][["garment", "scene"]].drop_duplicates()
         found: dict[str, list[str]] = {}
         for garment, scene in sorted(pairs.itertuples(index=False), key=lambda p: declared.get(p[1], 0)):
@@ -127,9 +121,7 @@ def run_data(config: Mapping[str, Any], rows: Sequence[Row]) -> Run:
     frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
     frame["case"] = _cases(frame, config.get("cases") or {})
     methods = _methods(frame, config.get("methods") or {})
-    scenes = config.get("scenes")
-    own = {**config, "scenes_declared": list(scenes) if isinstance(scenes, dict) else ()}
-    return Run(own, frame, metrics, methods)
+    return Run(config, frame, metrics, methods)
 
 
 def _metric(name: str, unit: str, said: Mapping[str, Any]) -> Metric:

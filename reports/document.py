@@ -52,7 +52,8 @@ def document(
         "Validation: known answers": blocks("validation") + _of_suite(run, tables, "validation"),
         "Extremes: where it breaks": blocks("maps") + _of_suite(run, tables, "extremes")
             + _not_converged(run, tables),
-        "Performance: microbenchmarks, one process each": _of_suite(run, tables, "performance"),
+        "Performance: microbenchmarks, one process each": _of_suite(run, tables, "performance")
+            + blocks("convergence"),
         "What did not run to its end": _trouble(run, tables, problems),
     }  # fmt: skip
     return {

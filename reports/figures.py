@@ -78,7 +78,7 @@ def throughput(folder: Path, run: Run) -> list[Picture]:
 
     Of the scenes that were measured both ways.
     """
-    cells = run.cells("garments")
+    cells = run.cells("garments", "speed")
     batched = cells[(cells["metric"] == BATCH) & cells["usable"] & (cells["garment"] != "")]
     if not len(batched):
         return []

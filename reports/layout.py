@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,12 +22,6 @@ REMARKS = {
     "†": "† The solver left some frames unconverged.",
 }
 NOISE = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
-METHODS = (
-    "method",
-    "solver",
-    "lower",
-    "higher",
-)  # columns that hold names of methods, printed by their labels
 
 
 def table_blocks(run: Run, table: Table) -> Iterator[Block]:
@@ -112,9 +107,11 @@ def _column_texts(
 def _text(run: Run, column: Column, cell: Cell) -> str:
     value = cell.value if isinstance(cell, Mean) else cell
     if isinstance(value, str):
-        return (run.label(value) if column.name in METHODS else value) or DASH
+        return (run.label(value) if column.method else value) or DASH
     if isinstance(value, int):
         return str(value)
+    if value == math.inf:  # tolerances away from a number that must be exact
+        return "∞"
     if column.unit == "s":
         return duration(value)
     small = column.digits > 3 and value is not None and abs(value) < NOISE

@@ -22,7 +22,7 @@ class Mean:
     over fewer cells than its neighbours in a table, and the table must say so. `stalled` says that a solver
     left some frames of some cell unconverged, `seeded` that another seed would give another value. `by_seed`:
     the mean over scenes of each seed. `lost`: seeds of which nothing usable is left, as of a network that
-    diverged. `pairing_group`: means of one group begin with the same draws at equal seeds; empty for none.
+    diverged. `pairing_group`: means of one group are compared seed by seed; empty for none.
     """
 
     value: float

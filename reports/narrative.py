@@ -12,7 +12,7 @@ from reports.break_even import NETWORK, compared_scenes, cost_of, crossing, fram
 from reports.data import Run
 from reports.means import mean_of, pair, shared_scenes
 from reports.numbers import duration, number, with_spread
-from reports.pareto import TIME, beaten_by, fastest, points_of, truncated
+from reports.pareto import TIME, Point, beaten_by, fastest, points_of, truncated
 
 TOTAL, CURVATURE = "energy/total", "curvature/error"
 
@@ -21,12 +21,13 @@ def summary(run: Run) -> list[tuple[str, str]]:
     """(topic, sentences), of what the run holds numbers for; means are of the first garment."""
     scenes = next(iter(run.garments(run.worn).values()), [])
     worn = run.worn[run.worn["scene"].isin(scenes)]
-    cells = run.cells("speed")
+    cells = run.cells("speed", "garments")
     compared = next(iter(compared_scenes(run, cells).values()), [])
+    has_network = NETWORK in set(worn["method"])
     found = [
         ("Total energy", least(run, worn, TOTAL, "J")),
         ("Wrinkles", least(run, worn, CURVATURE, "1/m")),
-        ("Run time", run_time(run, worn if NETWORK in set(worn["method"]) else cells)),
+        ("Run time", run_time(run, worn if has_network else cells[cells["scene"].isin(compared)])),
         ("Error against time", fronts(run, cells, compared)),
         ("When training pays", training_pays(run, cells, compared)),
         ("Known answers", checks(run).strip()),
@@ -38,7 +39,7 @@ def summary(run: Run) -> list[tuple[str, str]]:
 
 def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
     """The networks by a metric, the lowest first, and then what was not trained, over the scenes of all."""
-    rows = worn[worn["metric"] == metric]
+    rows = worn[(worn["metric"] == metric) | ~worn["usable"]]
     have = set(rows[rows["usable"]]["method"])
     networks = [name for name in run.with_role("network") if name in have and not run.methods[name].base]
     others = [name for name in run.ordered(run.with_role("reference", "bound", "baseline")) if name in have]
@@ -49,14 +50,12 @@ def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
     if not order:
         return ""
     best = found[order[0]]
-    text = f"{run.label(order[0])} has {with_spread(best.value, best.spread)} {unit}"
-    after, beside = (
-        ", ".join(f"{run.label(name)} {number(found[name].value)}" for name in names if name in found)
-        for names in (order[1:], others)
-    )
+    text = f"{run.label(order[0])} has {with_spread(best.value, best.spread)} {unit}{best.fewer}"
+    said = {name: f"{run.label(name)} {number(mean.value)}{mean.fewer}" for name, mean in found.items()}
+    after, beside = (", ".join(said[name] for name in names if name in said) for names in (order[1:], others))
     text += f", {after}." if after else "."
     text += f" Beside them: {beside}." if beside else ""
-    asked = rows["scene"].nunique()
+    asked = worn[worn["metric"] == metric]["scene"].nunique()
     return text + (f" Over {len(scenes)} of {asked} scenes." if len(scenes) < asked else "")
 
 
@@ -77,12 +76,19 @@ def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
         if own is None:
             continue
         best, solver = beaten_by(points, own), fastest(truncated(run, points), own.error)
-        text += f" By {run.metrics[metric].title.lower()} ({number(own.error)} in {number(own.time)} ms) "
-        text += f"{run.label(best.method)} beats SNUG" if best else "nothing as fast as SNUG is nearer"
-        text += f" ({number(best.error)} in {number(best.time)} ms)" if best else ""
+        text += f" By {run.metrics[metric].title.lower()} ({_both(own)}) "
+        if best is None:
+            text += "nothing as fast as SNUG is nearer"
+        else:
+            tie = " is nearer and no slower within repeats" if best.time > own.time else " beats SNUG"
+            text += f"{run.label(best.method)}{tie} ({_both(best)})"
         text += f"; the fastest solver as near is {run.label(solver.method)}, " if solver else ""
         text += f"{number(solver.time)} ms." if solver else "."
     return text.strip()
+
+
+def _both(point: Point) -> str:
+    return f"{number(point.error)} in {number(point.time)} ms{point.fewer}"
 
 
 def training_pays(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
@@ -95,6 +101,8 @@ def training_pays(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
         frames = crossing(own, rival) if rival else None
         after = "never" if frames is None else f"after {frames_text(frames)} frames"
         parts.append(f"{after} against {run.label(method)}")
+    if not parts:
+        return ""
     return f"SNUG's {duration(own.before)} of training pay {', '.join(parts)}."
 
 
@@ -113,8 +121,11 @@ def checks(run: Run) -> str:
 
 
 def trouble(run: Run) -> str:
-    cells = run.suite("garments", "speed").sort_values("status", key=lambda s: s == "ok", kind="stable")
-    words = counts(cells.drop_duplicates(["scene", "method", "seed"])["status"])
+    """How cells ended: what has any usable number has run, whatever became of its other metrics."""
+    best_first = {"stalled": 0, "ok": 1}
+    cells = run.suite("garments", "speed")
+    cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
+    words = counts(cells.drop_duplicates(["scene", "method", "seed"]).sort_index()["status"])
     return f"Cells of garments and speed: {words}; the reasons stand near the end." if words else ""
 
 

@@ -11,10 +11,6 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _FIGURE_SPACE, _POINT_SPACE = "\u2007", "\u2008"
 
 
-def finite(value: float | None) -> bool:
-    return value is not None and math.isfinite(value)
-
-
 def number(value: float | None, digits: int = 3, *, trim: bool = False) -> str:
     """`value` to `digits` significant digits: "0.0643", "12.3", "1,730", "2.50×10⁻⁷"; a dash if absent.
 
@@ -39,7 +35,7 @@ def _trimmed(text: str) -> str:
 
 def with_spread(value: float | None, spread: float | None) -> str:
     """As "0.064 ± 0.002", the spread with two digits; the value alone where there is no spread."""
-    if spread is None or not math.isfinite(spread) or not finite(value):
+    if spread is None or not math.isfinite(spread) or number(value) == DASH:
         return number(value)
     return f"{number(value)} ± {number(spread, 2)}"
 

@@ -72,8 +72,8 @@ def findings(run: Run) -> list[Table]:
     rows = list(_judged(run, run.worn[run.worn["garment"] == first]))
     columns = (
         Column("metric", "Measure", text=True, width="1fr"),
-        Column("lower", "Less of it", text=True, width="1fr"),
-        Column("higher", "More of it", text=True, width="1fr"),
+        Column("lower", "Less of it", text=True, method=True, width="1fr"),
+        Column("higher", "More of it", text=True, method=True, width="1fr"),
         Column("unit", "Unit", text=True),
         Column("first", "The first"),
         Column("second", "The second"),

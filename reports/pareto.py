@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -17,12 +16,16 @@ PERTURBED = "simulation-perturbed"  # whose distance is the sensitivity of the r
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 
 
+MOST_SLACK = 0.2  # share of a run time within which another one may count as no slower
+
+
 @dataclass(frozen=True)
 class Point:
     """A method's run time [ms per frame] and error.
 
     time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
     standard deviations over seeds. error_spread: one standard deviation over seeds. Both 0 where unknown.
+    fewer: words on seeds that are missing, empty where none is.
     """
 
     method: str
@@ -30,25 +33,29 @@ class Point:
     error: float
     time_spread: float = 0.0
     error_spread: float = 0.0
+    fewer: str = ""
 
 
 def points_of(
     run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str, x: str = TIME
 ) -> list[Point]:
-    """Every method that has both numbers in all the scenes, as means over them."""
-    rows = frame[frame["scene"].isin(list(scenes)) & frame["metric"].isin([metric, x, REPEATS])]
-    if not len(rows):
-        return []
+    """Every method that has both numbers in all the scenes, as means over them and the seeds that did all."""
+    rows = frame[frame["scene"].isin(list(scenes))]
+    measured = rows[rows["usable"] & rows["metric"].isin([metric, x])].groupby(["method", "seed"]).size()
+    whole = measured.index[measured == len(scenes) * len({metric, x})]
+    in_all = rows.set_index(["method", "seed"]).index.isin(whole)
+    rows = rows.assign(usable=rows["usable"] & in_all)
+    rows = rows[rows["metric"].isin([metric, x, REPEATS]) | ~rows["usable"]]
     wide = means(rows, "method", "metric")
     found = []
     for method in run.ordered(rows["method"]):
         time, error, repeats = (wide.get((method, name)) for name in (x, metric, REPEATS))
-        if time is None or error is None or min(time.scenes, error.scenes) < len(scenes):
+        if time is None or error is None:
             continue
         spread = 2.0 * (time.spread or 0.0)
         if repeats is not None and x == TIME:
             spread = time.value * repeats.value / 100.0
-        found.append(Point(method, time.value, error.value, spread, error.spread or 0.0))
+        found.append(Point(method, time.value, error.value, spread, error.spread or 0.0, error.fewer))
     return found
 
 
@@ -67,24 +74,20 @@ def fastest(points: Iterable[Point], error: float) -> Point | None:
     return min(reached, key=lambda p: (p.time, p.error, p.method)) if reached else None
 
 
+def of_one_problem(run: Run, points: Iterable[Point]) -> list[Point]:
+    """Those that solve what the reference solves, from where it starts."""
+    return [p for p in points if run.methods[p.method].family not in (PERTURBED, SMALLER_STEPS)]
+
+
 def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
     """Solvers alone, truncated or to a tolerance, with nothing learned, of the reference's own problem."""
     kept = set(run.with_role("reference", "solver", "reference-variant"))
-    return [
-        p
-        for p in points
-        if p.method in kept and run.methods[p.method].family not in (PERTURBED, SMALLER_STEPS)
-    ]
+    return [p for p in of_one_problem(run, points) if p.method in kept]
 
 
 def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
     """Of the solvers alone those that differ from others of their family by one number."""
     return [p for p in solvers(run, points) if run.methods[p.method].level is not None]
-
-
-def warm_started(run: Run, points: Iterable[Point]) -> list[Point]:
-    """Solvers that start each step from another method's guess."""
-    return [p for p in points if run.methods[p.method].role == "warm-started"]
 
 
 def beaten_by(points: Sequence[Point], own: Point) -> Point | None:
@@ -94,12 +97,9 @@ def beaten_by(points: Sequence[Point], own: Point) -> Point | None:
 
 
 def overtaken(point: Point, others: Sequence[Point]) -> bool:
-    """Whether one of the others is no less accurate, and no slower by more than run times scatter.
+    """Whether one of the others is no less accurate, and no slower by more than the point's own repeats.
 
-    The range of three repeats is 1.7 standard deviations on average, so both ranges together are near two of
-    the difference.
+    A rival whose run times scatter widely is no faster for that; nor is one that takes much longer.
     """
-    return any(
-        p.error <= point.error and p.time <= point.time + math.hypot(p.time_spread, point.time_spread)
-        for p in others
-    )
+    latest = point.time + min(point.time_spread, MOST_SLACK * point.time)
+    return any(p.error <= point.error and p.time <= latest for p in others)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from reports.data import Run
-from reports.pareto import PERTURBED, SMALLER_STEPS, Point, fastest, points_of
+from reports.pareto import Point, fastest, of_one_problem, points_of
 from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, new_figure, power_text, save
 from reports.styles import family_style
 
@@ -44,22 +44,21 @@ def performance_profile(folder: Path, run: Run) -> list[Picture]:
     families = dict.fromkeys(run.methods[name].family for name in run.ordered(run.methods))
     legend_above(figure, [looks[family] for family in families if family in shown], lines=True)
     caption = (
-        "Performance profile: the share of scenes on which a family reaches a relative energy gap within "
+        "Performance profile: the share of scenes on which a family reaches a relative energy gap within so "
+        "many times the time of the fastest. A family that never gets there has no line; a scene that it "
+        "cannot do, as a network a sheet, counts as not reached."
     )
-    caption += "so many times the time of the fastest. A family that never gets there has no line."
     return [save(figure, folder, "performance_profile", caption=caption, kind="profile")]
 
 
 def times_to_reach(run: Run, scenes: Sequence[str], target: float) -> dict[str, dict[str, float]]:
     """scene -> family -> time [ms per frame] of its fastest member with at most that gap."""
-    frame = run.cells("speed")
+    frame = run.cells("speed", "garments")
     found: dict[str, dict[str, float]] = {}
     for scene in scenes:
         families: dict[str, list[Point]] = {}
-        for point in points_of(run, frame, [scene], METRIC):
-            family = run.methods[point.method].family
-            if family not in (PERTURBED, SMALLER_STEPS):
-                families.setdefault(family, []).append(point)
+        for point in of_one_problem(run, points_of(run, frame, [scene], METRIC)):
+            families.setdefault(run.methods[point.method].family, []).append(point)
         times = {name: best.time for name, points in families.items() if (best := fastest(points, target))}
         if times:
             found[scene] = times

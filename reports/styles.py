@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from reports.data import Method, Run
 
 STATUS_COLOURS = {
-    "ok": "#0072B2",
     "stalled": "#E69F00",
     "timeout": "#CC79A7",
     "out-of-memory": "#882255",

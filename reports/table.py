@@ -5,6 +5,7 @@ It knows nothing of the page it is printed on: the CSV keeps nine digits, the PD
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.results import replacing
+from reports.data import Metric
 from reports.means import Mean
 from reports.numbers import CSV_DASH, csv_number
 
@@ -22,14 +24,15 @@ Cell = float | int | str | Mean | None
 class Column:
     """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
 
-    text: words, set from the left. width: "auto", or a share of the page's width as "1fr". digits: of its
-    numbers; trim: without zeros at their end.
+    text: words, set from the left; method: names of methods, printed by their labels. width: "auto", or a
+    share of the page's width as "1fr". digits: of its numbers; trim: without zeros at their end.
     """
 
     name: str
     title: str
     unit: str = ""
     text: bool = False
+    method: bool = False
     width: str = "auto"
     digits: int = 3
     trim: bool = False
@@ -66,6 +69,10 @@ class Table:
         return path
 
 
+def metric_column(metric: Metric) -> Column:
+    return Column(metric.name, metric.title, "" if metric.unit == "1" else metric.unit)
+
+
 def table(
     name: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], caption: str = "", **more
 ) -> list[Table]:
@@ -76,4 +83,4 @@ def table(
 def _csv_text(cell: float | int | str | None) -> str:
     if isinstance(cell, str):
         return cell or CSV_DASH
-    return str(cell) if isinstance(cell, int) else csv_number(cell)
+    return str(cell) if isinstance(cell, int) or cell == math.inf else csv_number(cell)

@@ -16,19 +16,15 @@ import pandas as pd
 from reports import paper
 from reports.ablations import ablations, ablations_judged
 from reports.break_even import crossings
-from reports.data import CELL, SUITES, Metric, Run
+from reports.data import SUITES, Run
 from reports.means import means
 from reports.pareto import ERRORS, TIME
-from reports.table import Cell, Column, Table, table
+from reports.table import Cell, Column, Table, metric_column, table
 
 BY_SCENE = ("suite", "scene")  # what groups the lines of a table that is not averaged over scenes
-METHOD = Column("method", "Method", text=True, width="1fr")
+METHOD = Column("method", "Method", text=True, method=True, width="1fr")
 GARMENT, SCENE, SUITE = (Column(name, name.capitalize(), text=True) for name in ("garment", "scene", "suite"))
 REASON = Column("reason", "Reason", text=True, width="2fr")
-
-
-def metric_column(metric: Metric) -> Column:
-    return Column(metric.name, metric.title, "" if metric.unit == "1" else metric.unit)
 
 
 def make_tables(run: Run) -> dict[str, Table]:
@@ -61,10 +57,7 @@ def by_garment(run: Run, name: str) -> list[Table]:
 
 def by_scene(run: Run, name: str) -> list[Table]:
     """The same scene by scene, in every suite. A cell of several suites stands in the first of them."""
-    order = {suite: place for place, suite in enumerate(SUITES)}
-    kept = run.frame[run.frame["case"] == ""]
-    kept = kept.sort_values("suite", key=lambda suites: suites.map(order), kind="stable")
-    kept = kept.drop_duplicates(CELL)
+    kept = run.cells(*SUITES)
     columns, lines = _pivot(run, kept, kept[kept["table"] == name], ("suite", "scene", "method"))
     title = name.replace("_", " ").capitalize()
     return table(
@@ -102,7 +95,7 @@ def _pivot(
 
 def speed(run: Run) -> list[Table]:
     """Every point of the plots of error against run time, in the scenes of suite speed."""
-    cells = run.cells("speed")
+    cells = run.cells("speed", "garments")
     rows = cells[cells["scene"].isin(run.suite("speed")["scene"])]
     own = [name for name, metric in run.metrics.items() if metric.table == "speed"]
     names = dict.fromkeys((TIME, *ERRORS, *own))
@@ -175,7 +168,7 @@ def extremes(run: Run) -> list[Table]:
     unit = rows["unit"].iloc[0] if len(rows) else ""
     columns = (
         Column("case", "Case", text=True, width="1fr"),
-        Column("method", "Method", text=True),
+        Column("method", "Method", text=True, method=True),
         Column("outcome", "Outcome", text=True),
         Column("gradient", "Largest gradient", unit, digits=2, trim=True),
         Column("reason", "In words", text=True, width="2fr"),
@@ -209,7 +202,8 @@ def unfinished(run: Run) -> list[Table]:
     rows = run.frame[(run.frame["status"] != "ok") & ~judged_elsewhere]
     names = ["suite", "scene", "method", "seed", "status", "reason"]
     lines = rows[names].drop_duplicates().itertuples(index=False)
-    columns = (SUITE, Column("scene", "Scene", text=True, width="1fr"), Column("method", "Method", text=True),
+    columns = (SUITE, Column("scene", "Scene", text=True, width="1fr"),
+        Column("method", "Method", text=True, method=True),
         Column("seed", "Seed", text=True), Column("status", "Status", text=True), REASON)  # fmt: skip
     cells = [(*line[:5], line[5] or "no reason given") for line in lines]
     return table("unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each.")

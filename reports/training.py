@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.results import RunFolder, model_path
 from reports.data import Run
-from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
+from reports.plotting import PAGE_WIDTH, Picture, file_name, grid, legend_above, log_axis, new_figure, save
 from reports.styles import leading, style
 
-LARGEST_HEADER = 64_000_000  # bytes; a longer one is a broken file
 PHYSICS = "physics loss [J per frame]"
-# A loss of another kind has a panel of its own, known by the terms of it that were logged.
-PANELS = {"vertices": "vertex loss [cm²]", "low": "vertex loss of two bands [cm]"}
+# By the kind of a network; any other is trained on the energies.
+PANELS = {
+    "supervised": "vertex loss [cm²]",
+    "santesteban2019": "vertex loss [cm²]",
+    "tailornet": "vertex loss of two bands [cm]",
+}
 
 
 class ModelHeaderError(ValueError):
@@ -25,52 +30,57 @@ class ModelHeaderError(ValueError):
 
 @dataclass(frozen=True)
 class History:
-    """How one model's loss fell: its method and, for every few steps, step, seconds, loss and terms."""
+    """How one model's loss fell: its method, the panel of its kind of loss and, for every few steps, step,
+    seconds, loss and terms.
+    """
 
     method: str
+    panel: str
     rows: list[dict[str, float]]
-
-    @property
-    def panel(self) -> str:
-        return next((title for term, title in PANELS.items() if term in self.rows[0]), PHYSICS)
 
     def column(self, name: str) -> np.ndarray:
         return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
 
 
-def read_history(path: Path) -> History | None:
-    """The history in a model file, None where it has none. Raises ModelHeaderError for a broken file.
+def read_history(path: Path, method: str) -> History | None:
+    """The history in a model file, None where it has none. Raises ModelHeaderError for a broken file."""
+    from safetensors import SafetensorError, safe_open
 
-    A safetensors file starts with the length of its JSON header, eight bytes, little-endian.
-    """
     try:
-        with path.open("rb") as stream:
-            length = int.from_bytes(stream.read(8), "little")
-            if not 2 <= length <= LARGEST_HEADER:
-                raise ValueError("its first bytes are no header length")
-            header: dict[str, Any] = json.loads(stream.read(length))
-        data = json.loads(header.get("__metadata__", {}).get("snug", "{}"))
-    except (OSError, ValueError, AttributeError) as error:
+        with safe_open(path, "numpy") as stored:
+            data: dict[str, Any] = json.loads((stored.metadata() or {}).get("snug", "{}"))
+    except (OSError, ValueError, SafetensorError) as error:
         raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
     rows = data.get("history") or []
-    method = path.stem.removesuffix(f"-seed{data.get('seed', 0)}")  # as the run names its files
-    return History(method, rows) if len(rows) > 1 else None
+    return History(method, PANELS.get(data.get("kind", ""), PHYSICS), rows) if len(rows) > 1 else None
 
 
-def training_curves(folder: Path, run: Run, models: Path, problems: list[str]) -> list[Picture]:
-    """Loss against training time: energies in one panel, distances of vertices in others."""
-    histories = []
-    for path in sorted(models.glob("[!.]*.safetensors")):  # no checkpoint of a training that was stopped
-        try:
-            history = read_history(path)
-        except ModelHeaderError as error:
-            problems.append(str(error).replace(f"{models.parent}/", ""))
-            continue
-        if history and history.method in run.methods:
-            histories.append(history)
+def training_curves(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
+    """A figure for each garment: loss against training time, a panel for each kind of loss."""
+    pictures: list[Picture] = []
+    worn = run.frame[run.frame["garment"] != ""]
+    for garment, rows in worn.groupby("garment", sort=False):
+        histories = []
+        for method, seed in rows[["method", "seed"]].drop_duplicates().itertuples(index=False):
+            path = model_path(folder.models_of(str(garment)), method, seed)
+            if not path.is_file():
+                continue
+            try:
+                history = read_history(path, method)
+            except ModelHeaderError as error:
+                problems.append(str(error).replace(f"{folder.path}/", ""))
+            else:
+                histories += [history] if history else []
+        name = f"training_{file_name(str(garment))}" if pictures else "training"
+        pictures += _curves(folder.figures, run, name, f"{garment}: training loss", histories)
+    return pictures
+
+
+def _curves(folder: Path, run: Run, name: str, what: str, histories: Sequence[History]) -> list[Picture]:
     shown = leading(run, {history.method for history in histories})
     histories = [history for history in histories if history.method in shown]
-    titles = [title for title in (PHYSICS, *PANELS.values()) if any(h.panel == title for h in histories)]
+    panels = dict.fromkeys((PHYSICS, *PANELS.values()))
+    titles = [title for title in panels if any(h.panel == title for h in histories)]
     if not titles:
         return []
     figure = new_figure(PAGE_WIDTH * (1.0 if len(titles) > 1 else 0.6), 2.2)
@@ -83,5 +93,5 @@ def training_curves(folder: Path, run: Run, models: Path, problems: list[str]) -
         log_axis(axes, "y")
         grid(axes)
     legend_above(figure, [style(run, method) for method in shown], lines=True)
-    caption = "Training loss against wall time; one curve per model and seed."
-    return [save(figure, folder, "training", caption=caption, kind="curves")]
+    caption = f"{what} against wall time; one curve per model and seed."
+    return [save(figure, folder, name, caption=caption, kind="curves")]

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.results import ResultsError
-from reports.data import Metric, Run
+from reports.data import SUITES, Metric, Run
 from reports.means import value_of
 from reports.numbers import number
 from reports.pareto import ERRORS, PERTURBED, SMALLER_STEPS, TIME, Point, front, points_of
@@ -44,7 +44,7 @@ def error_against_time(folder: Path, run: Run) -> list[Picture]:
 
     The first garment comes first, and of its scenes the one on which most methods ran.
     """
-    cells = run.cells("speed")
+    cells = run.cells("speed", "garments")
     timed = cells[cells["usable"] & (cells["metric"] == TIME)]
     apart = run.standing_apart(timed)
     frame = cells[~cells["method"].isin(apart)]
@@ -66,14 +66,15 @@ def error_against_time(folder: Path, run: Run) -> list[Picture]:
 def metric_against_metric(folder: Path, run: Run, x: str, y: str, scenes: Sequence[str]) -> Picture | None:
     """One figure of metric y against metric x, means over the scenes; None where fewer than two have both.
 
-    Both axes are logarithmic. Raises ResultsError for an x that is not positive, or a negative y.
+    Both axes are logarithmic: points at x = 0 are left out. Raises ResultsError for a negative number.
     """
-    points = points_of(run, run.cells("speed"), scenes, y, x)
+    found = points_of(run, run.cells(*SUITES), scenes, y, x)
+    points = [point for point in found if point.time != 0.0]
     if len(points) < 2:
         return None
     for point in points:
-        if point.time <= 0.0 or point.error < 0.0:
-            metric, value = (x, point.time) if point.time <= 0.0 else (y, point.error)
+        if min(point.time, point.error) < 0.0:
+            metric, value = (x, point.time) if point.time < 0.0 else (y, point.error)
             raise ResultsError(
                 f"{metric} of {point.method} is {value:.4g}: it has no place on a logarithmic axis; "
                 "name another metric"
@@ -84,25 +85,20 @@ def metric_against_metric(folder: Path, run: Run, x: str, y: str, scenes: Sequen
     axes.set(xlabel=f"{x} [{run.metrics[x].unit}]", ylabel=f"{y} [{run.metrics[y].unit}]")
     grid(axes)
     _legend(figure, run, points, None)
-    caption = f"{y} against {x}, means over {', '.join(scenes)}.{_hollow(run, below)}"
+    caption = f"{y} against {x}, means over {', '.join(scenes)}.{_hollow(run, below)}{_fewer(run, points)}"
+    zero = ", ".join(run.label(point.method) for point in found if point not in points)
+    caption += f" Left out, for {x} is zero: {zero}." if zero else ""
     return save(figure, folder, file_name(f"{y}_against_{x}"), caption=caption, kind="axes")
 
 
 def _errors(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """The points of one panel. The reference's own error is zero by construction: it is drawn as a line."""
-    scenes = list(dict.fromkeys(rows["scene"]))
-    found = []
-    for point in points_of(run, rows, scenes, metric):
-        method = run.methods[point.method]
-        other_problem = method.family == SMALLER_STEPS and metric in OWN_STEP
-        if (
-            point.time > 0.0
-            and method.role != "reference"
-            and method.family != PERTURBED
-            and not other_problem
-        ):
-            found.append(point)
-    return found
+    points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric)
+    # Smaller steps have errors of the garment, but none of the reference's own step.
+    left_out = (PERTURBED, SMALLER_STEPS) if metric in OWN_STEP else (PERTURBED,)
+    reference = run.with_role("reference")
+    kept = [p for p in points if run.methods[p.method].family not in left_out and p.method not in reference]
+    return [p for p in kept if p.time > 0.0]
 
 
 def _draw_errors(
@@ -145,12 +141,18 @@ def _draw_errors(
     if lead:
         return save(figure, folder, "error_against_time", caption=brief, kind="lead")
     name = f"error_against_time_{file_name(scene)}"
-    return save(figure, folder, name, caption=caption + _hollow(run, below), kind="speed")
+    caption += _hollow(run, below) + _fewer(run, shown)
+    return save(figure, folder, name, caption=caption, kind="speed")
 
 
 def _hollow(run: Run, below: set[str]) -> str:
     names = ", ".join(run.label(method) for method in run.ordered(below))
     return f" Hollow, on the lower edge: zero or below the panel ({names})." if below else ""
+
+
+def _fewer(run: Run, points: Sequence[Point]) -> str:
+    words = dict.fromkeys(f"{run.label(point.method)}{point.fewer}" for point in points if point.fewer)
+    return f" Seeds that did not finish are left out: {', '.join(words)}." if words else ""
 
 
 def _legend(figure: Figure, run: Run, points: Sequence[Point], reference: float | None) -> None:

@@ -30,7 +30,7 @@ from benchmarks.rows import described, rows_of
 from benchmarks.schedule import tasks_of
 from benchmarks.selection import MEASURED, Request, choose, choose_suites
 from benchmarks.tasks.task import Outcome
-from reports.convergence import main as draw
+from reports.convergence import convergence_curve
 from reports.data import run_data
 from reports.tables import make_tables
 from snug.motion_library import TEST, TRAIN
@@ -338,10 +338,12 @@ def test_the_held_out_motion_is_one_to_train_on():
     assert HELD_OUT in TRAIN and HELD_OUT not in TEST
 
 
-def test_the_curve_is_drawn_and_a_missing_one_is_one_line(tmp_path, capsys):
-    assert draw([str(tmp_path)]) == 2 and capsys.readouterr().err.count("\n") == 1
+def test_the_curve_is_drawn_and_a_broken_one_is_one_line(tmp_path):
+    folder, problems = RunFolder(tmp_path), []
+    assert convergence_curve(folder, problems) == [] and problems == []
     curve = tmp_path / "convergence.csv"
     curve.write_text("step,seconds,loss,validation\n10,1.5,2.0,1.9\n20,2.5,0.6,0.7\n")
-    assert draw([str(tmp_path)]) == 0 and (tmp_path / "convergence.png").stat().st_size > 5000
+    (picture,) = convergence_curve(folder, problems)
+    assert picture.path.with_suffix(".png").stat().st_size > 5000
     curve.write_text("step,seconds\n10,1\n")
-    assert draw([str(tmp_path)]) == 2
+    assert convergence_curve(folder, problems) == [] and len(problems) == 1

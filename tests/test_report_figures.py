@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from report_folder import FRAMES, mesh, row, run_of, sheet, write_model
 
+from benchmarks.results import RunFolder
 from reports import build, figures, hem, render, stability, styles, training, work_precision
 from reports.pareto import Point
 
@@ -106,12 +107,23 @@ def test_what_ended_early_moves_nobody_elses_picture(tmp_path):
 
 
 def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
-    write_model(tmp_path / "snug-seed0.safetensors", "snug", strain=0.1)
-    write_model(tmp_path / ".pbns-seed0.checkpoint.safetensors", "pbns", strain=0.1)
+    folder = RunFolder(tmp_path)
+    write_model(folder.models / "snug-seed0.safetensors", "snug", strain=0.1)
+    write_model(folder.models / ".pbns-seed0.checkpoint.safetensors", "pbns", strain=0.1)
     run, read = run_of([row(), row(method="pbns")]), []
-    monkeypatch.setattr(training, "read_history", read.append)
-    assert training.training_curves(tmp_path, run, tmp_path, []) == []
+    monkeypatch.setattr(training, "read_history", lambda path, method: read.append(path))
+    assert training.training_curves(folder, run, []) == []
     assert [path.name for path in read] == ["snug-seed0.safetensors"]
+
+
+def test_every_garment_has_its_training_curves(tmp_path):
+    folder = RunFolder(tmp_path)
+    for garment in ("tshirt", "tunic"):
+        write_model(folder.models_of(garment) / "snug-seed0.safetensors", "snug", strain=0.1)
+    run = run_of([row(), row("tunic/stop")])
+    pictures = training.training_curves(folder, run, [])
+    assert [picture.path.name for picture in pictures] == ["training.svg", "training_tunic.svg"]
+    assert [picture.caption.partition(":")[0] for picture in pictures] == ["tshirt", "tunic"]
 
 
 def point(stiffness: float, dt: float, status="ok"):
@@ -164,8 +176,6 @@ def test_throughput_is_of_the_scenes_that_were_measured_both_ways(tmp_path, monk
 
 def test_only_what_was_drawn_is_read(tmp_path):
     """A scene of another kind, such as a roll-out of a thousand frames, has no pictures of its frames."""
-    from benchmarks.results import RunFolder
-
     run = run_of([row("tshirt/there_and_back", metric="roll_out/drift", unit="mm")])
     folder, problems = RunFolder(tmp_path), []
     path = folder.trajectory_path("tshirt/there_and_back", "snug")

@@ -115,6 +115,8 @@ def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
     rows += [row("off", value=7.0, tolerance=0.0, **numbers_of), row("told", value=7.0, **numbers_of)]
     table = make_tables(run_of(rows))["validation"]
     assert [line[column(table, "away")] for line in table.rows] == [0.0, 0.25, float("inf"), None]
+    (block,) = table_blocks(run_of(rows), table)
+    assert block["groups"][0]["rows"][2][column(table, "away")]["text"] == "∞"
 
 
 def test_a_wide_table_goes_on_below_with_its_heads():
@@ -139,6 +141,8 @@ def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
     made = make_tables(run_of(rows))
     assert [line[1] for line in made["energies"].rows] == ["snug"]
     assert [line[1] for line in made["ablations"].rows] == ["snug", "snug-no-noise", "snug-window6"]
+    captions = made["ablations"].caption + made["ablations_judged"].caption
+    assert "recipe" not in captions and "ingredient" not in captions  # a variant may have more of it
     full = made["ablations"].rows[0]
     assert full[-1] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, complete=True)
     assert made["ablations_judged"].rows == (
@@ -240,6 +244,15 @@ def test_the_summary_compares_means_over_the_scenes_that_all_have():
     assert least(run_of(rows + twin), run_of(rows + twin).worn, "energy/total", "J") == said
 
 
+def test_the_summary_says_how_many_seeds_are_left():
+    rows = seeds_of("snug", "energy/total", (1.0, 1.2)) + seeds_of("pbns", "energy/total", (2.0,))
+    rows.append(row(metric="cost/frame", value=None, seed=2, status="diverged", reason="no end"))
+    rows.append(row(method="pbns", metric="cost/frame", value=None, seed=1, status="failed", reason="gone"))
+    run = run_of(rows)
+    said = "SNUG has 1.10 ± 0.14 J (2 of 3 seeds), PBNS 2.00 (1 of 2 seeds)."
+    assert least(run, run.worn, "energy/total", "J") == said
+
+
 def test_run_times_are_of_the_scenes_that_both_have():
     times = [(SCENES[0], "snug", 9.0), (SCENES[1], "snug", 0.25), (SCENES[1], "simulation", 100.0)]
     run = run_of([row(s, m, "cost/frame", t, unit="ms") for s, m, t in times])
@@ -252,6 +265,12 @@ def test_what_did_not_end_well_is_counted_by_cell():
     rows = [*all_rows(), row("tshirt/walk", "pbns", "energy/bending", status="stalled", reason="a frame")]
     assert trouble(run_of(rows)).startswith("Cells of garments and speed: 2 failed, 1 skipped, 1 stalled;")
     assert trouble(run_of(rows[:3])) == ""
+    # A metric that is not finite, or off its tolerance, fails no cell that has others.
+    rows[:3] = [
+        *rows[:3],
+        row("tshirt/walk", "pbns", "gap/energy", None, status="failed", reason="no number"),
+    ]
+    assert "2 failed, 1 skipped, 1 stalled;" in trouble(run_of(rows))
 
 
 @pytest.mark.parametrize(

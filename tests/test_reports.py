@@ -46,7 +46,7 @@ def made(tmp_path_factory) -> RunFolder:
             write_mesh(run.trajectory_path(scene, method), cloth, faces, fields)
     write_model(run.models / "snug-seed0.safetensors", "snug", strain=0.1)
     write_model(run.models / "supervised-seed0.safetensors", "supervised", vertices=2.0)
-    assert build.main([str(run.path), "--no-opengl"]) == 0
+    assert build.main([str(run.path)]) == 0
     return run
 
 
@@ -94,8 +94,22 @@ def test_made_twice_it_is_the_same_to_the_byte(made):
         return {str(p): p.read_bytes() for p in sorted(made.path.rglob("*")) if p.is_file()}
 
     before = contents()
-    assert build.main([str(made.path), "--no-opengl"]) == 0
+    assert build.main([str(made.path)]) == 0
     assert contents() == before
+
+
+def test_figures_of_an_earlier_report_are_removed_and_others_stay(tmp_path):
+    run = RunFolder(tmp_path)
+    run.write_config(declaration(all_rows()))
+    run.write_rows(all_rows())
+    run.figures.mkdir()
+    old = ("hem_tunic-stop.svg", "error_against_time_flag.png", "training_tunic.svg")
+    kept = ("mine.png", "gap-relative_against_cost-frame.svg")
+    for name in (*old, *kept):
+        (run.figures / name).write_bytes(b"")
+    assert build.main([str(tmp_path)]) == 0
+    left = {path.name for path in run.figures.iterdir()}
+    assert left.isdisjoint(old) and left.issuperset(kept)
 
 
 def test_failed_cells_are_listed_once_with_their_reason(made):
@@ -136,7 +150,7 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     path.write_bytes(b"no mesh")
     (run.models).mkdir()
     (run.models / "snug-seed0.safetensors").write_bytes(b"\xff" * 20)
-    assert build.main([str(tmp_path), "--no-opengl"]) == 1
+    assert build.main([str(tmp_path)]) == 1
     said = capsys.readouterr()
     assert "tshirt-walk/snug.vtkhdf" in said.err and "snug-seed0.safetensors" in said.err
     assert said.out.strip() == str(run.report_path) and run.report_path.is_file()
@@ -190,11 +204,13 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
     assert (heat.title, heat.unit) == ("Heat", "J")
 
 
-def test_histories_come_from_the_models_headers(made):
-    history = training.read_history(made.models / "snug-seed0.safetensors")
+def test_histories_come_from_the_models_headers(made, tmp_path):
+    history = training.read_history(made.models / "snug-seed0.safetensors", "snug")
     assert history is not None and history.method == "snug" and history.panel == training.PHYSICS
     assert history.column("loss").tolist() == [2.0, 1.0, 0.5]
-    taught = [training.History("m", [{"loss": 1.0, term: 1.0}]) for term in ("vertices", "low", "strain")]
+    for kind in ("supervised", "tailornet", "dynamic"):
+        write_model(tmp_path / kind, kind)
+    taught = [training.read_history(tmp_path / kind, kind) for kind in ("supervised", "tailornet", "dynamic")]
     assert len({history.panel for history in taught}) == 3
 
 

@@ -145,6 +145,7 @@ def test_the_closing_table_keeps_garments_apart_and_marks_means_over_less():
             ("tunic/a", "snug", 9.0),
         )
     ]  # fmt: skip
+    rows.append(Row("garments", "tunic/long", "snug", 0, "roll_out/drift", "mm", 1.0, garment="tunic"))
     rows.append(
         Row("garments", "tshirt/b", "pbns", 0, "cost/frame", "ms", None, "diverged", "why", garment="tshirt")
     )

@@ -21,7 +21,6 @@ from reports.pareto import (
     points_of,
     solvers,
     truncated,
-    warm_started,
 )
 from reports.plotting import _columns
 from reports.profile import performance_profile, staircases, times_to_reach
@@ -91,7 +90,6 @@ def test_points_need_every_scene():
     alone = {"newton-1", "newton-4", "lbfgs-5", "lbfgs-20"}
     assert {p.method for p in solvers(run, worn)} == {"simulation", *alone}
     assert {p.method for p in truncated(run, worn)} == alone
-    assert {p.method for p in warm_started(run, worn)} == {"snug+lbfgs-1", "snug+lbfgs-4"}
 
 
 def test_a_profile_counts_scenes_within_a_ratio_of_the_fastest():
@@ -160,6 +158,78 @@ def test_as_fast_is_within_the_scatter_of_run_times():
     assert not overtaken(
         Point("snug", 0.350, 4.2), [Point("supervised", 0.357, 3.7)]
     )  # no repeats: no scatter
+
+
+def test_a_rival_is_no_faster_for_repeats_that_scatter():
+    point, wide = Point("snug", 1.36, 0.53, 0.1), Point("snug+lbfgs-1", 19.1, 0.32, 19.6)
+    assert beaten_by([point, wide], point) is None
+    shaky = dataclasses.replace(point, time_spread=20.0)
+    assert beaten_by([shaky, wide], shaky) is None
+    rows = [row(SCENES[0], "snug", "cost/spread", 10.0, "%")] + [
+        row(SCENES[0], method, metric, value)
+        for method, time, gap in (("snug", 1.0, 0.3), ("pbns", 1.05, 0.2), ("newton-1", 12.0, 0.1))
+        for metric, value in (("cost/frame", time), ("gap/relative", gap))
+    ]
+    said = plain(run_of(rows))["Error against time"]
+    assert "PBNS is nearer and no slower within repeats (0.200 in 1.05 ms)" in said
+
+
+def test_a_solver_in_a_whole_motion_takes_no_clip_off_page_one():
+    """The energy gap is measured in suite speed alone."""
+    whole = [
+        any_row("tshirt/kick", method, "cost/frame", time, unit="ms")
+        for method, time in (("snug", 0.3), ("newton-4", 50.0), ("simulation", 100.0))
+    ]
+    run, alone = run_of([*all_rows(), *whole]), run_of(all_rows())
+    frame = run.cells("speed", "garments")
+    assert compared_scenes(run, frame) == {"tshirt": sorted(SCENES, reverse=True)}
+    assert plain(run)["Error against time"] == plain(alone)["Error against time"]
+    assert compared_scenes(run_of(whole), run_of(whole).frame) == {"tshirt": ["tshirt/kick"]}
+
+
+def test_a_point_is_of_the_seeds_that_did_every_scene():
+    rows = [
+        dataclasses.replace(row(scene, "snug", metric, value), seed=seed)
+        for seed, values in ((0, (1.0, 3.0)), (1, (9.0, None)))
+        for scene, value in zip(SCENES, values)
+        for metric in ("cost/frame", "gap/relative")
+        if value is not None
+    ]
+    gone = {"value": None, "seed": 1, "status": "diverged", "reason": "no end"}
+    rows.append(dataclasses.replace(row(SCENES[1], "snug", "cost/frame", 0.0), **gone))
+    (found,) = points_of(run_of(rows), run_of(rows).frame, SCENES, "gap/relative")
+    assert (found.time, found.error, found.fewer) == (2.0, 2.0, " (1 of 2 seeds)")
+
+
+def test_a_training_without_rivals_has_no_sentence():
+    rows = [r for r in all_rows() if r.method in ("snug", "snug+lbfgs-1") and r.metric != "gap/relative"]
+    rows = [r for r in rows if r.metric != "curvature/error"]
+    assert "When training pays" not in plain(run_of(rows))
+
+
+def test_run_times_on_page_one_are_of_the_garment_compared():
+    rows = all_rows() + [row("skirt/stop", m, "cost/frame", 500.0, "ms") for m in ("snug", "simulation")]
+    assert plain(run_of(rows))["Run time"] == (
+        "SNUG takes 0.250 ms per frame, the simulation 100 ms: 400 times."
+    )
+
+
+def test_the_table_of_crossings_has_every_network_and_the_figure_those_it_has_room_for(tmp_path):
+    more = [f"snug-{k}" for k in range(9)]
+    costs = (("cost/frame", 0.25), ("cost/train", 9.0), ("cost/data", 0.0))
+    rows = [
+        dataclasses.replace(row(scene, method, *cost), role="ablation")
+        for scene in SCENES
+        for method in more
+        for cost in costs
+    ]
+    (table,) = crossings(run_of(all_rows() + rows))
+    assert {line[1] for line in table.rows} == {"snug", *more}
+
+
+def test_a_profile_says_that_scenes_nobody_asked_of_a_family_count(tmp_path):
+    (picture,) = performance_profile(tmp_path, run_of(all_rows()))
+    assert "a scene that it cannot do" in picture.caption
 
 
 def test_ablations_are_drawn_where_the_full_recipe_is_not(tmp_path):
@@ -234,6 +304,16 @@ def test_any_metric_against_any_other(tmp_path, capsys):
     # Curvature exists on the dressed scenes alone, where most methods have it; zero has no place there.
     assert build.main([str(tmp_path), "--axes", "cost/frame", "curvature/error"]) == 0
     assert (tmp_path / "figures/curvature-error_against_cost-frame.svg").is_file()
+    # Suites other than garments and speed have their metrics too. A single zero is left out, not the figure.
+    far = [
+        dataclasses.replace(row("fast", method, metric, value), suite="extremes")
+        for method, value in (("simulation", 1.0), ("snug", 2.0), ("skinning", 0.0))
+        for metric in ("motion/strain", "motion/offset")
+    ]
+    run.write_rows([*all_rows(), *far])
+    assert build.main([str(tmp_path), "--axes", "motion/strain", "motion/offset"]) == 0
+    assert (tmp_path / "figures/motion-offset_against_motion-strain.svg").is_file()
+    assert "Left out, for motion/strain is zero: Skinning alone." in capsys.readouterr().out
     run.write_rows([*all_rows(), row("sheet", "newton-1", "curvature/error", 1.0)])
     assert build.main([str(tmp_path), "--axes", "cost/frame", "curvature/error"]) == 0
     run.write_rows([*all_rows(), row(SCENES[0], "newton-1", "lag", -1.0), row(SCENES[0], "snug", "lag", 1.0)])

@@ -1,7 +1,7 @@
 """A whole training of recipe default, rolled out on a motion that it does not see.
 
 Time is that of training: what the validations take is left out. Leaves the curve and the network; a run that
-was killed goes on from its last checkpoint, and python -m reports.convergence draws the curve.
+was killed goes on from its last checkpoint. The report draws the curve.
 """
 
 from __future__ import annotations
