@@ -183,17 +183,10 @@ def stress_tests(run: Run) -> pd.DataFrame:
 
 
 def map_points(run: Run) -> dict[str, tuple[float, float]]:
-    """Case -> factor on the stiffness and time step [s], of the cases of stability maps.
-
-    A case with these two options alone is a point of a map.
-    """
+    """Case -> factor on the stiffness and time step [s], of the cases of stability maps."""
     cases = run.config.get("cases") or {}
-    options = {name: case.get("options") or {} for name, case in cases.items()}
-    return {
-        name: (float(own["stiffness"]), float(own["dt"]))
-        for name, own in options.items()
-        if own.keys() == {"stiffness", "dt"}
-    }
+    points = {name: case.get("map_point") for name, case in cases.items()}
+    return {name: (float(point[0]), float(point[1])) for name, point in points.items() if point}
 
 
 def unfinished(run: Run) -> list[Table]:

@@ -89,7 +89,7 @@ def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
     metrics = {r.metric: r for r in sorted(rows, key=lambda r: r.metric == "energy/total")}
     cases = {
         r.scene: {
-            "suite": r.suite, "scene": r.scene, "metric": r.metric, "description": "", "options": {},
+            "suite": r.suite, "scene": r.scene, "metric": r.metric, "description": "",
         }
         for r in rows
         if r.metric in ("check", "outcome")

@@ -132,7 +132,7 @@ def point(stiffness: float, dt: float, status="ok"):
     return row("map_sheet", "simulation", value=value, **{**more, "metric": f"map/{stiffness:g}/{dt:.3g}"})
 
 
-def test_a_map_of_every_outcome_is_drawn_from_the_options_of_its_cases(tmp_path):
+def test_a_map_of_every_outcome_is_drawn_from_what_its_cases_declare(tmp_path):
     statuses = ("ok", "stalled", "failed", "timeout", "diverged")
     rows, cases = [], {}
     for k, status in enumerate(statuses):
@@ -140,10 +140,10 @@ def test_a_map_of_every_outcome_is_drawn_from_the_options_of_its_cases(tmp_path)
             rows.append(point(10.0**k, dt, status))
             cases[f"case {len(rows)}"] = {
                 "suite": "extremes", "scene": "map_sheet", "metric": rows[-1].metric,
-                "options": {"stiffness": 10.0**k, "dt": dt},
+                "map_point": [10.0**k, dt],
             }  # fmt: skip
     other = row("another", "simulation", "outcome", 1.0, suite="extremes")
-    cases["another"] = {"suite": "extremes", "options": {"stiffness": 1e3}}
+    cases["another"] = {"suite": "extremes", "map_point": None}
     run = run_of([*rows, other], cases=cases)
     from reports.tables import map_points, stress_tests
 

@@ -9,14 +9,18 @@ import re
 import numpy as np
 import pytest
 from report_folder import SCENES, all_rows, row, run_of, skipped
+from test_cell_tasks import plan_of
 
+from benchmarks.rows import described
+from benchmarks.validation.registry import CASES
 from reports import numbers
 from reports.ablations import ablations, ablations_judged
+from reports.data import run_data
 from reports.document import document
 from reports.layout import table_blocks
 from reports.means import Mean, mean_of, pair
 from reports.narrative import least, run_time, summary, trouble
-from reports.tables import make_tables, merged
+from reports.tables import make_tables, map_points, merged
 
 
 def seeds_of(method, metric, values, **more):
@@ -25,6 +29,16 @@ def seeds_of(method, metric, values, **more):
 
 def column(table, name):
     return [column.name for column in table.columns].index(name)
+
+
+def test_every_declared_case_has_its_place_in_the_tables(tmp_path):
+    rows = [case.row(1.0, "ok") for case in CASES]
+    run = run_data(described(plan_of(tmp_path, cases=CASES), rows), rows)
+    tables = make_tables(run)
+    maps = {case.name for case in CASES if case.map_point}
+    tested = {case.name for case in CASES if case.suite == "extremes"} - maps
+    assert {line[0] for line in tables["extremes"].rows} == tested and set(map_points(run)) == maps
+    assert len(tables["validation"].rows) == sum(case.suite == "validation" for case in CASES)
 
 
 def test_mean_and_spread_over_seeds():

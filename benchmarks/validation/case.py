@@ -34,6 +34,7 @@ class Case:
         module: dotted; with all that it imports it is what the row depends on.
         smoke: whether the smallest preset runs it.
         seconds: after which the case's process is ended; None: never.
+        map_point: (factor on the stiffness, time step [s]) of a point of a stability map, which its scene is.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Case:
     reason: str = ""
     smoke: bool = False
     seconds: float | None = None
+    map_point: tuple[float, float] | None = None
 
     def run(self) -> Row:
         """The row, measured here and now. What is raised becomes a failed row with its reason."""

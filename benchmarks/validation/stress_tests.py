@@ -44,7 +44,7 @@ def stability_map(name: str, what: str, module: str, function: str) -> tuple[Cas
             name=f"{name}/{factor:g}/{dt:.3g}", scene=name, suite="extremes", seconds=DEADLINE,
             description=f"{what}: stiffness x{factor:g}, dt = {dt:.3g} s",
             module=f"benchmarks.validation.{module}", function=function,
-            options={"stiffness": factor, "dt": dt},
+            options={"stiffness": factor, "dt": dt}, map_point=(factor, dt),
             metric=f"map/{factor:g}/{dt:.3g}", unit="iterations",
         )
         for factor in (1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)
