@@ -20,7 +20,7 @@ from witnesses import WITNESSES
 from benchmarks.validation.registry import KNOWN_ANSWERS
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("reference_sim", "benchmarks")
+PACKAGES = ("reference_sim", "snug", "benchmarks")
 ENOUGH = 2  # checks that fail before the others are left out
 RUNNER = """
 import json, sys
