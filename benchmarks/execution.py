@@ -29,8 +29,9 @@ OF_TRAINING = ("cost/setup", "cost/train")
 
 def execute(plan: Plan) -> int:
     """Run the plan. Returns 0 when all ended well, 1 when something failed or there is no report."""
+    tasks = tasks_of(plan)
     log = RunLog(plan)
-    runner = Runner(tasks_of(plan), log.cache)
+    runner = Runner(tasks, log.cache)
     try:
         assets = None
         if plan.garments:

@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .registry import DeclarationError
+from .results import ROLES
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -78,6 +81,11 @@ class MethodEntry:
     level: float | None = None
     base: str = ""
     pairing_group: str = ""
+
+    def __post_init__(self) -> None:
+        if self.role not in ROLES:
+            roles = ", ".join(filter(None, ROLES))
+            raise DeclarationError(f"method {self.name}: unknown role '{self.role}'; use one of {roles}")
 
     def meant_for(self, scene: Scene) -> bool:
         """Whether the two may meet at all: some scenes are for networks alone, and some for none."""

@@ -19,6 +19,7 @@ from .performance.microbenchmark import SUITE
 from .plan import Motions, OwnBody, Plan, PlanError
 from .presets import PRESETS, find_preset
 from .provenance import usable_cores
+from .registry import DeclarationError
 from .results import ResultsError, RunFolder
 from .selection import Request, choose, choose_motions, choose_suites, names_no_motion
 from .timing import one_thread
@@ -120,19 +121,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ValueError as error:  # also the readers' own errors: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
-    if options.dry_run:
-        from .dry_run import describe
-
-        print(describe(plan))
-        return 0
     from .lock import HeldError, held
 
     try:
+        if options.dry_run:
+            from .dry_run import describe
+
+            print(describe(plan))
+            return 0
         with held(plan.folder):
             from .execution import execute
 
             return execute(plan)
-    except HeldError as error:
+    except (HeldError, DeclarationError) as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

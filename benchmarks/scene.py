@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from .registry import DeclarationError, by_name
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -72,6 +74,12 @@ class Scene:
 
     def at(self, preset: Preset) -> Scene:
         """The scene with the sizes of a preset among its options."""
+        for name in self.sizes:
+            if not hasattr(preset, name):
+                raise DeclarationError(
+                    f"scene {self.name}: sizes={self.sizes!r} has {name!r}, which no preset has; "
+                    "it is a tuple of names such as 'sheet_cells'"
+                )
         sizes = {name: getattr(preset, name) for name in self.sizes}
         return replace(self, sizes=(), options={**sizes, **self.options})
 
@@ -121,6 +129,9 @@ class BuiltScene:
     glitch: int | None = None
     kept: np.ndarray | None = None
     repeated: tuple[np.ndarray, np.ndarray] | None = None
+
+    def __post_init__(self) -> None:
+        by_name("energy", self.energies)  # rows of one would overwrite those of the other
 
     @cached_property
     def start(self) -> np.ndarray:

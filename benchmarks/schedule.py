@@ -21,9 +21,10 @@ from .methods import find_method
 from .metrics import names_of
 from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
+from .registry import DeclarationError
 from .scene import Scene
 from .scenes import GARMENT_SCENES, find_scene, of_garment
-from .source import digest, digest_of_file
+from .source import digest, digest_of_file, find_module
 from .tasks.case import RunCase
 from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
 from .tasks.ground_truth import SettleStart, SimulateMotion, SimulateQuasiStatic
@@ -38,8 +39,11 @@ TASKS, ASSETS = "benchmarks.tasks", "benchmarks.assets"
 
 
 def tasks_of(plan: Plan) -> list[Task]:
-    """Every task of the plan."""
-    return list(Schedule(plan).tasks())
+    """Every task of the plan. Raises DeclarationError where an entry names a module that is not there."""
+    tasks = list(Schedule(plan).tasks())
+    for module in {module for task in tasks for module in task.modules}:
+        find_module(module)
+    return tasks
 
 
 class Schedule:
@@ -268,9 +272,9 @@ def _declared(entry: Any) -> dict[str, Any]:
 
 
 def _content(path: Path, garment: str) -> str:
-    """Digest of a file. Raises ValueError where there is none."""
+    """Digest of a file. Raises DeclarationError where there is none."""
     if not path.is_file():
-        raise ValueError(f"{path}: no such file; garment {garment} is read from it")
+        raise DeclarationError(f"{path}: no such file; garment {garment} is read from it")
     return digest_of_file(path)
 
 

@@ -20,6 +20,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from .registry import DeclarationError
+
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS = ("reference_sim", "snug", "benchmarks")
 NO_DATA = (".py", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
@@ -62,8 +64,13 @@ def code_of(*modules: str) -> dict[str, str]:
     """File -> digest of its code, of these modules and all of ours that they import, directly or not."""
     found: set[str] = set()
     for module in modules:
-        found |= _closure(_file_of(module) or _elsewhere(module))
+        found |= _closure(find_module(module))
     return {path: _source(path).digest for path in sorted(found)}
+
+
+def find_module(module: str) -> str:
+    """The file of a module, ours or a user's. Raises DeclarationError."""
+    return _file_of(module) or _elsewhere(module)
 
 
 def packages_of(code: Iterable[str]) -> dict[str, str]:
@@ -102,12 +109,12 @@ def _version(package: str) -> str:
 
 
 def _elsewhere(module: str) -> str:
-    """The file of a module that is not ours: a method or a scene of a user. Raises ValueError."""
+    """The file of a module that is not ours: a method or a scene of a user. Raises DeclarationError."""
     found = None
     with suppress(ModuleNotFoundError):  # of its package
         found = importlib.util.find_spec(module)
     if found is None or found.origin is None:
-        raise ValueError(f"no module {module}")
+        raise DeclarationError(f"no module {module}: see the entry that names it")
     return found.origin
 
 
@@ -132,7 +139,10 @@ class _Source:
 
 @cache
 def _source(path: str) -> _Source:
-    tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    try:
+        tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    except SyntaxError as error:
+        raise DeclarationError(f"{path}: line {error.lineno}: {error.msg}") from None
     imports = [pair for node in _running(tree) for pair in _imported(node, path)]
     roots = {base.split(".")[0] for base, _ in imports}
     files = (

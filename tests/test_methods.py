@@ -44,6 +44,11 @@ FINER = [e for e in SMALL_METHODS if e.level is not None and e not in COARSEST] 
 ]
 DRESSED_METHODS = [entry for entry in SMALL_METHODS if entry not in FINER]
 BODY = f"tshirt/{TEST}"
+SIMULATING = {
+    f"benchmarks.methods.{name}"
+    for name in ("simulation", "perturbed_start", "warm_started", "vertex_block_descent", "xpbd")
+}
+EXTERNAL = {entry.name for entry in METHODS if entry.package or entry.needs_no_obstacle}
 NAMES = [*(scene.name for scene in SCENES), BODY]
 
 
@@ -95,7 +100,7 @@ def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
     scene, found = scenes[name], outcomes_of(run, name)
     for method, outcome in found.items():
         if outcome.status == "skipped":
-            assert outcome.reason and (scene.dressed is None or find_method(method).package)
+            assert outcome.reason and (scene.dressed is None or method in EXTERNAL)
             continue
         assert outcome.status == "ok", f"{name} x {method}: {outcome.reason}"
         trajectory = trajectory_of(run, name, method)
@@ -103,14 +108,14 @@ def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
         assert np.isfinite(trajectory.positions).all() and np.array_equal(trajectory.faces, scene.cloth.faces)
         seconds = trajectory.frame_seconds[1:]  # the simulator's own; no method takes times
         simulated = np.isfinite(seconds).all()
-        assert simulated == (find_method(method).dtype == "float64")
+        assert simulated == (find_method(method).module in SIMULATING)
         assert not simulated or ((seconds > 0).all() and seconds.sum() <= outcome.result["seconds"])
         assert trajectory.provenance["scene"] == name
         given = 0 if find_method(method).gives_first_frame else 1
         assert outcome.result["frames"] == scene.frames - given
     skipped = {method for method, outcome in found.items() if not outcome.files}
-    bound = {entry.name for entry in METHODS if entry.needs_body or entry.package}
-    assert skipped <= bound and (scene.dressed is None or skipped <= {"newton-vbd", "newton-xpbd"})
+    bound = {entry.name for entry in METHODS if entry.needs_body}
+    assert skipped <= bound | EXTERNAL and (scene.dressed is None or skipped <= EXTERNAL)
 
 
 def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows, scenes):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..method import MethodEntry
+from ..registry import by_name
 from .learned import LEARNED, RECIPE_DEVIATIONS, network
 from .solvers import SOLVERS
 
@@ -39,4 +40,4 @@ METHODS = (
 
 def find_method(name: str) -> MethodEntry:
     """The entry of that name. Raises KeyError."""
-    return {entry.name: entry for entry in METHODS}[name]
+    return by_name("method", METHODS)[name]

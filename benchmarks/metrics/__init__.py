@@ -9,6 +9,7 @@ from functools import cache
 from types import ModuleType
 
 from ..metric import Metric
+from ..registry import DeclarationError, by_name
 
 MODULES = (
     "energy",
@@ -39,11 +40,18 @@ def modules() -> dict[str, ModuleType]:
 
 @cache
 def declared() -> dict[str, Metric]:
-    """Name -> metric, of all modules, and of microbenchmarks."""
+    """Name -> metric, of all modules, and of microbenchmarks. Raises DeclarationError."""
     from ..performance.metrics import METRICS
 
-    own = (metric for module in modules().values() for metric in module.METRICS)
-    return {metric.name: metric for metric in (*own, *METRICS)}
+    own: list[Metric] = []
+    for name, module in modules().items():
+        if not hasattr(module, "METRICS"):
+            raise DeclarationError(f"benchmarks.metrics.{name} declares no METRICS, a tuple of Metric")
+        own += module.METRICS
+    for metric in own:
+        if not metric.unit:
+            raise DeclarationError(f"metric '{metric.name}' has no unit: say 1 where it has no dimension")
+    return by_name("metric", (*own, *METRICS))
 
 
 def find_metric(name: str) -> Metric:

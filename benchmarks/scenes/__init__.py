@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..presets import PRESETS
+from ..registry import by_name
 from ..scene import Scene
 from .further import OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
 
@@ -52,7 +53,7 @@ FURTHER = (
 
 def find_scene(name: str) -> Scene:
     """The scene of that name, of those that hang on no motion of the run. Raises KeyError."""
-    return {scene.name: scene for scene in (*SCENES, *FURTHER)}[name]
+    return by_name("scene", (*SCENES, *FURTHER))[name]
 
 
 @dataclass(frozen=True)
@@ -108,4 +109,4 @@ def all_scenes(motions: Iterable[str], dynamic_motions: Iterable[str]) -> dict[s
         for motion in chosen[scenes.dynamic]
         for part in ("whole", "clip")
     ]
-    return {scene.name: scene for scene in (*SCENES, *dressed, *long, *FURTHER)}
+    return by_name("scene", (*SCENES, *dressed, *long, *FURTHER))

@@ -213,7 +213,7 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
     if trajectory.status == "max_iterations":
         return ("ok", "") if truncated else ("stalled", reason)
     if trajectory.status not in WORDS:
-        return "failed", f"unknown status {trajectory.status}: {reason}"
+        return "failed", f"unknown status '{trajectory.status}', use one of {', '.join(WORDS)}; {reason}"
     status = WORDS[trajectory.status]
     if status != "ok" and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())

@@ -61,7 +61,7 @@ class Energy:
 
     def element_energy(self, u: Tensor) -> Tensor:
         """Energy of each element from its own vertices: u (..., N, k, 3) [m] -> (..., N) [J]."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} defines no element_energy")
 
     def prepare(self, step: Step) -> None:
         """Freeze what this term needs for one step; most terms need nothing."""
