@@ -160,6 +160,7 @@ def test_the_gap_is_zero_for_the_reference_and_falls_with_the_iterations(name):
     if scene.obstacle is not None:
         # Planes searched at the end of the step are others than those at its beginning.
         assert whole["gap/refrozen"] > 10.0 * whole["gap/energy"]
+        assert judged(refreeze=1)["gap/refrozen"] < 0.1 * whole["gap/refrozen"]
     else:
         assert "gap/refrozen" not in whole
 
