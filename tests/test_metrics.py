@@ -23,8 +23,9 @@ from benchmarks.metrics.curvature import (
 from benchmarks.metrics.energy import energy_series, mean_energy
 from benchmarks.metrics.geometry import distance_rms, hem_drift, own_part_depth, penetration
 from benchmarks.metrics.intersections import intersecting, intersecting_share
-from benchmarks.metrics.optimality import FINDERS, first_guess, optimality
+from benchmarks.metrics.optimality import FINDERS, optimality
 from benchmarks.metrics.shape import area_change, dihedral_angle, edge_change
+from benchmarks.metrics.step import first_guess
 from benchmarks.metrics.time_error import time_errors
 from benchmarks.results import Row
 from benchmarks.rows import remarked
@@ -242,12 +243,12 @@ def test_the_gap_is_taken_to_the_lowest_minimum_found():
 
 def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypatch):
     """Its first guess has no energy; the minimum found from its frame has one."""
-    from benchmarks.metrics import optimality as module
+    from benchmarks.metrics import step
 
     scene = small_scene("hanging_sheet")
     still = np.repeat(scene.start[None], 3, axis=0)
-    monkeypatch.setattr(module, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
-    found = module.optimality(scene, still, samples=1)
+    monkeypatch.setattr(step, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
+    found = optimality(scene, still, samples=1)
     assert np.isnan(found.to_gain) and found.missed >= 0.0 and sum(found.found_by.values()) == 1
 
 

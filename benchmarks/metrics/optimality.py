@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from ..metric import Metric, skinned
 from .energy import FIRST_FULL_FRAME
+from .step import own_terms, prepared
 
 if TYPE_CHECKING:
     from ..metric import RollOut
@@ -107,22 +108,19 @@ def optimality(
 ) -> Optimality:
     """Judge positions (T,V,3) [m] at `samples` frames spread evenly; skinned (T,V,3) are the x_s of above."""
     from reference_sim import Potential
-    from reference_sim.energies import Inertia, Step
     from reference_sim.minimise import LBFGS, Newton
     from reference_sim.minimise.descent import mean_weight
 
     found = Optimality()
     if len(positions) <= FIRST_FULL_FRAME:
         return found
-    potential = Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
+    potential = Potential(own_terms(scene))
     newton = Newton(potential, max_iterations=ITERATIONS)
     both = LBFGS(potential, max_iterations=ITERATIONS)
     frames = np.unique(np.linspace(FIRST_FULL_FRAME, len(positions) - 1, samples).round().astype(int))
     for frame in frames:
-        x, previous = np.ascontiguousarray(positions[frame]), positions[frame - 1]
-        velocity = (previous - positions[frame - 2]) / scene.dt
-        guess = first_guess(scene, previous, velocity, int(frame))
-        potential.prepare(Step(previous, velocity, guess, scene.dt, scene.obstacle, int(frame)))
+        x = np.ascontiguousarray(positions[frame])
+        guess = prepared(scene, potential, positions, int(frame)).guess
         here, gradient = potential.value_and_gradient(x)
         if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
             found.missed = found.missed_locally = float("nan")
@@ -145,16 +143,3 @@ def optimality(
         found.to_gain += to_gain
         found.gradients.append(float(np.abs(gradient[scene.cloth.free]).max()) / mean_weight(potential))
     return found
-
-
-def first_guess(
-    scene: BuiltScene, previous: NDArray[np.float64], velocity: NDArray[np.float64], frame: int
-) -> NDArray[np.float64]:
-    """Where a solver would start, (V,3) [m]: what a step costs nothing to get."""
-    if scene.obstacle is None:
-        guess = previous + scene.dt * velocity
-    else:
-        guess = scene.obstacle.transported(previous, frame, scene.cloth.rest_positions)
-    pins = scene.cloth.pins
-    guess[pins] = previous[pins] if scene.pin_positions is None else scene.pin_positions(frame)
-    return np.ascontiguousarray(guess)
