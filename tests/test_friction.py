@@ -11,7 +11,7 @@ from meshes import box
 from benchmarks.metrics.conservation import law_series
 from benchmarks.metrics.energy import energy_series
 from benchmarks.metrics.optimality import optimality
-from benchmarks.metrics.step import own_terms, prepared
+from benchmarks.metrics.step import own_terms, prepare
 from benchmarks.presets import find_preset
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import find_scene
@@ -95,12 +95,12 @@ def another(x: np.ndarray) -> np.ndarray:
     return x + np.array([0.0, 1e-3, 0.0])
 
 
-@pytest.mark.parametrize("samples", [1, 3, FRAMES])
-def test_the_simulation_ends_each_step_in_its_minimum_also_where_frames_are_jumped(judged, samples):
+def test_the_simulation_ends_each_step_in_its_minimum_also_where_frames_are_jumped(judged):
+    """Frames are taken from all over the trajectory in turn, and again with planes at the frame itself."""
     scene, trajectory = judged
-    found = optimality(scene, trajectory.positions, samples=samples)
-    assert max(found.gradients) <= 1e-6
-    assert found.missed_locally <= 1e-12 * found.to_gain
+    found = optimality(scene, trajectory.positions, samples=FRAMES)
+    assert len(found.gradients) == len(found.refrozen) == FRAMES - 2 and max(found.gradients) <= 1e-6
+    assert max(found.local) <= 1e-12
 
 
 def test_laws_hold_for_the_simulation_beside_another(judged):
@@ -136,11 +136,11 @@ def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
     scene, trajectory = judged
     x, frame = trajectory.positions, FRAMES - 3
     own, row = Potential(own_terms(scene)), Potential(own_terms(scene))
-    prepared(scene, own, x, 4)  # a frame of before, far from this one
-    step = prepared(scene, own, x, frame)
+    prepare(scene, own, x, 4)  # a frame of before, far from this one
+    guess = prepare(scene, own, x, frame)
     for t in range(1, frame + 1):
-        last = prepared(scene, row, x, t)
-    assert np.array_equal(step.guess, last.guess) and step.frame == frame
+        last = prepare(scene, row, x, t)
+    assert np.array_equal(guess, last)
     at = np.ascontiguousarray(x[frame])
     assert own.terms(at) == row.terms(at) and own.terms(at)["friction"] > 0
     assert not np.shares_memory(own.gradient(at), row.gradient(at))

@@ -24,7 +24,7 @@ class PerturbedStart(Simulation):
         direction = np.random.default_rng(0).standard_normal(scene.start.shape)
         direction *= SHIFT / np.linalg.norm(direction, axis=1, keepdims=True)
         direction[scene.cloth.pins] = 0.0
-        start = scene.start + direction
+        start = scene.start_state + np.stack([direction, np.zeros_like(direction)])
         super().prepare(dataclasses.replace(scene, settle=lambda: start))
 
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from ..scene import BuiltScene
 
+Floats = NDArray[np.float64]
+
 
 def own_terms(scene: BuiltScene) -> list[Energy]:
     """The terms that the scene declares, and inertia, to be prepared for one trajectory alone.
@@ -30,31 +32,32 @@ def own_terms(scene: BuiltScene) -> list[Energy]:
     return list(twins.values())
 
 
-def prepared(scene: BuiltScene, potential: Potential, positions: NDArray[np.float64], frame: int) -> Step:
-    """Prepare the potential for the step that ended at `frame` (1 or later) of positions (T,V,3) [m].
+def prepare(
+    scene: BuiltScene, potential: Potential, positions: Floats, frame: int, *, guess: Floats | None = None
+) -> Floats:
+    """Freeze the potential for the step that ended at `frame` (1 or later) of positions (T,V,3) [m], at the
+    simulator's first guess or at another; gives that guess (V,3) [m].
 
-    The step before it is prepared first, which a term may remember: any frame may be jumped to.
+    The step before, which a term may remember, is prepared first: any frame may be jumped to.
     """
     if frame > 1:
         potential.prepare(step_to(scene, positions, frame - 1))
-    step = step_to(scene, positions, frame)
+    step = step_to(scene, positions, frame, guess=guess)
     potential.prepare(step)
-    return step
+    return step.guess
 
 
-def step_to(scene: BuiltScene, positions: NDArray[np.float64], frame: int) -> Step:
+def step_to(scene: BuiltScene, positions: Floats, frame: int, *, guess: Floats | None = None) -> Step:
     """What a solver would be given to get from frame - 1 of positions (T,V,3) [m] to `frame`, 1 or later."""
     from reference_sim.energies import Step
 
     previous = positions[frame - 1]
     velocity = (previous - positions[max(frame - 2, 0)]) / scene.dt
-    guess = first_guess(scene, previous, velocity, frame)
+    guess = first_guess(scene, previous, velocity, frame) if guess is None else guess
     return Step(previous, velocity, guess, scene.dt, scene.obstacle, frame)
 
 
-def first_guess(
-    scene: BuiltScene, previous: NDArray[np.float64], velocity: NDArray[np.float64], frame: int
-) -> NDArray[np.float64]:
+def first_guess(scene: BuiltScene, previous: Floats, velocity: Floats, frame: int) -> Floats:
     """Where a solver would start, (V,3) [m]: what a step costs nothing to get."""
     if scene.obstacle is None:
         guess = previous + scene.dt * velocity
