@@ -18,8 +18,10 @@ from tasks_by_hand import small_scene
 from benchmarks.methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import optimality as module
+from benchmarks.metrics import step
 from benchmarks.metrics.curvature import curvature_error, curvature_series
-from benchmarks.metrics.optimality import FINDERS, first_guess, gap_scale, optimality, spread
+from benchmarks.metrics.optimality import FINDERS, gap_scale, optimality, spread
+from benchmarks.metrics.step import first_guess
 from reference_sim import Potential, Trajectory, minimise, simulate
 from reference_sim.energies import Inertia, Step
 
@@ -255,7 +257,7 @@ def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypat
     """Its first guess has no energy; the minimum found from its frame has one."""
     scene = small_scene("hanging_sheet")
     still = np.repeat(scene.start[None], 3, axis=0)
-    monkeypatch.setattr(module, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
+    monkeypatch.setattr(step, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
     found = optimality(scene, still, samples=1)
     assert found.gaps[0] >= 0.0 and sum(found.found_by.values()) == 1
     nowhere = still.copy()

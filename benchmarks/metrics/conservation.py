@@ -21,7 +21,6 @@ along with the body, at no cost.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -33,7 +32,7 @@ from reference_sim.material import GRAVITY
 
 from ..metric import Metric
 from .energy import FIRST_FULL_FRAME
-from .optimality import first_guess
+from .step import own_terms, step_to
 
 if TYPE_CHECKING:
     from reference_sim import Potential
@@ -147,36 +146,25 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
     tree of a frame is made once. Raises ValueError for a scene with pins or a trajectory too short.
     """
     from reference_sim import Potential
-    from reference_sim.energies import Inertia
 
     if len(scene.cloth.pins):
         raise ValueError(f"scene {scene.name}: laws of a cloth with pins need the pins' forces")
     frames = [len(positions) for positions in trajectories]
     if frames and min(frames) <= FIRST_FULL_FRAME:
         raise ValueError(f"scene {scene.name}: a law needs {FIRST_FULL_FRAME + 1} frames, not {min(frames)}")
-    declared = [*scene.energies, Inertia(scene.cloth, scene.dt)]
-    own = [Potential([copy.copy(term) for term in declared]) for _ in trajectories]
+    own = [Potential(own_terms(scene)) for _ in trajectories]
     pivots = _pelvis(scene)
     found: list[list[tuple[float, ...]]] = [[] for _ in trajectories]
     # From the first step on, as a solver: an obstacle's search tree covers what it has been asked about, and
     # where two of its faces are equally near, the tree decides between them.
     for frame in range(1, max(frames, default=0)):
-        steps = {k: _step(scene, x, frame) for k, x in enumerate(trajectories) if frame < frames[k]}
+        steps = {k: step_to(scene, x, frame) for k, x in enumerate(trajectories) if frame < frames[k]}
         for k, step in steps.items():
             own[k].prepare(step)
             if frame >= FIRST_FULL_FRAME:
                 found[k].append(_one_step(scene, own[k], step, trajectories[k][frame], pivots[frame]))
     weight = float(scene.cloth.masses.sum() * GRAVITY)
     return [LawSeries(weight, *np.array(steps).T) for steps in found]
-
-
-def _step(scene: BuiltScene, x: Floats, frame: int) -> Step:
-    """What a solver would be given to get from frame - 1 of x (T,V,3) [m] to `frame`."""
-    from reference_sim.energies import Step
-
-    velocity = (x[frame - 1] - x[max(frame - 2, 0)]) / scene.dt
-    guess = first_guess(scene, x[frame - 1], velocity, frame)
-    return Step(x[frame - 1], velocity, guess, scene.dt, scene.obstacle, frame)
 
 
 def _one_step(

@@ -7,7 +7,6 @@ two before it; it counts as moving freely, hence inertia 0 there. Means are over
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from reference_sim.energies.gravity import Gravity
 
 from ..metric import Metric
+from .step import own_terms
 
 if TYPE_CHECKING:
     from reference_sim.energies import Energy
@@ -54,12 +54,8 @@ def energy_series(
 
     Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
     """
-    from reference_sim.energies import Inertia
-
-    declared = [*scene.energies, Inertia(scene.cloth, scene.dt)]
-    # A term may remember the step before: each trajectory has terms of its own.
-    own = [[copy.copy(term) for term in declared] for _ in trajectories]
-    found = [{term.name: np.zeros(len(positions)) for term in declared} for positions in trajectories]
+    own = [own_terms(scene) for _ in trajectories]
+    found = [{name: np.zeros(len(positions)) for name in scene.terms} for positions in trajectories]
     for frame in range(max(map(len, trajectories), default=0)):
         for positions, terms, series in zip(trajectories, own, found):
             if frame < len(positions):

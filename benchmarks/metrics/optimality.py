@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 
 from ..metric import Estimate, Metric, skinned
 from .curvature import boundary_mask, mean_curvature
+from .step import own_terms, prepare
 
 if TYPE_CHECKING:
     from reference_sim import Potential
@@ -214,24 +215,8 @@ def _judged(scene: BuiltScene, positions: Floats) -> range:
 
 def _potential(scene: BuiltScene) -> Potential:
     from reference_sim import Potential
-    from reference_sim.energies import Inertia
 
-    return Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
-
-
-def prepare(
-    scene: BuiltScene, potential: Potential, positions: Floats, frame: int, *, guess: Floats | None = None
-) -> Floats:
-    """Freeze the potential for the step that ended at `frame` of positions (T,V,3) [m], at the simulator's
-    first guess or at another; gives that guess (V,3) [m].
-    """
-    from reference_sim.energies import Step
-
-    previous = positions[frame - 1]
-    velocity = (previous - positions[frame - 2]) / scene.dt
-    guess = first_guess(scene, previous, velocity, frame) if guess is None else guess
-    potential.prepare(Step(previous, velocity, guess, scene.dt, scene.obstacle, frame))
-    return guess
+    return Potential(own_terms(scene))
 
 
 def spread(frames: range) -> Iterator[int]:
@@ -251,14 +236,3 @@ def _curvature_error(x: Floats, y: Floats, faces: NDArray[np.int64], inner: NDAr
     ours, _ = mean_curvature(x, faces)
     theirs, areas = mean_curvature(y, faces)
     return float(np.average(np.abs(ours - theirs)[inner], weights=areas[inner]))
-
-
-def first_guess(scene: BuiltScene, previous: Floats, velocity: Floats, frame: int) -> Floats:
-    """Where a solver would start, (V,3) [m]: what a step costs nothing to get."""
-    if scene.obstacle is None:
-        guess = previous + scene.dt * velocity
-    else:
-        guess = scene.obstacle.transported(previous, frame, scene.cloth.rest_positions)
-    pins = scene.cloth.pins
-    guess[pins] = previous[pins] if scene.pin_positions is None else scene.pin_positions(frame)
-    return np.ascontiguousarray(guess)
