@@ -81,7 +81,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     if roll_out not in _asked(roll_out.group):
         return {}
     laws = roll_out.group.kept(_laws_of)[roll_out]
-    found = laws.metrics()
+    found = laws.metrics(roll_out.scene.warm_up - FIRST_FULL_FRAME)
     if roll_out is not roll_out.group.reference:
         return found
     fields, frames = roll_out.trajectory.frame_fields, roll_out.trajectory.frames
@@ -123,19 +123,20 @@ class LawSeries:
     residual: Floats
     residual_rms: Floats
 
-    def metrics(self) -> dict[str, float]:
-        """Means over frames, and shares of frames [%] that break an inequality."""
-        broken = self.rise > RISE * self.size
-        climbed = self.climb > RISE * self.size
+    def metrics(self, first: int = 0) -> dict[str, float]:
+        """Means over the steps from `first` on, and shares of these [%] that break an inequality."""
+        judged = slice(first, None)
+        broken = (self.rise > RISE * self.size)[judged]
+        climbed = (self.climb > RISE * self.size)[judged]
         return {
-            "conservation/momentum": 100.0 * float(self.force.mean()) / self.weight,
-            "conservation/angular": float(self.torque.mean()),
-            "conservation/energy": float(np.where(broken, self.rise, 0.0).mean()),
+            "conservation/momentum": 100.0 * float(self.force[judged].mean()) / self.weight,
+            "conservation/angular": float(self.torque[judged].mean()),
+            "conservation/energy": float(np.where(broken, self.rise[judged], 0.0).mean()),
             "conservation/energy_frames": 100.0 * float(broken.mean()),
-            "conservation/descent": float(np.where(climbed, self.climb, 0.0).mean()),
+            "conservation/descent": float(np.where(climbed, self.climb[judged], 0.0).mean()),
             "conservation/descent_frames": 100.0 * float(climbed.mean()),
-            "conservation/residual": float(self.residual.mean()),
-            "conservation/residual_rms": float(self.residual_rms.mean()),
+            "conservation/residual": float(self.residual[judged].mean()),
+            "conservation/residual_rms": float(self.residual_rms[judged].mean()),
         }
 
 
