@@ -82,7 +82,7 @@ class NewtonSolver(Method):
     def run(self) -> Trajectory:
         scene = self.scene
         x = scene.start
-        v = np.zeros_like(x) if scene.start_velocity is None else scene.start_velocity
+        v = scene.start_velocity
         positions, status, reason = [x], "ok", ""
         for frame in range(1, scene.frames):
             if scene.pin_positions is not None:
