@@ -21,13 +21,14 @@ if TYPE_CHECKING:
 class Assets:
     """A body, what it may wear and the motions, all by name; each motion at most `preset.frames` long.
 
-    clips: motion -> its liveliest part. bodies: (motion, part) -> posed body (T,B,3) [m], where ready made.
+    clips: motion -> frames of its liveliest part. bodies: motion or clip -> posed body (T,B,3) [m], where
+    ready made.
     """
 
     body: Body
     garments: dict[str, Garment]
     motions: dict[str, Motion]
-    clips: dict[str, Motion]
+    clips: dict[str, range]
     bodies: dict[str, np.ndarray] = field(default_factory=dict)
 
     def named(self, names: Iterable[str]) -> list[Motion]:
@@ -35,8 +36,17 @@ class Assets:
         return [self.motions[name] for name in names]
 
     def motion(self, name: str, part: str) -> Motion:
-        """The whole motion of that name, or its clip."""
-        return (self.clips if part == "clip" else self.motions)[name]
+        """The whole motion of that name, or its clip, named "<motion>@clip"."""
+        whole = self.motions[name]
+        if part != "clip":
+            return whole
+        frames = self.clips[name]
+        return replace(whole.cut(frames.start, frames.stop), name=f"{name}@clip")
+
+    def before(self, name: str, part: str) -> Motion | None:
+        """What comes before that part of the motion; None where it begins with the motion."""
+        start = self.clips[name].start if part == "clip" else 0
+        return self.motions[name].cut(0, start) if start else None
 
     def only(self, motion: str) -> Assets:
         """The same with this motion alone: little to hand to another process."""
@@ -70,7 +80,7 @@ def open_assets(
         name: find_template(name).tailor(wearer, vertices=preset.garment_vertices) for name in garments
     }
     whole = [motion.cut(0, preset.frames) for motion in motions]
-    clips = {motion.name: clip(wearer, motion, preset.clip_frames) for motion in whole}
+    clips = {motion.name: clip(wearer, motion, preset.clip_frames, preset.warm_up_frames) for motion in whole}
     return Assets(wearer, tailored, {motion.name: motion for motion in whole}, clips)
 
 

@@ -2,9 +2,15 @@
 
 A module of benchmarks/metrics holds METRICS, a tuple of Metric, and
 
-    measure(roll_out: RollOut) -> dict[str, float]     name -> value; what does not apply is left out
+    measure(roll_out: RollOut) -> dict[str, float | Estimate]     name -> value; what does not apply is left
+                                                                   out
 
-and where it wants curves in the trajectory file
+and where numbers compare a roll-out with the reference simulation
+
+    compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]     name -> value
+
+which is called with the reference, and with each simulation that is as right as the reference: how far a
+number moves with them is its uncertainty. And where it wants curves in the trajectory file
 
     series(roll_out: RollOut) -> dict[str, np.ndarray]  name -> (T,)
 
@@ -20,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -32,6 +38,17 @@ if TYPE_CHECKING:
 
 Made = TypeVar("Made")
 WHOLE = ("ok", "stalled")  # statuses of cells that came to their last frame
+COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what others are measured beside
+# Families of simulations that are as right as the reference. Those of another time step are not: they solve
+# another discrete problem, and how far they are from it is the time error.
+AS_RIGHT = ("simulation-perturbed", "simulation-tolerance", "simulation-refrozen")
+
+
+class Estimate(NamedTuple):
+    """A number and how far it may be off, in the same unit."""
+
+    value: float
+    uncertainty: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,6 +120,11 @@ class RollOut(Kept):
         return None if reference is self else reference
 
     @property
+    def judged(self) -> slice:
+        """The frames after those of the warm-up."""
+        return slice(self.scene.warm_up, None)
+
+    @property
     def place(self) -> int:
         """Among the roll-outs of the group."""
         return self.group.roll_outs.index(self)
@@ -113,7 +135,7 @@ class SceneRollOuts(Kept):
 
     Attributes:
         scene: as it was built.
-        gap_samples: frames at which a step is solved again.
+        gap_samples: frames at least at which a step is solved again.
         quasi_static: (T,V,3) [m] the simulator's answer to poses held still, or None.
         roll_outs: to be filled before anything is measured.
     """
@@ -137,6 +159,11 @@ class SceneRollOuts(Kept):
     @property
     def reference(self) -> RollOut | None:
         return self.find(role="reference")
+
+    @property
+    def as_right(self) -> list[RollOut]:
+        """Simulations that could stand in the reference's place."""
+        return [r for r in self.roll_outs if r.entry.family in AS_RIGHT and r.status == "ok"]
 
     @property
     def positions(self) -> list[np.ndarray]:

@@ -23,6 +23,7 @@ class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
     frames: at most so many frames of each motion, at 30 per second; clip_frames: of its liveliest part;
+    warm_up_frames: at the beginning of a dressed scene, simulated and not judged, before those of a clip;
     loop_frames: of the walk in a loop.
     steps: optimiser steps per kind of network, or per training. further: whether the
     ablations and further baselines of a suite take part without being named. settle_frames: frames from the
@@ -40,6 +41,7 @@ class Preset:
     test_motions: int | None
     frames: int
     clip_frames: int
+    warm_up_frames: int
     loop_frames: int
     settle_frames: int
     steps: dict[str, int]
@@ -68,6 +70,7 @@ PRESETS = (
         test_motions=1,
         frames=20,
         clip_frames=10,
+        warm_up_frames=3,
         loop_frames=390,
         settle_frames=12,
         steps={
@@ -96,6 +99,7 @@ PRESETS = (
         test_motions=None,
         frames=150,
         clip_frames=36,
+        warm_up_frames=10,
         loop_frames=10_000,
         settle_frames=30,
         steps={
@@ -124,6 +128,7 @@ PRESETS = (
         test_motions=None,
         frames=100_000,
         clip_frames=100_000,
+        warm_up_frames=10,
         loop_frames=10_000,
         settle_frames=60,
         steps=dict.fromkeys(

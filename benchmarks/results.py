@@ -22,8 +22,8 @@ STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "
 
 COLUMNS = (
     "suite", "scene", "method", "seed", "metric", "unit", "value", "status", "reason", "expected",
-    "tolerance", "preset", "commit", "hardware", "dtype", "threads", "terms", "garment", "motion", "part",
-    "family", "level", "role", "base", "seeded", "pairing_group",
+    "tolerance", "uncertainty", "preset", "commit", "hardware", "dtype", "threads", "terms", "garment",
+    "motion", "part", "family", "level", "role", "base", "seeded", "pairing_group",
 )  # fmt: skip
 # In this order methods stand in a report.
 ROLES = (
@@ -40,8 +40,10 @@ class ResultsError(ValueError):
 class Row:
     """One measured number: a (suite, scene, method, seed, metric) and what came out.
 
-    `value`, `expected` and `tolerance` are None where absent (an empty cell in the file); a skipped
-    row has a reason and no value. `terms` names the energies of the scene, joined by "+".
+    `value`, `expected`, `tolerance` and `uncertainty` are None where absent (an empty cell in the file); a
+    skipped row has a reason and no value. `uncertainty`, in the unit of the value: how far it moves where
+    another simulation as right as the reference takes its place, or its standard error as a sample of
+    frames. `terms` names the energies of the scene, joined by "+".
 
     Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
     Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
@@ -62,6 +64,7 @@ class Row:
     reason: str = ""
     expected: float | None = None
     tolerance: float | None = None
+    uncertainty: float | None = None
     preset: str = ""
     commit: str = ""
     hardware: str = ""
@@ -93,7 +96,7 @@ class Row:
         return self.status in ("ok", "skipped")
 
 
-_OPTIONAL_NUMBERS = ("value", "expected", "tolerance", "level")
+_OPTIONAL_NUMBERS = ("value", "expected", "tolerance", "uncertainty", "level")
 _WHOLE_NUMBERS = ("seed", "threads")
 _TRUTHS = {"true": True, "false": False}
 

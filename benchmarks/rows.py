@@ -11,6 +11,7 @@ from typing import Any
 from snug.recipes import learns_from_simulation
 
 from .methods import find_method
+from .metric import AS_RIGHT
 from .metrics import declared, find_metric
 from .plan import Plan, network_of
 from .results import Row
@@ -20,9 +21,9 @@ from .tasks.task import Outcome, Task, TaskId
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
-GAP = "gap/relative"
+GAP = "gap/energy"
 NOT_FALLING = "the error does not fall here"  # how the reason of a gap above that of a coarser method begins
-ROUND_OFF = 1e-6  # a gap below it counts as none: who is called lower there is chance
+ROUND_OFF = 1e-6  # [J] a gap below it counts as none: who is called lower there is chance
 
 Outcomes = Mapping[TaskId, Outcome]
 
@@ -32,7 +33,7 @@ def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
     schedule = Schedule(plan)
     cells = [row for cell in plan.cells for row in rows_of_cell(cell, schedule, outcomes)]
     others = [row for task in tasks for row in _rows_of_task(task, outcomes)]
-    return [*remarked(cells), *others]
+    return [*remarked(with_uncertainty(cells)), *others]
 
 
 def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator[Row]:
@@ -43,7 +44,7 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
     measured = outcomes.get(("metrics", cell.name))
     if outcome.files and measured is None:
         return  # interrupted before it was measured
-    metrics: dict[str, float] = {}
+    metrics: dict[str, Any] = {}  # a number, or a number and its uncertainty
     status, reason = outcome.status, outcome.reason or outcome.remark
     if outcome.files:
         assert measured is not None
@@ -68,7 +69,7 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
 
 
 def _rows(
-    cell: Cell, suite: str, outcome: Outcome, status: str, reason: str, metrics: Mapping[str, float]
+    cell: Cell, suite: str, outcome: Outcome, status: str, reason: str, metrics: Mapping[str, Any]
 ) -> Iterator[Row]:
     scene, entry = cell.scene, cell.entry
     base = Row(
@@ -80,7 +81,8 @@ def _rows(
     )  # fmt: skip
     if not metrics:
         yield base
-    for name, value in metrics.items():
+    for name, found in metrics.items():
+        value, uncertainty = found if isinstance(found, (tuple, list)) else (found, None)
         metric, why, ended = find_metric(name), reason, status
         if name == "cost/spread" and value > 100.0 * SPREAD:
             why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
@@ -92,9 +94,13 @@ def _rows(
         if not math.isfinite(value):
             why, ended = why or f"{name} is not finite", "failed" if status == "ok" else status
         yield dataclasses.replace(
-            base, metric=name, unit=metric.unit, value=float(value) if math.isfinite(value) else None,
-            status=ended, reason=why, **judged,
+            base, metric=name, unit=metric.unit, value=_finite(value),
+            status=ended, reason=why, uncertainty=_finite(uncertainty), **judged,
         )  # fmt: skip
+
+
+def _finite(number: float | None) -> float | None:
+    return float(number) if number is not None and math.isfinite(number) else None
 
 
 def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str, float], str]:
@@ -162,6 +168,25 @@ def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
         reason = "; ".join(filter(None, (row.reason, outcome.remark)))
         unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
         yield dataclasses.replace(row, **outcome.origin, reason=reason, unit=unit)
+
+
+def with_uncertainty(rows: Sequence[Row]) -> list[Row]:
+    """The rows, those of the reference with the largest difference to a simulation that is as right.
+
+    Not of times, and not of what has an uncertainty of its own.
+    """
+    others: dict[tuple[str, str, str], list[float]] = {}
+    for row in rows:
+        if row.family in AS_RIGHT and row.status == "ok" and row.value is not None:
+            others.setdefault((row.suite, row.scene, row.metric), []).append(row.value)
+
+    def of(row: Row) -> float | None:
+        there = others.get((row.suite, row.scene, row.metric), [])
+        if row.role == "reference" and row.uncertainty is None and not row.metric.startswith("cost/"):
+            return max((abs(value - row.value) for value in there if row.value is not None), default=None)
+        return row.uncertainty
+
+    return [dataclasses.replace(row, uncertainty=of(row)) for row in rows]
 
 
 def remarked(rows: Iterable[Row]) -> list[Row]:

@@ -92,12 +92,16 @@ class Scene:
 
 @dataclass(frozen=True)
 class Dressed:
-    """Who wears what and moves how: what a network may know of a scene. betas: (S,) shape, or the mean."""
+    """Who wears what and moves how: what a network may know of a scene. betas: (S,) shape, or the mean.
+
+    before: what the body did until then, where the motion is a part of a longer one.
+    """
 
     body: Body
     garment: Garment
     motion: Motion
     betas: np.ndarray | None = None
+    before: Motion | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,8 +109,10 @@ class BuiltScene:
     """All that a method may read. Frame 0 of every array is the start.
 
     energies: the terms declared, inertia left out: the time step adds it. dt [s]; frames: positions of a
-    trajectory, the start included. settle: gives the start (V,3) [m] from which to simulate; it may itself
-    simulate, so it is called once, off the clock. origin_heights: (T,) [m] where the gravity energy of each
+    trajectory, the start included. settle: gives the start (V,3) [m] from which to simulate, at rest, or
+    positions and velocities (2,V,3) [m, m/s]; it may itself simulate, so it is called once, off the clock.
+    warm_up: frames at the beginning that are not judged; the first two have no two before them.
+    origin_heights: (T,) [m] where the gravity energy of each
     frame is zero. exact: (T,V,3) [m] or None. pin_positions: frame -> (P,3) [m] of handles that move.
     substeps: time steps that a simulator takes for a frame. glitch: the frame whose pose is wrong on purpose.
     kept: frames of the motion that a trajectory holds, or None for all. repeated: two sets of frames of the
@@ -123,9 +129,9 @@ class BuiltScene:
     origin_heights: np.ndarray | None = None
     exact: np.ndarray | None = None
     dressed: Dressed | None = None
-    start_velocity: np.ndarray | None = None
     pin_positions: Callable[[int], np.ndarray] | None = None
     substeps: int = 1
+    warm_up: int = 2
     glitch: int | None = None
     kept: np.ndarray | None = None
     repeated: tuple[np.ndarray, np.ndarray] | None = None
@@ -134,9 +140,22 @@ class BuiltScene:
         by_name("energy", self.energies)  # rows of one would overwrite those of the other
 
     @cached_property
+    def start_state(self) -> np.ndarray:
+        """Positions and velocities, (2,V,3) [m, m/s]."""
+        import numpy as np
+
+        state = np.asarray(self.settle(), dtype=np.float64)
+        return np.stack([state, np.zeros_like(state)]) if state.ndim == 2 else state
+
+    @property
     def start(self) -> np.ndarray:
         """(V,3) [m]."""
-        return self.settle()
+        return self.start_state[0]
+
+    @property
+    def start_velocity(self) -> np.ndarray:
+        """(V,3) [m/s]."""
+        return self.start_state[1]
 
     @property
     def terms(self) -> tuple[str, ...]:

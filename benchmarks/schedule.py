@@ -18,6 +18,7 @@ from snug.recipes import TRAININGS
 from . import provenance
 from .cache import dependencies
 from .methods import find_method
+from .metric import COMPARED_WITH
 from .metrics import names_of
 from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
@@ -167,7 +168,7 @@ class Schedule:
     def metrics(self, cell: Cell) -> MeasureCell:
         scene, plan = cell.scene, self.plan
         cells = tuple(other for other in plan.cells if other.scene == scene and runs(other))
-        compared = (other for other in cells if other.entry.role in ("reference", "reference-variant"))
+        compared = (other for other in cells if other.entry.role in COMPARED_WITH)
         reads = tuple(("cell", other.name) for other in compared if other != cell)
         quasi_static, counterpart = None, None
         if scene.dynamic:

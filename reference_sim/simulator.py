@@ -40,6 +40,7 @@ def simulate(
     guess: str | None = None,
     quasi_static: bool = False,
     substeps: int = 1,
+    refreeze: int = 0,
     path: str | Path | None = None,
     resume: bool = False,
     progress: str | None = None,
@@ -61,6 +62,8 @@ def simulate(
         quasi_static: forget the velocity at every frame; for settling.
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
+        refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
+            ended, and the step solved again from there.
         path: write the VTKHDF file there, frame by frame.
         resume: go on after the last whole frame of `path`, where a run with the same arguments left it (more
             frames may be asked for); without such a file start at the beginning. The same bits come out as
@@ -84,7 +87,7 @@ def simulate(
             raise ValueError(f"simulate: {name} = {count}: must be at least 1")
     x = _checked(start, cloth.rest_positions, "start")
     v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
-    loop = Stepper(cloth, energies, dt, substeps, obstacle, guess, quasi_static, options)
+    loop = Stepper(cloth, energies, dt, substeps, obstacle, guess, quasi_static, refreeze, options)
     provenance = loop.provenance() | {"start": fingerprint(x, v)}
     earlier = recover(path, provenance, frames=frames) if resume and path else None
     if earlier and earlier.complete(frames):

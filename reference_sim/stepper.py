@@ -49,6 +49,7 @@ class Stepper:
         obstacle: Obstacle | None,
         guess: str | None,
         quasi_static: bool,
+        refreeze: int,
         options: dict[str, Any],
     ) -> None:
         from .energies.inertia import Inertia
@@ -60,7 +61,9 @@ class Stepper:
                 f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)};"
                 " body_transported needs an obstacle"
             )
-        self.cloth, self.guess, self.substeps = cloth, guess, substeps
+        if refreeze < 0:
+            raise ValueError(f"simulate: refreeze = {refreeze}: must not be negative")
+        self.cloth, self.guess, self.substeps, self.refreeze = cloth, guess, substeps, refreeze
         self.frame_dt, self.dt = dt, dt / substeps  # between frames, and of one step
         self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refined(substeps)
         self.potential = Potential([*energies, Inertia(cloth, self.dt)])
@@ -81,6 +84,11 @@ class Stepper:
             step = (frame - 1) * self.substeps + j
             guess = self.prepare(step, x, v, handles)
             results.append(self.reach(x, guess))
+            for _ in range(self.refreeze):
+                if not np.isfinite(results[-1].positions).all():
+                    break
+                self.freeze(step, x, v, results[-1].positions)
+                results.append(self.minimiser.minimise(results[-1].positions))
             y = results[-1].positions
             if results[-1].status == "diverged" or not np.isfinite(y).all():
                 return None, results
@@ -100,8 +108,12 @@ class Stepper:
         else:
             first = x + self.dt * v if self.guess == "extrapolated" else x.copy()
         first[self.cloth.pins] = handles
-        self.potential.prepare(Step(x, v, first, self.dt, self.obstacle, step))
+        self.freeze(step, x, v, first)
         return first
+
+    def freeze(self, step: int, x: np.ndarray, v: np.ndarray, guess: np.ndarray) -> None:
+        """Freeze every term for the step from x with velocity v (V, 3), as it is at the guess (V, 3)."""
+        self.potential.prepare(Step(x, v, guess, self.dt, self.obstacle, step))
 
     def resumed(
         self, earlier: PartialRun, v0: np.ndarray, pin_positions: Callable[[int], np.ndarray] | None
@@ -195,6 +207,7 @@ class Stepper:
             "substeps": self.substeps,
             "guess": self.guess,
             "quasi_static": self.quasi_static,
+            "refreeze": self.refreeze,
             "options": {name: getattr(value, "__name__", value) for name, value in self.options.items()},
             "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
             "material": asdict(cloth.material),

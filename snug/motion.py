@@ -65,6 +65,13 @@ class Motion:
         """Frames start to stop - 1. Raises MotionError when nothing is left."""
         return replace(self, poses=self.poses[start:stop], translations=self.translations[start:stop])
 
+    def followed_by(self, other: Motion) -> Motion:
+        """This motion and then the other one's frames, as they are."""
+        poses = np.concatenate([self.poses, other.poses])
+        return replace(
+            self, poses=poses, translations=np.concatenate([self.translations, other.translations])
+        )
+
 
 def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
     """Turn both shoulders outward and up by the same angle in all frames, about the chest's front axis.

@@ -21,8 +21,9 @@ STVK, SPRING, BARRIER, HINGE = (
     f"reference_sim/energies/{name}.py"
     for name in ("stretch_stvk", "stretch_spring", "area_barrier", "bend_hinge")
 )
-GRAVITY, INERTIA, CONTACT = (
-    f"reference_sim/energies/{name}.py" for name in ("gravity", "inertia", "contact_penalty")
+GRAVITY, INERTIA, CONTACT, FRICTION = (
+    f"reference_sim/energies/{name}.py"
+    for name in ("gravity", "inertia", "contact_penalty", "contact_friction")
 )
 NEWTON, CHECK, FACTORISED, DESCENT, HISTORY = (
     f"reference_sim/minimise/{name}.py"
@@ -194,6 +195,22 @@ FAULTS = (
         "np.repeat(cloth.areas / 2, 3), len(edges))",
     ),
     Fault("half the contact stiffness", CONTACT, "curvature = 6.0 *", "curvature = 3.0 *"),
+    Fault("friction of two thirds of the force", FRICTION, "coefficient * 3 *", "coefficient * 2 *"),
+    Fault("friction in proportion to slip", FRICTION, "(2 / h - y / (h * h))  #", "(1 / h)  #"),
+    Fault(
+        "a first step without friction",
+        FRICTION,
+        "self._coulomb(samples, skin, planes.normals)",
+        "0 * self._coulomb(samples, skin, planes.normals)",
+        fast=("friction_slide",),
+    ),
+    Fault(
+        "friction against the ground, not its skin",
+        FRICTION,
+        "samples + planes.points - skin",
+        "samples + planes.points - planes.points",
+        fast=("friction_belt",),
+    ),
     # minimisers
     Fault(
         "Newton uphill",

@@ -7,7 +7,7 @@ import pytest
 from tasks_by_hand import small_scene
 
 from benchmarks.methods.warm_started import FromElsewhere, WarmStarted
-from benchmarks.metrics.optimality import first_guess
+from benchmarks.metrics.step import first_guess
 from benchmarks.minimisers.block_descent import VertexBlockDescent
 from benchmarks.minimisers.elements import contacts, hinges, membrane, terms_of, weights
 from benchmarks.minimisers.kernels import block, depth, fold, strain

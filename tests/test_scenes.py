@@ -22,6 +22,7 @@ from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
 from benchmarks.schedule import Schedule
 from benchmarks.selection import choose_suites
+from reference_sim import simulate
 from snug.body import Body
 from snug.motion_library import make_motion
 
@@ -156,8 +157,9 @@ def test_suite_speed_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
     assert "turning_stop" in plan.motions_of("tshirt") and "turning_stop" not in plan.motions.train_of(
         "tshirt"
     )
-    body = Body.load()
-    walk = clip(body, make_motion("turning_stop"), plan.preset.clip_frames)
+    body, whole = Body.load(), make_motion("turning_stop")
+    frames = clip(body, whole, plan.preset.clip_frames)
+    walk = whole.cut(frames.start, frames.stop)
     assert joint_speeds(body, walk).min() > 0.5  # [m/s] it is over before the stop
     pace = np.linalg.norm(np.ptp(walk.translations[:, [0, 2]], axis=0)) / walk.duration
     assert 0.6 < pace < 1.6
@@ -196,3 +198,41 @@ def planned(*words):
     from benchmarks.run import make_parser, make_plan
 
     return make_plan(make_parser().parse_args(list(words)), words)
+
+
+def test_a_clip_is_the_liveliest_part_and_what_is_not_judged_before_it():
+    body, motion = Body.load(), make_motion("sudden_stop")
+    speed = joint_speeds(body, motion)
+    judged = clip(body, motion, 20)
+    sums = [speed[k : k + 19].sum() for k in range(len(speed) - 18)]
+    assert judged == range(np.argmax(sums), np.argmax(sums) + 20)
+    assert clip(body, motion, 20, 6) == range(judged.start - 6, judged.stop)
+    # Where it is liveliest at once, the liveliest part that has so much before it.
+    late = motion.cut(judged.start + 2, motion.frames)
+    frames = clip(body, late, 20, 6)
+    assert len(frames) == 26 and frames.start >= 0
+    assert clip(body, motion, 1000, 6) == range(motion.frames)
+    assert clip(body, motion, motion.frames - 2, 6) == range(motion.frames)
+
+
+def test_a_clip_goes_on_where_the_whole_motion_is():
+    """No jolt: its simulation and that of the whole motion are one until round-off has grown."""
+    preset = dataclasses.replace(SMOKE, frames=24, clip_frames=8, warm_up_frames=4, settle_frames=6)
+    assets = open_assets(preset, embedded_motions(["sudden_stop"]), ["tshirt"])
+    scenes = all_scenes(["sudden_stop"], [])
+    built = [scenes[f"tshirt/sudden_stop{part}"].at(preset).build(assets) for part in ("", "@clip")]
+    whole, part = (
+        simulate(
+            scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
+            start=scene.start, velocity=scene.start_velocity,
+        ).positions
+        for scene in built
+    )  # fmt: skip
+    frames = assets.clips["sudden_stop"]
+    assert frames.start > 0 and len(frames) == 12 and built[1].warm_up == 3  # at most a quarter
+    assert np.abs(whole[frames.start : frames.stop] - part).max() < 1e-8
+    assert np.abs(built[1].start_velocity).max() > 0.05
+    before, motion = built[1].dressed.before, built[1].dressed.motion
+    joined = before.followed_by(motion)
+    assert np.array_equal(joined.poses, assets.motions["sudden_stop"].poses[: frames.stop])
+    assert built[0].dressed.before is None

@@ -83,7 +83,7 @@ class NewtonSolver(Method):
     def run(self) -> Trajectory:
         scene = self.scene
         x = scene.start
-        v = np.zeros_like(x) if scene.start_velocity is None else scene.start_velocity
+        v = scene.start_velocity
         positions, seconds, status, reason = [x], [0.0], "ok", ""
         clock = time.perf_counter()
         for frame in range(1, scene.frames):

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..method import MethodEntry
 
+SHIFTS = (1e-9, 3e-9, 1e-8, 1e-7, 1e-6, 1e-5, 3e-5, 1e-4)  # [m]
 _SIMULATION = "benchmarks.methods.simulation"
 # Newton: every iteration is a factorisation of the true Hessian, or several. L-BFGS: the preconditioner
 # (mass over dt^2, a cotangent Laplacian, contacts) is factorised once a step; an iteration then costs one
@@ -107,13 +108,27 @@ SOLVERS = (
         )
         for substeps in (2, 4, 8)
     ),
+    *(
+        MethodEntry(
+            name=f"simulation-perturbed-{shift:.0e}".replace("e-0", "e-"),
+            label=f"Simulation, start moved by {shift * 1e9:,.0f} nm",
+            description=f"the reference again, its start moved by {shift:g} m: how far apart they end",
+            module="benchmarks.methods.perturbed_start",
+            options={"shift": shift},
+            role="reference-variant",
+            family="simulation-perturbed",
+            level=shift,
+        )
+        for shift in SHIFTS
+    ),
     MethodEntry(
-        name="simulation-perturbed",
-        label="Simulation, start moved",
-        description="the reference again, its start moved by 1e-9 m: how far two right answers lie apart",
-        module="benchmarks.methods.perturbed_start",
+        name="simulation-refrozen",
+        label="Simulation, planes searched twice",
+        description="the reference, each step solved again with contact planes searched at its end",
+        module=_SIMULATION,
+        options={"refreeze": 1},
         role="reference-variant",
-        family="simulation-perturbed",
+        family="simulation-refrozen",
     ),
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",

@@ -21,7 +21,6 @@ along with the body, at no cost.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -33,7 +32,7 @@ from reference_sim.material import GRAVITY
 
 from ..metric import Metric
 from .energy import FIRST_FULL_FRAME
-from .optimality import first_guess
+from .step import own_terms, step_to
 
 if TYPE_CHECKING:
     from reference_sim import Potential
@@ -82,7 +81,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     if roll_out not in _asked(roll_out.group):
         return {}
     laws = roll_out.group.kept(_laws_of)[roll_out]
-    found = laws.metrics()
+    found = laws.metrics(roll_out.scene.warm_up - FIRST_FULL_FRAME)
     if roll_out is not roll_out.group.reference:
         return found
     fields, frames = roll_out.trajectory.frame_fields, roll_out.trajectory.frames
@@ -124,19 +123,20 @@ class LawSeries:
     residual: Floats
     residual_rms: Floats
 
-    def metrics(self) -> dict[str, float]:
-        """Means over frames, and shares of frames [%] that break an inequality."""
-        broken = self.rise > RISE * self.size
-        climbed = self.climb > RISE * self.size
+    def metrics(self, first: int = 0) -> dict[str, float]:
+        """Means over the steps from `first` on, and shares of these [%] that break an inequality."""
+        judged = slice(first, None)
+        broken = (self.rise > RISE * self.size)[judged]
+        climbed = (self.climb > RISE * self.size)[judged]
         return {
-            "conservation/momentum": 100.0 * float(self.force.mean()) / self.weight,
-            "conservation/angular": float(self.torque.mean()),
-            "conservation/energy": float(np.where(broken, self.rise, 0.0).mean()),
+            "conservation/momentum": 100.0 * float(self.force[judged].mean()) / self.weight,
+            "conservation/angular": float(self.torque[judged].mean()),
+            "conservation/energy": float(np.where(broken, self.rise[judged], 0.0).mean()),
             "conservation/energy_frames": 100.0 * float(broken.mean()),
-            "conservation/descent": float(np.where(climbed, self.climb, 0.0).mean()),
+            "conservation/descent": float(np.where(climbed, self.climb[judged], 0.0).mean()),
             "conservation/descent_frames": 100.0 * float(climbed.mean()),
-            "conservation/residual": float(self.residual.mean()),
-            "conservation/residual_rms": float(self.residual_rms.mean()),
+            "conservation/residual": float(self.residual[judged].mean()),
+            "conservation/residual_rms": float(self.residual_rms[judged].mean()),
         }
 
 
@@ -147,36 +147,25 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
     tree of a frame is made once. Raises ValueError for a scene with pins or a trajectory too short.
     """
     from reference_sim import Potential
-    from reference_sim.energies import Inertia
 
     if len(scene.cloth.pins):
         raise ValueError(f"scene {scene.name}: laws of a cloth with pins need the pins' forces")
     frames = [len(positions) for positions in trajectories]
     if frames and min(frames) <= FIRST_FULL_FRAME:
         raise ValueError(f"scene {scene.name}: a law needs {FIRST_FULL_FRAME + 1} frames, not {min(frames)}")
-    declared = [*scene.energies, Inertia(scene.cloth, scene.dt)]
-    own = [Potential([copy.copy(term) for term in declared]) for _ in trajectories]
+    own = [Potential(own_terms(scene)) for _ in trajectories]
     pivots = _pelvis(scene)
     found: list[list[tuple[float, ...]]] = [[] for _ in trajectories]
     # From the first step on, as a solver: an obstacle's search tree covers what it has been asked about, and
     # where two of its faces are equally near, the tree decides between them.
     for frame in range(1, max(frames, default=0)):
-        steps = {k: _step(scene, x, frame) for k, x in enumerate(trajectories) if frame < frames[k]}
+        steps = {k: step_to(scene, x, frame) for k, x in enumerate(trajectories) if frame < frames[k]}
         for k, step in steps.items():
             own[k].prepare(step)
             if frame >= FIRST_FULL_FRAME:
                 found[k].append(_one_step(scene, own[k], step, trajectories[k][frame], pivots[frame]))
     weight = float(scene.cloth.masses.sum() * GRAVITY)
     return [LawSeries(weight, *np.array(steps).T) for steps in found]
-
-
-def _step(scene: BuiltScene, x: Floats, frame: int) -> Step:
-    """What a solver would be given to get from frame - 1 of x (T,V,3) [m] to `frame`."""
-    from reference_sim.energies import Step
-
-    velocity = (x[frame - 1] - x[max(frame - 2, 0)]) / scene.dt
-    guess = first_guess(scene, x[frame - 1], velocity, frame)
-    return Step(x[frame - 1], velocity, guess, scene.dt, scene.obstacle, frame)
 
 
 def _one_step(

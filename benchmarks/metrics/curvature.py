@@ -51,13 +51,13 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    curvature = roll_out.kept(series_of)
-    found = {"curvature/mean": float(curvature.means().mean())}
-    if roll_out.reference is None:
-        return found
-    frames = min(len(roll_out.positions), len(roll_out.reference.positions))
-    ours, theirs = curvature.first(frames), roll_out.reference.kept(series_of).first(frames)
-    return found | {
+    return {"curvature/mean": float(roll_out.kept(series_of).means()[roll_out.judged].mean())}
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    frames = slice(roll_out.scene.warm_up, min(len(roll_out.positions), len(reference.positions)))
+    ours, theirs = roll_out.kept(series_of).part(frames), reference.kept(series_of).part(frames)
+    return {
         "curvature/error": float(curvature_error(ours, theirs).mean()),
         "curvature/histogram": float(histogram_distance(ours, theirs).mean()),
         "curvature/mean_difference": float((ours.means() - theirs.means()).mean()),
@@ -131,9 +131,9 @@ class CurvatureSeries:
         """(T,) area-weighted mean over interior vertices [1/m]."""
         return _weighted(self.curvature, self.area)
 
-    def first(self, frames: int) -> CurvatureSeries:
-        """The series of the first frames."""
-        return CurvatureSeries(self.curvature[:frames], self.area[:frames])
+    def part(self, frames: slice) -> CurvatureSeries:
+        """The series of these frames."""
+        return CurvatureSeries(self.curvature[frames], self.area[frames])
 
 
 def curvature_series(positions: Floats, faces: NDArray[np.int64]) -> CurvatureSeries:

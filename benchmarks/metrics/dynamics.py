@@ -11,12 +11,14 @@ from .geometry import rms
 from .hem import AFTER, HemMotion, stop_frame
 
 if TYPE_CHECKING:
-    from ..metric import RollOut, SceneRollOuts
+    from ..metric import RollOut
 
 
 def _dynamics(name: str, unit: str, title: str, definition: str, table: str = "dynamics") -> Metric:
     return Metric(name=f"dynamics/{name}", unit=unit, title=title, definition=definition, table=table)
 
+
+COMMON = ("amplitude", "correlation", "gain", "lag")
 
 METRICS = (
     _dynamics("quasi_static_difference", "mm", "From quasi-static",
@@ -26,6 +28,10 @@ METRICS = (
     _dynamics("correlation", "1", "Correlation", "cosine between the two dynamic parts"),
     _dynamics("gain", "1", "Gain", "factor by which the hem answers its own quasi-static turn or shift"),
     _dynamics("lag", "frames", "Lag", "frames by which it comes later"),
+    *(_dynamics(f"common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
+                "the same where every method's dynamic part is taken from the simulator's answer to poses "
+                "held still instead of its own", table="dynamics" if name in COMMON[:2] else "")
+      for name, title in zip(COMMON, ("A", "Correlation", "Gain", "Lag"))),
     _dynamics("ringing", "mm", "Ringing", "distance of the hem to where it ends, after the body has stopped"),
     *(_dynamics(f"ringing/{after}", "mm", f"Ringing, {after} frames",
                 f"the same {after} frames after the stop", table="") for after in AFTER),
@@ -35,30 +41,38 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    own, x = roll_out.quasi_static, roll_out.positions
-    if roll_out is roll_out.group.reference:
-        own = roll_out.group.quasi_static
-    found = {}
+    x, group = roll_out.positions, roll_out.group
+    own = group.quasi_static if roll_out is group.reference else roll_out.quasi_static
+    found: dict[str, float] = compare(roll_out, roll_out) if roll_out is group.reference else {}
     if own is not None:
-        frames = min(len(x), len(own))
-        found["dynamics/quasi_static_difference"] = rms(x[:frames], own[:frames])
-    hem = roll_out.group.kept(hem_motion)
-    if hem is not None and (own is None or (len(own) >= len(x) and np.isfinite(own).all())):
-        found |= hem.measure(x, own)
+        frames = slice(roll_out.scene.warm_up, min(len(x), len(own)))
+        found["dynamics/quasi_static_difference"] = rms(x[frames], own[frames])
     return found
 
 
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """By the method's own answer to poses held still and, under other names, by the simulator's."""
+    hem, x, own = reference.kept(hem_motion), roll_out.positions, roll_out.quasi_static
+    if hem is None:
+        return {}
+    found: dict[str, float] = {}
+    if own is None or (len(own) >= len(x) and np.isfinite(own).all()):
+        found |= hem.measure(x, own)
+    common = hem.measure(x)
+    return found | {f"dynamics/common_{name}": common[f"dynamics/{name}"] for name in COMMON
+                    if f"dynamics/{name}" in common}  # fmt: skip
+
+
 def series(roll_out: RollOut) -> dict[str, np.ndarray]:
-    hem = roll_out.group.kept(hem_motion)
+    reference = roll_out.group.reference
+    hem = None if reference is None else reference.kept(hem_motion)
     return {} if hem is None else hem.curves(roll_out.positions)
 
 
-def hem_motion(group: SceneRollOuts) -> HemMotion | None:
-    """What to measure hems of this scene in; None without a body, a hem, or the simulator's two answers."""
-    dressed, reference = group.scene.dressed, group.reference
-    if dressed is None or "hem" not in dressed.garment.loops:
-        return None
-    if reference is None or group.quasi_static is None:
+def hem_motion(reference: RollOut) -> HemMotion | None:
+    """What to measure hems of this scene in; None without a body, a hem, or the simulator's static answer."""
+    group, dressed = reference.group, reference.scene.dressed
+    if dressed is None or "hem" not in dressed.garment.loops or group.quasi_static is None:
         return None
     from snug.skeleton import rotation_matrices
 
@@ -71,4 +85,5 @@ def hem_motion(group: SceneRollOuts) -> HemMotion | None:
         simulated=reference.positions,
         quasi_static=group.quasi_static,
         dt=group.scene.dt,
+        first=group.scene.warm_up,
     )

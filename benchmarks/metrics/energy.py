@@ -2,12 +2,11 @@
 
 Each method is judged on its own history: inertia compares a frame with the two before it in the same
 trajectory, and contact planes are searched at the method's own positions. A frame before the third has no
-two before it; it counts as moving freely, hence inertia 0 there, and means start at the third frame.
+two before it; it counts as moving freely, hence inertia 0 there. Means are over the frames after the warm-up.
 """
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from reference_sim.energies.gravity import Gravity
 
 from ..metric import Metric
+from .step import own_terms
 
 if TYPE_CHECKING:
     from reference_sim.energies import Energy
@@ -35,7 +35,7 @@ def _energy(term: str, definition: str, title: str = "") -> Metric:
 
 
 METRICS = (
-    _energy("strain", "membrane energy of the declared material, mean over the frames with two before them"),
+    _energy("strain", "membrane energy of the declared material, mean over frames"),
     _energy("bending", "energy of the hinges, mean over frames"),
     _energy("gravity", "weight times height above the pelvis's own height at rest, mean over frames"),
     _energy("inertia", "sum of m / (2 dt^2) |x - 2 x' + x''|^2 over vertices, x' and x'' the method's "
@@ -54,12 +54,8 @@ def energy_series(
 
     Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
     """
-    from reference_sim.energies import Inertia
-
-    declared = [*scene.energies, Inertia(scene.cloth, scene.dt)]
-    # A term may remember the step before: each trajectory has terms of its own.
-    own = [[copy.copy(term) for term in declared] for _ in trajectories]
-    found = [{term.name: np.zeros(len(positions)) for term in declared} for positions in trajectories]
+    own = [own_terms(scene) for _ in trajectories]
+    found = [{name: np.zeros(len(positions)) for name in scene.terms} for positions in trajectories]
     for frame in range(max(map(len, trajectories), default=0)):
         for positions, terms, series in zip(trajectories, own, found):
             if frame < len(positions):
@@ -97,13 +93,10 @@ def _terms_at(
     return values
 
 
-def mean_energy(series: NDArray[np.float64]) -> float:
-    """Mean over the frames that have two before them [J per frame]; over all, where there are only two."""
-    return float(series[FIRST_FULL_FRAME:].mean() if len(series) > FIRST_FULL_FRAME else series.mean())
-
-
 def measure(roll_out: RollOut) -> dict[str, float]:
-    return {f"energy/{term}": mean_energy(series) for term, series in energies(roll_out).items()}
+    """Means over the judged frames [J per frame]."""
+    found = energies(roll_out)
+    return {f"energy/{term}": float(series[roll_out.judged].mean()) for term, series in found.items()}
 
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:

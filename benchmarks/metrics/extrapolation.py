@@ -77,7 +77,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     if scene.obstacle is not None:
         found["motion/penetration"] = 100.0 * float(geometry.inside_of(roll_out).share.mean())
     if scene.cloth.material != usual and len(x) == scene.frames:
-        found["motion/total"] = energy.mean_energy(energy.energies(roll_out)["total"])
+        found["motion/total"] = float(energy.energies(roll_out)["total"][roll_out.judged].mean())
     if scene.glitch is not None and there is not None:
         apart = geometry.distance_rms(whole, there[: len(whole)])
         found |= {

@@ -31,11 +31,6 @@ METRICS = (
         definition="95 % of these distances are smaller",
     ),
     Metric(
-        name="distance/sensitivity", unit="mm", title="Sensitivity", table="penetration",
-        definition="distance between the simulation and the same from a start moved by 1e-9 m: cloth that "
-        "wrinkles has several minima, and no distance below this one means anything",
-    ),
-    Metric(
         name="penetration/vertices", unit="%", title="Below the skin", table="penetration",
         lower_is_better=True, definition="vertices inside the body, none left out, mean over frames",
     ),
@@ -60,40 +55,31 @@ METRICS = (
 )  # fmt: skip
 
 
-def measure(roll_out: RollOut) -> dict[str, float]:
-    return _distances(roll_out) | _depths(roll_out)
-
-
-def _distances(roll_out: RollOut) -> dict[str, float]:
-    if roll_out.reference is None:
-        return {}
-    reference = roll_out.reference
-    frames = min(len(roll_out.positions), len(reference.positions))
-    x, y = roll_out.positions[:frames], reference.positions[:frames]
-    found = {
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    frames = slice(roll_out.scene.warm_up, min(len(roll_out.positions), len(reference.positions)))
+    x, y = roll_out.positions[frames], reference.positions[frames]
+    return {
         "distance/rms": rms(x, y),
         "distance/p95": MM * float(np.percentile(np.linalg.norm(x - y, axis=2), 95)),
     }
-    perturbed = roll_out.group.find(role="reference-variant", family="simulation-perturbed")
-    if perturbed is not None:
-        found["distance/sensitivity"] = rms(perturbed.positions, reference.positions)
-    return found
 
 
-def _depths(roll_out: RollOut) -> dict[str, float]:
-    scene, x = roll_out.scene, roll_out.positions
+def measure(roll_out: RollOut) -> dict[str, float]:
+    scene, x, judged = roll_out.scene, roll_out.positions, roll_out.judged
     if scene.obstacle is None:
         return {}
-    own = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)
+    own = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
     inside = inside_of(roll_out)
+    depth = inside.depth[judged]
     found = {
-        "penetration/vertices": 100.0 * float(inside.share.mean()),
-        "penetration/deep": 100.0 * float((inside.depth > DEEP).mean()),
-        "penetration/depth_p99": MM * float(np.percentile(inside.depth, 99)),
+        "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
+        "penetration/deep": 100.0 * float((depth > DEEP).mean()),
+        "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
         "penetration/own_part_p999": MM * float(np.percentile(own, 99.9)),
     }
     if scene.dressed is not None and scene.origin_heights is not None:
-        found["drift/hem"] = MM * hem_drift(x, scene.dressed.garment.hem, scene.origin_heights)
+        heights = scene.origin_heights[: len(x)][judged]
+        found["drift/hem"] = MM * hem_drift(x[judged], scene.dressed.garment.hem, heights)
     return found
 
 

@@ -144,7 +144,7 @@ class HemMotion:
     """What dynamics are measured in: the body's root, when it stops, and the simulator's two answers.
 
     axes: (T,3,3) root to world; origins: (T,3) [m]; stop: frame or None; hem: vertices (H,); simulated and
-    quasi_static: the simulator's positions (T,V,3) [m], world; dt [s].
+    quasi_static: the simulator's positions (T,V,3) [m], world; dt [s]; first: frame that is judged.
     """
 
     axes: Array
@@ -154,6 +154,7 @@ class HemMotion:
     simulated: Array
     quasi_static: Array
     dt: float
+    first: int = 0
 
     def of(self, positions: Array) -> Array:
         """The hem (T,H,3) in the root frame of positions (T,V,3) [m]."""
@@ -173,14 +174,15 @@ class HemMotion:
 
         static: (T,V,3), the method's own answer to poses held still; None takes the simulator's.
         """
-        frames = min(len(positions), len(self.simulated), len(self.quasi_static))
-        if frames < SHORTEST:
+        last = min(len(positions), len(self.simulated), len(self.quasi_static))
+        if last - self.first < SHORTEST:
             return {}
-        moving, simulated = self.of(positions[:frames]), self.of(self.simulated[:frames])
-        quiet = self.of(self.quasi_static[:frames])
-        own = quiet if static is None else self.of(static[:frames])
+        judged = slice(self.first, last)
+        moving, simulated = self.of(positions[:last])[judged], self.of(self.simulated[:last])[judged]
+        quiet = self.of(self.quasi_static[:last])[judged]
+        own = quiet if static is None else self.of(static[:last])[judged]
         part, reference = dynamic_part(moving, own), dynamic_part(simulated, quiet)
-        gain, lag = response(moving, own, self.axes[:frames])
+        gain, lag = response(moving, own, self.axes[judged])
         found = {
             "dynamics/amplitude": amplitude(part, reference),
             "dynamics/correlation": correlation(part, reference),
@@ -188,8 +190,8 @@ class HemMotion:
             "dynamics/lag": lag,
             "dynamics/spectrum": spectrum_distance(moving, simulated, self.dt),
         }
-        if self.stop is not None and self.stop + AFTER[-1] < frames:
-            distances = 1e3 * ringing(moving, self.stop)
+        if self.stop is not None and self.first <= self.stop < last - AFTER[-1]:
+            distances = 1e3 * ringing(moving, self.stop - self.first)
             found["dynamics/ringing"] = float(distances.mean())
             found |= {f"dynamics/ringing/{after}": float(d) for after, d in zip(AFTER, distances)}
         return {name: value for name, value in found.items() if np.isfinite(value)}

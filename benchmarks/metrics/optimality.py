@@ -1,58 +1,89 @@
-"""How far a frame is from the minimum of its own time step: energy, share of skinning's, and force.
+"""How far a frame is from the minimum of its own time step: in energy, millimetres, curvature and force.
 
 At frame t the step's objective is Phi(x) = inertia + all declared terms, with x_hat from the method's own
 two previous frames and contact planes frozen at the step's initial guess x_0 (the same guess as the
-simulator's: carried by the obstacle, else x + dt v). Over the sampled frames
+simulator's: carried by the obstacle, else x + dt v). Phi* is the lowest value found by the simulator's
+minimiser, L-BFGS and then Newton, from x_0 and from x_t itself. A step has several minima; y_t is the one
+found from x_t, the one that lies below the frame. Over the judged frames
 
-    energy = mean of Phi(x_t) - Phi* [J]
-    gap    = sum (Phi(x_t) - Phi*) / sum (Phi(x_s) - Phi*)
-    local  = sum (Phi(x_t) - Phi(minimum below x_t)) / the same denominator
-    norm   = mean of the largest component of grad Phi(x_t), in mean vertex weights
+    gap        mean of Phi(x_t) - Phi* [J]
+    local      mean of Phi(x_t) - Phi(y_t) [J]
+    relative   gap / scale,  scale = mean of Phi(x_s) - Phi(x_r) over steps of the reference simulation x_r
+    refrozen   the gap where planes are frozen at x_t instead: what depends on where they are frozen
+    distance   mean of the root mean square distance of vertices between x_t and y_t [mm]
+    curvature  mean of |H(x_t) - H(y_t)| by the areas of y_t [1/m]
+    norm       mean of the largest component of grad Phi(x_t), in mean vertex weights
 
-x_s is the garment skinned to the frame's pose or, where there is no body, the guess x_0: 0 is a minimiser, 1
-no better than that. Phi* is the lowest value found by L-BFGS and Newton from x_0 (as the simulator does), by
-Newton alone from x_0, by both from x_t, or x_t itself, and who found it is counted. A step has several
-minima, so the reference's own local gap is 0 by construction and its gap is what another solver found below.
+x_s is the garment skinned to the frame's pose or, where there is no body, the guess x_0. The scale is the
+same for every method of a scene. Each method is judged from its own history, which a chaotic roll-out cannot
+blur: a small gap says that a step was solved, not that the past was right; it does not measure dynamics.
 
-Each method is judged from its own history: a small gap says that a step was solved, not that the past was
-right; it does not measure dynamics. And where the past went far from the body, as a solver's that stops much
-too early, skinning is far from that past, the denominator grows and the share flatters: the energy does not.
+All judged frames are looked at, or of a long roll-out as many, evenly spread, as bring the standard error of
+the gap below PRECISION of it; that error is the uncertainty of its row.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric import Metric, skinned
-from .energy import FIRST_FULL_FRAME
+from ..metric import Estimate, Metric, skinned
+from .curvature import boundary_mask, mean_curvature
+from .step import own_terms, prepare
 
 if TYPE_CHECKING:
-    from ..metric import RollOut
+    from reference_sim import Potential
+
+    from ..metric import RollOut, SceneRollOuts
     from ..scene import BuiltScene
 
-SUITES = ("speed",)  # each sample is four minimisations
+Floats = NDArray[np.float64]
+
+SUITES = ("speed",)  # each sampled frame is two minimisations or three
 
 ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
-FINDERS = ("simulator", "newton", "from_frame", "frame")
-ALIKE = 1e-9  # of the denominator: minima this near are one
+FINDERS = ("simulator", "from_frame", "frame")
+ALIKE = 1e-9  # of the scale: minima this near are one
+PRECISION = 0.05  # standard error of the gap, as a share of it
+LEAST = 1e-4  # of the scale: a standard error below it is small enough however small the gap is
+MM = 1e3
 
 METRICS = (
     Metric(
-        name="gap/relative", unit="1", title="Energy gap", table="speed", lower_is_better=True,
-        definition="how far frames lie above the minimum of their own time step, as a share of what "
-        "skinning, or the first guess, lies above it",
-    ),
-    Metric(
         name="gap/energy", unit="J", title="Energy gap", table="speed", lower_is_better=True,
-        definition="the same in joules, mean over sampled frames; a wrong past does not show in either",
+        definition="how far frames lie above the lowest minimum found of their own time step, mean over "
+        "frames",
     ),
     Metric(
-        name="gap/local", unit="1", title="Local gap", lower_is_better=True,
-        definition="the same share for the minimum that lies below the frame itself",
+        name="gap/relative", unit="1", title="Relative gap", table="speed", lower_is_better=True,
+        definition="the same over what skinning, or the first guess, lies above the steps of the simulation: "
+        "one scale a scene, the same for all methods",
+    ),
+    Metric(
+        name="gap/scale", unit="J", title="Scale of the gap", lower_is_better=None,
+        definition="that scale: what skinning, or the first guess, lies above the steps of the simulation",
+    ),
+    Metric(
+        name="gap/local", unit="J", title="Local gap", lower_is_better=True,
+        definition="how far frames lie above the minimum below the frame itself",
+    ),
+    Metric(
+        name="gap/refrozen", unit="J", title="Refrozen gap", table="speed", lower_is_better=True,
+        definition="the same with contact planes searched at the frame instead of the step's first guess",
+    ),
+    Metric(
+        name="step/distance", unit="mm", title="One-step distance", table="speed", lower_is_better=True,
+        definition="root mean square distance of vertices between a frame and the minimum of its own time "
+        "step that lies below it, mean over frames",
+    ),
+    Metric(
+        name="step/curvature", unit="1/m", title="One-step curvature error", table="speed",
+        lower_is_better=True,
+        definition="|H - H_min| of the same vertices between a frame and that minimum, mean by its areas",
     ),
     Metric(
         name="gradient/norm", unit="1", title="Gradient", table="speed", lower_is_better=True,
@@ -68,93 +99,140 @@ METRICS = (
 )  # fmt: skip
 
 
-def measure(roll_out: RollOut) -> dict[str, float]:
+def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
     group = roll_out.group
-    return optimality(
-        roll_out.scene, roll_out.positions, samples=group.gap_samples, skinned=group.kept(skinned)
-    ).metrics()
+    scale = group.kept(gap_scale)
+    found: dict[str, float | Estimate] = {}
+    found |= optimality(roll_out.scene, roll_out.positions, samples=group.gap_samples, scale=scale).metrics()
+    if scale is None or not found:
+        return found
+    gap = found["gap/energy"]
+    assert isinstance(gap, Estimate)
+    found["gap/relative"] = Estimate(gap.value / scale, gap.uncertainty / scale) if scale else gap
+    return found | ({"gap/scale": scale} if roll_out is group.reference else {})
+
+
+def gap_scale(group: SceneRollOuts) -> float | None:
+    """[J] of the scene; None without a reference that has a judged frame."""
+    reference = group.reference
+    frames = [] if reference is None else list(_judged(group.scene, reference.positions))
+    if reference is None or not frames:
+        return None
+    potential, bare = _potential(group.scene), group.kept(skinned)
+    above = []
+    for frame in frames:
+        guess = prepare(group.scene, potential, reference.positions, frame)
+        start = guess if bare is None else np.ascontiguousarray(bare[frame])
+        here = np.ascontiguousarray(reference.positions[frame])
+        above.append(potential.value(start) - potential.value(here))
+    return float(np.mean(above))
 
 
 @dataclass
 class Optimality:
-    """Sums over sampled frames. found_by: whose minimum was the lowest; of equals the first in FINDERS."""
+    """What was found at sampled frames, of `judged` in all. found_by: whose minimum was the lowest; of equals
+    the first in FINDERS. refrozen: at the first of these frames alone.
+    """
 
-    missed: float = 0.0
-    missed_locally: float = 0.0
-    to_gain: float = 0.0
+    judged: int = 0
+    gaps: list[float] = field(default_factory=list)
+    local: list[float] = field(default_factory=list)
+    refrozen: list[float] = field(default_factory=list)
+    distances: list[float] = field(default_factory=list)
+    curvatures: list[float] = field(default_factory=list)
     gradients: list[float] = field(default_factory=list)
     found_by: dict[str, int] = field(default_factory=lambda: dict.fromkeys(FINDERS, 0))
 
-    def metrics(self) -> dict[str, float]:
-        """gap/* and gradient/norm; empty without a frame."""
-        if not self.gradients:
+    def estimate(self, values: list[float]) -> Estimate:
+        """Mean, and its standard error as a sample of the judged frames; 0 where all were looked at."""
+        count = len(values)
+        if count >= self.judged:
+            return Estimate(float(np.mean(values)), 0.0)
+        left = 1.0 - count / self.judged  # correction for a finite population
+        error = float(np.std(values, ddof=1)) * np.sqrt(left / count) if count > 1 else float("nan")
+        return Estimate(float(np.mean(values)), float(error))
+
+    def metrics(self) -> dict[str, float | Estimate]:
+        """gap/*, step/* and gradient/norm; empty without a frame."""
+        if not self.gaps:
             return {}
-        scale = self.to_gain if self.to_gain > 0.0 else float("nan")
-        return {
-            "gap/energy": self.missed / len(self.gradients),
-            "gap/relative": self.missed / scale,
-            "gap/local": self.missed_locally / scale,
-            "gradient/norm": float(np.mean(self.gradients)),
-        } | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
+        means = {
+            "gap/energy": self.gaps, "gap/local": self.local, "gap/refrozen": self.refrozen,
+            "step/distance": self.distances, "step/curvature": self.curvatures,
+            "gradient/norm": self.gradients,
+        }  # fmt: skip
+        found: dict[str, float | Estimate] = {name: self.estimate(v) for name, v in means.items() if v}
+        return found | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
+
+    def precise(self, scale: float) -> bool:
+        """Whether the gap is known well enough."""
+        gap = self.estimate(self.gaps)
+        return gap.uncertainty <= max(PRECISION * abs(gap.value), LEAST * scale)
 
 
 def optimality(
-    scene: BuiltScene,
-    positions: NDArray[np.float64],
-    *,
-    samples: int,
-    skinned: NDArray[np.float64] | None = None,
+    scene: BuiltScene, positions: Floats, *, samples: int, scale: float | None = None
 ) -> Optimality:
-    """Judge positions (T,V,3) [m] at `samples` frames spread evenly; skinned (T,V,3) are the x_s of above."""
-    from reference_sim import Potential
-    from reference_sim.energies import Inertia, Step
-    from reference_sim.minimise import LBFGS, Newton
+    """Judge positions (T,V,3) [m] at `samples` frames or more, see above; scale [J] of the scene's gaps."""
+    from reference_sim.minimise import LBFGS
     from reference_sim.minimise.descent import mean_weight
 
-    found = Optimality()
-    if len(positions) <= FIRST_FULL_FRAME:
-        return found
-    potential = Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
-    newton = Newton(potential, max_iterations=ITERATIONS)
-    both = LBFGS(potential, max_iterations=ITERATIONS)
-    frames = np.unique(np.linspace(FIRST_FULL_FRAME, len(positions) - 1, samples).round().astype(int))
-    for frame in frames:
-        x, previous = np.ascontiguousarray(positions[frame]), positions[frame - 1]
-        velocity = (previous - positions[frame - 2]) / scene.dt
-        guess = first_guess(scene, previous, velocity, int(frame))
-        potential.prepare(Step(previous, velocity, guess, scene.dt, scene.obstacle, int(frame)))
+    frames = _judged(scene, positions)
+    found, potential = Optimality(judged=len(frames)), _potential(scene)
+    minimiser = LBFGS(potential, max_iterations=ITERATIONS)
+    inner = ~boundary_mask(scene.cloth.faces, scene.cloth.vertex_count)
+    for frame in spread(frames):
+        x = np.ascontiguousarray(positions[frame])
+        guess = prepare(scene, potential, positions, frame)
         here, gradient = potential.value_and_gradient(x)
         if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
-            found.missed = found.missed_locally = float("nan")
-            found.gradients.append(float("nan"))
-            continue
-        energies = {
-            "simulator": both.minimise(guess).energy,
-            "newton": newton.minimise(guess).energy,
-            "from_frame": both.minimise(x).energy,
-            "frame": here,
-        }
+            found.gaps, found.local, found.gradients = [np.nan], [np.nan], [np.nan]
+            found.refrozen, found.distances, found.curvatures = [], [], []
+            return found
+        below = minimiser.minimise(x)
+        energies = {"simulator": minimiser.minimise(guess).energy, "from_frame": below.energy, "frame": here}
         # A guess that has no energy, as of a garment that collapsed a frame ago, leads nowhere.
         best = min(energy for energy in energies.values() if np.isfinite(energy))
-        to_gain = potential.value(guess if skinned is None else skinned[frame]) - best
-        alike = ALIKE * abs(to_gain) if np.isfinite(to_gain) else 0.0
-        finder = next(name for name in FINDERS if energies[name] <= best + alike)
-        found.found_by[finder] += 1
-        found.missed += here - best
-        found.missed_locally += here - min(here, energies["from_frame"])
-        found.to_gain += to_gain
+        alike = ALIKE * (scale or abs(here))
+        found.found_by[next(name for name in FINDERS if energies[name] <= best + alike)] += 1
+        found.gaps.append(here - best)
+        found.local.append(here - min(here, below.energy))
         found.gradients.append(float(np.abs(gradient[scene.cloth.free]).max()) / mean_weight(potential))
+        y = below.positions
+        found.distances.append(MM * float(np.sqrt(((x - y) ** 2).sum(1).mean())))
+        found.curvatures.append(_curvature_error(x, y, scene.cloth.faces, inner))
+        if scene.obstacle is not None and len(found.refrozen) < samples:
+            prepare(scene, potential, positions, frame, guess=x)
+            found.refrozen.append(potential.value(x) - min(potential.value(x), minimiser.minimise(x).energy))
+        if len(found.gaps) >= samples and found.precise(scale or 0.0):
+            break
     return found
 
 
-def first_guess(
-    scene: BuiltScene, previous: NDArray[np.float64], velocity: NDArray[np.float64], frame: int
-) -> NDArray[np.float64]:
-    """Where a solver would start, (V,3) [m]: what a step costs nothing to get."""
-    if scene.obstacle is None:
-        guess = previous + scene.dt * velocity
-    else:
-        guess = scene.obstacle.transported(previous, frame, scene.cloth.rest_positions)
-    pins = scene.cloth.pins
-    guess[pins] = previous[pins] if scene.pin_positions is None else scene.pin_positions(frame)
-    return np.ascontiguousarray(guess)
+def _judged(scene: BuiltScene, positions: Floats) -> range:
+    return range(scene.warm_up, len(positions))
+
+
+def _potential(scene: BuiltScene) -> Potential:
+    from reference_sim import Potential
+
+    return Potential(own_terms(scene))
+
+
+def spread(frames: range) -> Iterator[int]:
+    """All of the frames, in an order whose every beginning is spread evenly: halves, quarters, eighths."""
+    count = len(frames)
+    bits = max(count - 1, 1).bit_length()
+    for place in range(1 << bits):
+        turned = int(f"{place:0{bits}b}"[::-1], 2)  # the bits in reverse: van der Corput's sequence
+        if turned < count:
+            yield frames[turned]
+
+
+def _curvature_error(x: Floats, y: Floats, faces: NDArray[np.int64], inner: NDArray[np.bool_]) -> float:
+    """|H(x) - H(y)| [1/m] of inner vertices, mean by the areas of y (V,3)."""
+    if not inner.any():
+        return 0.0
+    ours, _ = mean_curvature(x, faces)
+    theirs, areas = mean_curvature(y, faces)
+    return float(np.average(np.abs(ours - theirs)[inner], weights=areas[inner]))

@@ -38,7 +38,7 @@ METRICS = (
 def measure(roll_out: RollOut) -> dict[str, float]:
     from .intersections import intersecting_share
 
-    cloth, x = roll_out.scene.cloth, roll_out.positions
+    cloth, x = roll_out.scene.cloth, roll_out.positions[roll_out.judged]
     return {
         "deformation/edges": 100.0 * float(edge_change(x, cloth.edges, cloth.edge_lengths).mean()),
         "deformation/areas": 100.0 * float(area_change(x, cloth.faces, cloth.areas).mean()),

@@ -76,7 +76,7 @@ class GarmentScenes:
             name=f"{self.garment}/{motion}" + ("@clip" if part == "clip" else ""),
             description=f"a body in {self.words}: {motion}{of}",
             module="benchmarks.scenes.dressed_body",
-            sizes=("settle_frames",),
+            sizes=("settle_frames", "warm_up_frames"),
             garment=self.garment,
             motion=motion,
             part=part,

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from ..assets import Assets
     from ..presets import Dependence
 
+WARM_UP = 2  # it starts at rest, and few frames are simulated
+
 
 def build(
     scene: Scene, assets: Assets, *, dependence: Dependence, vertices: int = 0, substeps: int = 1
@@ -27,5 +29,5 @@ def build(
     garment = find_template(scene.garment).tailor(assets.body, vertices=vertices or dependence.middle)
     motion = make_motion(scene.motion).cut(0, dependence.frames)
     own = replace(assets, garments={scene.garment: garment}, motions={scene.motion: motion})
-    built = dressed_body.build(scene, own, settle_frames=dependence.settle_frames)
+    built = dressed_body.build(scene, own, settle_frames=dependence.settle_frames, warm_up_frames=WARM_UP)
     return replace(built, substeps=substeps)

@@ -1,10 +1,14 @@
 """A body in a garment, doing one motion. The simulator sees the body as a moving mesh and nothing more.
 
 Before the motion starts the garment settles: the body, already facing and standing as in the first frame,
-moves its limbs from the T-pose into the first pose, then holds still for a while.
+moves its limbs from the T-pose into the first pose, then holds still for a while. A part of a motion begins
+with the positions and velocities that a simulation from the motion's own first frame has there.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,13 +20,28 @@ from snug.motion import Motion
 from ..assets import Assets
 from ..scene import BuiltScene, Dressed, Scene
 
+if TYPE_CHECKING:
+    from snug.body import Body
+
 HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
+SHORT = 0.25  # share of a motion's frames that is left out at most
 
 
-def build(scene: Scene, assets: Assets, *, settle_frames: int) -> BuiltScene:
-    """The built scene of a garment and a motion, or of the clip of it."""
+def build(scene: Scene, assets: Assets, *, settle_frames: int, warm_up_frames: int) -> BuiltScene:
+    """The built scene of a garment and a motion, or of the clip of it.
+
+    warm_up_frames: at the beginning, not judged; fewer where the motion is short.
+    """
     body, garment = assets.body, assets.garments[scene.garment]
     motion = assets.motion(scene.motion, scene.part)
+    before = assets.before(scene.motion, scene.part)
+
+    def settle() -> np.ndarray:
+        if before is None:
+            return settled(cloth, energies, assets, garment, motion, settle_frames)
+        start = settled(cloth, energies, assets, garment, before, settle_frames)
+        return moved_along(cloth, energies, body, garment, before.followed_by(motion.cut(0, 1)), start)
+
     cloth = Cloth(garment.rest_positions, garment.faces, Material(), pins=garment.pins)
     handles = garment.body_transported(body, motion.poses, motion.translations)
     energies = declared_energies(cloth)
@@ -33,10 +52,11 @@ def build(scene: Scene, assets: Assets, *, settle_frames: int) -> BuiltScene:
         energies=energies,
         dt=1.0 / motion.fps,
         frames=motion.frames,
-        settle=lambda: settled(cloth, energies, assets, garment, motion, settle_frames),
+        settle=settle,
         obstacle=obstacle,
         origin_heights=body.joints()[0, 1] + motion.translations[:, 1],
-        dressed=Dressed(body, garment, motion),
+        dressed=Dressed(body, garment, motion, before=before),
+        warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )
 
@@ -62,19 +82,44 @@ def settled(
     approach = transition(t_pose, first, frames)
     poses = np.concatenate([approach, np.repeat(first[None], int(HOLD * frames), axis=0)])
     translations = np.repeat(motion.translations[:1], len(poses), axis=0)
-    obstacle = Obstacle(body.vertices(poses, translations), body.faces, rest_positions=body.shaped())
     # The garment, still in its rest shape, goes where the root takes a body in T-pose: a rigid motion.
     root = body.transforms(t_pose[None], translations[:1])[0, 0]
     start = cloth.rest_positions @ root[:, :3].T + root[:, 3]
-    handles = garment.body_transported(body, poses, translations)
+    way = replace(motion, poses=poses, translations=translations)
+    return _simulated(cloth, energies, body, garment, way, start, "come to rest in the first pose")[-1]
+
+
+def moved_along(
+    cloth: Cloth,
+    energies: tuple[Energy, ...],
+    body: Body,
+    garment: Garment,
+    motion: Motion,
+    start: np.ndarray,
+) -> np.ndarray:
+    """Positions and velocities (2,V,3) at the motion's last frame, from start (V,3) [m] at rest in its first.
+
+    Raises RuntimeError when the simulation did not stay finite.
+    """
+    positions = _simulated(cloth, energies, body, garment, motion, start, "reach the first frame of the clip")
+    return np.stack([positions[-1], (positions[-1] - positions[-2]) * motion.fps])
+
+
+def _simulated(
+    cloth: Cloth, energies: tuple[Energy, ...], body: Body, garment: Garment, motion: Motion,
+    start: np.ndarray, aim: str,
+) -> np.ndarray:  # fmt: skip
+    """Positions (T,V,3) [m] of every frame of the motion. Raises RuntimeError, with what it did not."""
+    posed = body.vertices(motion.poses, motion.translations)
+    handles = garment.body_transported(body, motion.poses, motion.translations)
     trajectory: Trajectory = simulate(
-        cloth, energies, dt=1.0 / motion.fps, frames=len(poses), obstacle=obstacle, start=start,
+        cloth, energies, dt=1.0 / motion.fps, frames=motion.frames, start=start,
+        obstacle=Obstacle(posed, body.faces, rest_positions=body.shaped()),
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )  # fmt: skip
     # A step that diverges ends a simulation: what it leaves is a garment half-way, on a body that moved on.
-    if trajectory.frames < len(poses):
+    if trajectory.frames < motion.frames:
         raise RuntimeError(
-            f"the garment did not come to rest in the first pose of {motion.name}: {trajectory.reason}; "
-            "the pose may leave it no room"
+            f"the garment did not {aim} of {motion.name}: {trajectory.reason}; the pose may leave it no room"
         )
-    return trajectory.positions[-1]
+    return trajectory.positions

@@ -32,8 +32,7 @@ def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames
         energies=(Gravity(cloth),),
         dt=dt,
         frames=frames,
-        settle=lambda: positions,
-        start_velocity=np.tile(VELOCITY, (len(positions), 1)),
+        settle=lambda: np.stack([positions, np.broadcast_to(VELOCITY, positions.shape)]),
         exact=exact_fall(positions, VELOCITY, dt, frames),
     )
 

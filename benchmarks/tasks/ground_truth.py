@@ -39,7 +39,7 @@ class SettleStart(Task):
             np.save(temporary, scene.obstacle.positions)
         write_body(run, scene)
         with replacing(run.start_path(scene.name)) as temporary:
-            np.save(temporary, np.load(run.start_path(shared)) if shared else scene.start)
+            np.save(temporary, np.load(run.start_path(shared)) if shared else scene.start_state)
         context.tell(self.units)
         paths = (run.start_path(scene.name), run.body_path(scene.name))
         return Outcome(files=tuple(map(run.relative, paths)))
@@ -76,7 +76,7 @@ class SimulateMotion(Task):
         scene = self.scene.build(context.assets)
         trajectory = simulate(
             scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
-            start=scene.start, pin_positions=scene.pin_positions,
+            start=scene.start, velocity=scene.start_velocity, pin_positions=scene.pin_positions,
         )  # fmt: skip
         path = context.folder.trajectory_path(scene.name, "simulation")
         path.parent.mkdir(parents=True, exist_ok=True)

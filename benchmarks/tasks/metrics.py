@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..metric import RollOut, SceneRollOuts
+from ..metric import Estimate, RollOut, SceneRollOuts
 from ..metrics import find_metric, modules, names_of
 from .cell import Cell, built
 from .task import Context, Outcome, Task, TaskId
@@ -66,21 +66,38 @@ class MeasureCell(Task):
 
 def measured(
     roll_out: RollOut, chosen: Sequence[str] | None = None
-) -> tuple[dict[str, float], dict[str, np.ndarray], tuple[str, str]]:
+) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
     """Metrics and curves of a roll-out by all modules that apply, or by those chosen; and status and reason
-    where one of them says that it has failed.
+    where one of them says that it has failed. Empty where no frame is left after the warm-up.
     """
-    metrics: dict[str, float] = {}
+    metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}
     ended = ("ok", "")
-    for module in (modules()[name] for name in names_of(chosen) if len(roll_out.positions)):
+    judged = len(roll_out.positions) > roll_out.scene.warm_up
+    for module in (modules()[name] for name in names_of(chosen) if judged):
         suites = getattr(module, "SUITES", roll_out.suites)
         if any(suite in suites for suite in roll_out.suites):
             values = module.measure(roll_out)
-            metrics |= {find_metric(name).name: float(value) for name, value in values.items()}
+            if hasattr(module, "compare"):
+                values |= compared(roll_out, module.compare)
+            metrics |= {find_metric(name).name: value for name, value in values.items()}
             curves |= module.series(roll_out) if hasattr(module, "series") else {}
             ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
     return metrics, curves, ended
+
+
+def compared(
+    roll_out: RollOut, compare: Callable[[RollOut, RollOut], dict[str, float]]
+) -> dict[str, float | Estimate]:
+    """The numbers against the reference, with the largest change that a simulation as right as it brings."""
+    if roll_out.reference is None:
+        return {}
+    values = compare(roll_out, roll_out.reference)
+    others = [compare(roll_out, other) for other in roll_out.group.as_right if other is not roll_out]
+    return {
+        name: Estimate(value, max(abs(other[name] - value) for other in others)) if others else value
+        for name, value in values.items()
+    }
 
 
 def _add_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:

@@ -123,6 +123,40 @@ DISCRETE = (
         reason="the residual gradient that the solver may leave"),
 )  # fmt: skip
 
+FRICTION = (
+    known_answer("friction_creep",
+        "speed of a patch on a slope of tan(a) = .8 mu, over (1 - .2^.5) of the smoothing's: it creeps",
+        "friction", "creep_speed", options={"ratio": 0.8}, expected=1.0, tolerance=1e-9,
+        reason="the residual gradient that the solver may leave"),
+    *(
+        known_answer(f"friction_slope_{name}",
+            f"distance of a patch on a slope of tan(a) = {ratio:g} mu to its exact discrete path, 30 steps",
+            "friction", "slope_path", options={"ratio": ratio}, unit="m", expected=0.0, tolerance=1e-10,
+            reason="the residual gradient that the solver may leave, summed twice")
+        for name, ratio in (("below", 0.8), ("at", 1.0))
+    ),
+    known_answer("friction_slide",
+        "the same at 1.2 mu, to the path of the constant force g (sin a - mu cos a): no smoothing is left",
+        "friction", "slide_path", options={"ratio": 1.2}, unit="m", expected=0.0, tolerance=1e-10,
+        reason="the residual gradient that the solver may leave, summed twice"),
+    known_answer("friction_belt",
+        "distance of a patch put at rest on a moving belt to its exact discrete path, 15 steps",
+        "friction", "belt_path", unit="m", expected=0.0, tolerance=1e-10,
+        reason="the residual gradient that the solver may leave, summed twice"),
+    known_answer("friction_landing",
+        "speed that a sliding patch keeps when it lands, over v - mu (v_n + g t)",
+        "friction", "landing_speed", expected=1.0, tolerance=1e-9,
+        reason="what is left of its bounce, and the residual gradient"),
+    known_answer("friction_spring_path",
+        "distance of a point that a spring pulls along to discrete steps solved by scipy, 300 steps",
+        "friction_pull", "spring_path", unit="m", expected=0.0, tolerance=1e-10,
+        reason="the residual gradient that the solver may leave, summed twice"),
+    known_answer("friction_spring_pull",
+        "pull of that spring over mu m g once the point slides: no more than to break it loose",
+        "friction_pull", "spring_pull", expected=1.0, tolerance=1e-4,
+        reason="what is left of its swing after 300 steps"),
+)  # fmt: skip
+
 MINIMISERS = (
     known_answer("newton_quadratic",
         "factorisations for inertia and weight alone: one step, and one to confirm the minimum",
@@ -147,4 +181,4 @@ MINIMISERS = (
         reason="2e-7, and 15 times that without its memory"),
 )  # fmt: skip
 
-CASES = (*SCIKIT_FEM, *CLOSED_FORMS, *DERIVATIVES, *DISCRETE, *MINIMISERS)
+CASES = (*SCIKIT_FEM, *CLOSED_FORMS, *DERIVATIVES, *DISCRETE, *FRICTION, *MINIMISERS)

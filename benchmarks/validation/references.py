@@ -74,6 +74,27 @@ OTHERS = (
     known_answer("drum_pressure", "mean contact pressure over (tension/R + w cos phi)",
         "round_bodies", "drum_pressure", expected=1.0, tolerance=2e-3,
         reason="120 cells; the strip's depth in the margin over R"),
+    *(
+        known_answer(f"friction_capstan_{name}",
+            f"pull on the tight end of a strip over a turning drum over that on the slack one, mu = {mu:g}, "
+            "over exp(mu phi)",
+            "friction_capstan", "ratio", options={"mu": mu}, expected=1.0, tolerance=1e-3,
+            reason="60 cells: mu (1 + mu^2) phi b^2 / 12, at most 8e-4")
+        for name, mu in (("rough", 0.5), ("smooth", 0.1))
+    ),
+    known_answer("friction_capstan_order", "order of its error in the length of a cell",
+        "friction_capstan", "order", expected=2.0, tolerance=0.2,
+        reason="the strip's depth in the margin over R is left"),
+    known_answer("friction_capstan_soft", "the same ratio with the contact stiffness of garments",
+        "friction_capstan", "ratio", options={"mu": 0.5, "stiffness": 3.4e6},
+        reason="reported: the strip sinks by a millimetre of R = 200 towards its tight end"),
+    known_answer("friction_strip_pull",
+        "pull on the end of a strip that sticks to a table, worst error over mu times its weight",
+        "friction_pull", "strip_pull", expected=0.0, tolerance=1e-3,
+        reason="40 cells, and which of them slides last"),
+    known_answer("friction_strip_slide", "pull on that strip once all of it slides, over mu times its weight",
+        "friction_pull", "strip_slide", expected=1.0, tolerance=1e-5,
+        reason="its vertices move aside a little: all diagonals lean one way"),
     known_answer("leaving_point",
         "cos theta where a point leaves a sphere, over 2/3 cos theta_0, extrapolated in dt",
         "round_bodies", "leaving_point", expected=1.0, tolerance=2e-3,

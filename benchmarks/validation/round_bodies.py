@@ -127,7 +127,7 @@ def _strip_on_drum() -> tuple[np.ndarray, ...]:
     rest = in_space(points)[:, [0, 2, 1]]
     ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > length - 1e-9))
     cloth = Cloth(rest, faces[:, ::-1], material, pins=ends)
-    start = _wrapped(rest, radius, length, 1 + pull / material.membrane_modulus)
+    start = wrapped(rest, radius, length, 1 + pull / material.membrane_modulus)
     contact = ContactPenalty(cloth, samples="vertices")
     potential = Potential([StretchStVK(cloth), Gravity(cloth), contact])
     x, body = start, RoundBody(DRUM, axis=2)
@@ -140,7 +140,7 @@ def _strip_on_drum() -> tuple[np.ndarray, ...]:
     return _profiles(cloth, contact, x, points, weight)
 
 
-def _wrapped(rest: np.ndarray, radius: float, length: float, stretch: float) -> np.ndarray:
+def wrapped(rest: np.ndarray, radius: float, length: float, stretch: float) -> np.ndarray:
     """The strip on a circle of `radius` about z, both ends hanging straight down."""
     s = (rest[:, 0] - length / 2) * stretch
     angle = np.clip(s / radius, -np.pi / 2, np.pi / 2)

@@ -18,6 +18,7 @@ meets, minimise there to gain distance, and go on, until the body is where the f
 
 from __future__ import annotations
 
+import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,6 +73,12 @@ class ContactBarrier(Energy):
         self.step: Step | None = None
         self._hessians_of: tuple | None = None
         self._hessians: dict[str, sp.csc_matrix] = {}
+
+    def __copy__(self) -> ContactBarrier:
+        """With collisions of its own: they hold where the obstacle is in a step."""
+        twin = object.__new__(type(self))
+        vars(twin).update(vars(self), collisions=copy.copy(self.collisions))
+        return twin
 
     def parameters(self) -> dict[str, Any]:
         return {

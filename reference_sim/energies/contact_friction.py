@@ -3,8 +3,14 @@
     u = (I - n n^T) ((x_s - x_s^t) - (c - c^t))    slip over the step, relative to the skin under the sample
     E = mu N f(|u|),   f(y) = y^2/h - y^3/(3 h^2) + h/3 for y < h, else y,   h = speed dt
 
-(IPC's smoothing, Li et al. 2020.) N [N] is the normal force of the collision penalty at the end of the
-previous step. `speed` [m/s] is the slip below which friction is still growing.
+(IPC's smoothing, Li et al. 2020.) `speed` [m/s] is the slip below which friction is still growing.
+
+N [N] is the normal force of the collision penalty that ended the previous step, on that step's planes: the
+force that acted, so that friction is mu times what carried the cloth, also where the cloth slides past the
+end of a plane within a step. It comes a step late: a sample that meets the skin within a step has friction
+from the next one on. A first step (frame 1, or 0 of a potential without frames) has none before it: there N
+is that of the start, on the step's own planes moved back with the skin. In any other step without the one
+before, N is not known, and the energy is refused.
 """
 
 from __future__ import annotations
@@ -20,6 +26,8 @@ from .energy import Energy, Step
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from ..obstacle import Planes
+
 
 class ContactFriction(Energy):
     """Friction energy [J] of each sample of a ContactPenalty, which must come before it in a scene's terms.
@@ -28,6 +36,10 @@ class ContactFriction(Energy):
         contact: the collision term whose samples, planes and forces are used.
         coefficient: mu [1].
         speed: [m/s].
+
+    Raises:
+        ValueError: at prepare, if the contact was not prepared for the same step; when evaluated, if the step
+            before was not prepared.
     """
 
     name = "friction"
@@ -38,33 +50,44 @@ class ContactFriction(Energy):
         self.stencils, self.weights = contact.stencils, contact.weights
         self.coefficient, self.speed = float(coefficient), float(speed)
         count = len(self.stencils)
-        self.forces = np.zeros(count)
+        self.forces: np.ndarray | None = np.zeros(count)  # mu N; None where it is not known
         self.anchors = np.zeros((count, 3))  # where each sample would be if it stuck to the skin
         self.normals = np.zeros((count, 3))
         self.threshold = self.speed / 30
-        self._last: tuple[int, np.ndarray, np.ndarray] | None = None
+        self._last: tuple[Step, Planes] | None = None
 
     def parameters(self) -> dict[str, Any]:
         return {"coefficient": self.coefficient, "speed_m_per_s": self.speed}
 
     def prepare(self, step: Step) -> None:
-        if step.obstacle is None or self.contact.planes is None:
-            raise ValueError(
-                "ContactFriction needs an obstacle, and its ContactPenalty before it in the terms"
-            )
         planes = self.contact.planes
+        if self.contact.step is not step or step.obstacle is None or planes is None:
+            raise ValueError("ContactFriction needs its own ContactPenalty before it in the terms")
         samples = self.contact.sample_matrix @ step.previous
-        depth = np.zeros(len(samples))
-        if self._last is not None and self._last[0] == step.frame - 1:  # not left over from another run
-            _, points, normals = self._last
-            gap = np.einsum("si,si->s", normals, samples - points)
-            depth = np.maximum(self.contact.margin - gap, 0.0)
-        self.forces = self.coefficient * 3 * self.contact.stiffness * depth**2
         corners = step.obstacle.at(max(step.frame - 1, 0))[step.obstacle.faces[planes.faces]]
-        skin_motion = planes.points - np.einsum("sa,sai->si", planes.barycentric, corners)
-        self.anchors, self.normals = samples + skin_motion, planes.normals
+        skin = np.einsum("sa,sai->si", planes.barycentric, corners)  # where the planes' points were
+        last, self._last = self._last, (step, planes)
+        if step.frame <= 1:
+            self.forces = self._coulomb(samples, skin, planes.normals)
+        elif last and last[0].obstacle is step.obstacle and last[0].frame == step.frame - 1:
+            self.forces = self._coulomb(samples, last[1].points, last[1].normals)
+        else:  # left over from another run, or a frame that was jumped to
+            self.forces = None
+        self.anchors, self.normals = samples + planes.points - skin, planes.normals
         self.threshold = self.speed * step.dt
-        self._last = (step.frame, planes.points, planes.normals)
+
+    def _coulomb(self, samples: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """mu N (S,) [N] of samples (S, 3) [m] on planes."""
+        gap = np.einsum("si,si->s", normals, samples - points)
+        depth = np.maximum(self.contact.margin - gap, 0.0)
+        return self.coefficient * 3 * self.contact.stiffness * depth**2
+
+    def _known_forces(self) -> np.ndarray:
+        if self.forces is None:
+            raise ValueError(
+                "ContactFriction does not know its normal force: prepare the step of the frame before first"
+            )
+        return self.forces
 
     def element_energy(self, u: Tensor) -> Tensor:
         import torch
@@ -77,26 +100,28 @@ class ContactFriction(Energy):
         square, h = (slip**2).sum(-1), self.threshold
         y = torch.sqrt(torch.where(square > 0, square, torch.ones_like(square)))
         near = square / h - torch.where(square > 0, y**3, torch.zeros_like(y)) / (3 * h * h) + h / 3
-        return torch.as_tensor(self.forces).to(u) * torch.where(square < h * h, near, y)
+        return torch.as_tensor(self._known_forces()).to(u) * torch.where(square < h * h, near, y)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         gradient = np.zeros_like(x)
-        state = (self.forces, self.anchors, self.normals, self.threshold)
+        state = (self._known_forces(), self.anchors, self.normals, self.threshold)
         return _gradient(x, self.stencils, self.weights, *state, gradient), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
         return self.expanded(*self.active_hessian_blocks(x))
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        elements = np.flatnonzero(self.forces)
-        state = (self.forces, self.anchors, self.normals, self.threshold)
+        forces = self._known_forces()
+        elements = np.flatnonzero(forces)
+        state = (forces, self.anchors, self.normals, self.threshold)
         return elements, _hessian(x, elements, self.stencils, self.weights, *state)
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The curvature of sticking, 2 mu N / h, in every direction."""
-        elements = np.flatnonzero(self.forces)
+        forces = self._known_forces()
+        elements = np.flatnonzero(forces)
         w = self.weights[elements]
-        curvature = 2 * self.forces[elements] / self.threshold
+        curvature = 2 * forces[elements] / self.threshold
         return elements, curvature[:, None, None] * w[:, :, None] * w[:, None, :]
 
 

@@ -76,6 +76,7 @@ class ContactPenalty(Energy):
         )
         self.rest_samples = self.sample_matrix @ cloth.rest_positions
         self.planes: Planes | None = None
+        self.step: Step | None = None  # that the planes belong to
         # Until a step is prepared every plane lies far below its sample: no contact. Finite also as float32.
         self.points = np.tile([0.0, -1e30, 0.0], (len(self.stencils), 1))
         self.normals = np.tile([0.0, 1.0, 0.0], (len(self.stencils), 1))
@@ -92,6 +93,7 @@ class ContactPenalty(Energy):
             raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
         planes = step.obstacle.planes(self.sample_matrix @ step.guess, step.frame, self.rest_samples)
         self.planes, self.points, self.normals = planes, planes.points, planes.normals
+        self.step = step
 
     def energy(self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None) -> Tensor:
         """x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S) [J]; default: the prepared planes."""
