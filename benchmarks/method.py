@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 
     from reference_sim import Trajectory
 
-    from .scene import BuiltScene, Scene
+    from .scene import BuiltScene, Dressed, Scene
 
 
 class Method:
     """What the harness asks of a method; one object serves one cell. Derive from it, or write the same names.
 
-    No method takes times: the harness times the whole of run().
+    The harness owns the clock: it times the whole of run(), and inputs() by the same clock. What a method may
+    add are the times of its frames, as `frame_seconds` of the trajectory.
     """
 
     def prepare(self, scene: BuiltScene) -> None:
@@ -31,8 +32,19 @@ class Method:
         raise NotImplementedError
 
     def run(self) -> Trajectory:
-        """The work, frame by frame. Timed. Failure is a status in the trajectory, not an exception."""
+        """The work, frame by frame. Timed. Failure is a status in the trajectory, not an exception.
+
+        Short ones are called again until enough time is measured: each does all of the work, from the start.
+        """
         raise NotImplementedError
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object] | None:
+        """What makes, called with a frame, all that run() takes as ready of that frame's pose; None without a
+        body. Timed, one frame at a time, and added to the run: from pose to world vertices.
+
+        By default the posed body, and the places of the pins.
+        """
+        return None if scene.dressed is None else posed_body(scene.dressed)
 
     def quasi_static(self) -> Trajectory | None:
         """Its answer to each frame's pose held still; None where that is the simulator's. Not timed."""
@@ -44,6 +56,18 @@ class Method:
         Asked only of methods that are declared `batched`.
         """
         raise NotImplementedError
+
+
+def posed_body(dressed: Dressed) -> Callable[[int], tuple[np.ndarray, np.ndarray]]:
+    """What poses the body in a frame: its vertices (B, 3) and the garment's pins (P, 3) [m]."""
+    body, motion, garment = dressed.body, dressed.motion, dressed.garment
+    pose = body.poser(dressed.betas)
+
+    def inputs(frame: int) -> tuple[np.ndarray, np.ndarray]:
+        poses, translations = motion.poses[frame : frame + 1], motion.translations[frame : frame + 1]
+        return pose(poses, translations)[0], garment.body_transported(body, poses, translations)[0]
+
+    return inputs
 
 
 @dataclass(frozen=True, kw_only=True)

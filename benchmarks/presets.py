@@ -29,7 +29,8 @@ class Preset:
     ablations and further baselines of a suite take part without being named. settle_frames: frames from the
     T-pose into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along
     each side. gap_samples: frames of a trajectory at which suite speed solves the step again to know the gap
-    to its minimum. repeats: times that a cell of suite speed is run, those whose first run took at most
+    to its minimum. least_seconds [s]: of run time to be measured of each timed cell, whose short run is done
+    again until then. repeats: times that a cell of suite speed is run, those whose first run took at most
     repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended [s].
     """
 
@@ -48,6 +49,7 @@ class Preset:
     sheet_frames: int
     iteration_budgets: tuple[int, ...]
     gap_samples: int
+    least_seconds: float
     repeats: int
     repeat_seconds: float
     cell_seconds: float
@@ -83,6 +85,7 @@ PRESETS = (
         sheet_frames=10,
         iteration_budgets=(1, 4),
         gap_samples=3,
+        least_seconds=0.1,
         repeats=2,
         repeat_seconds=0.5,
         cell_seconds=120.0,
@@ -111,6 +114,7 @@ PRESETS = (
         sheet_frames=45,
         iteration_budgets=(1, 2, 4, 8),
         gap_samples=4,
+        least_seconds=1.0,
         repeats=3,
         repeat_seconds=1.5,
         cell_seconds=600.0,
@@ -135,6 +139,7 @@ PRESETS = (
         sheet_frames=90,
         iteration_budgets=(1, 2, 4, 8),
         gap_samples=20,
+        least_seconds=1.0,
         repeats=3,
         repeat_seconds=120.0,
         cell_seconds=86_400.0,

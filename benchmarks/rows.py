@@ -104,23 +104,29 @@ def _finite(number: float | None) -> float | None:
 
 
 def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str, float], str]:
-    """What clock and process give: cost/frame, cost/batch [ms], cost/spread [%], cost/peak [MB]; and a remark
-    on what did not go well.
+    """What clock and process give: cost/frame and its percentiles, cost/whole, cost/batch [ms], cost/spread
+    [%], cost/peak [MB]; and a remark on what did not go well.
 
-    A frame's time is the median of the repeats, each the time of the whole run over the frames computed.
+    Each is the median of the repeats; a frame's time is that of the whole run over the frames computed.
     """
     first, remark = outcomes["cell", cell.name], ""
     batch = outcomes.get(("batch", cell.name), Outcome("skipped"))
     if batch.status not in ("ok", "skipped"):
         remark = f"many at once: {batch.status}: {batch.reason}"
-    seconds = [first.result["seconds"]]
+    results = [first.result]
     for number in range(1, repeats):
         again = outcomes.get(("repeat", f"{cell.name}-{number}"), Outcome("skipped"))
         if again.status == "ok":
-            seconds.append(again.result["seconds"])
+            results.append(again.result)
         elif again.status != "skipped":
             remark = remark or f"repeat {number}: {again.status}: {again.reason}"
+    seconds = [result["seconds"] for result in results]
     costs = {"cost/frame": MS * median(seconds) / first.result["frames"]}
+    if "inputs" in first.result:
+        costs["cost/whole"] = costs["cost/frame"] + MS * first.result["inputs"]
+    for name in ("frame_p50", "frame_p95", "frame_worst"):
+        if name in first.result:
+            costs[f"cost/{name}"] = MS * median(r[name] for r in results if name in r)
     if len(seconds) > 1:
         costs["cost/spread"] = 100.0 * (max(seconds) - min(seconds)) / median(seconds)
     if batch.status == "ok":

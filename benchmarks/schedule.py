@@ -142,6 +142,7 @@ class Schedule:
         return kind(
             name=cell.name, label=cell.label, cell=cell, needs=needs, process=process,
             batch="" if process else cell.scene.name, deadline=self.preset.cell_seconds,
+            least=self._least(cell),
             **of_scene | {"inputs": inputs},
         )  # fmt: skip
 
@@ -149,8 +150,12 @@ class Schedule:
         first = self.cell(cell)
         return kind(
             name=name, label=cell.label, cell=cell, inputs={}, modules=(f"{TASKS}.cell",), needs=(first.id,),
-            process=first.process, deadline=first.deadline, **fields,
+            process=first.process, deadline=first.deadline, least=first.least, **fields,
         )  # fmt: skip
+
+    def _least(self, cell: Cell) -> float:
+        """[s] that each of its repeats has to measure, so that it is enough together."""
+        return self.preset.least_seconds / (self.preset.repeats if "speed" in cell.suites else 1)
 
     # --- what is measured ----------------------------------------------------------------------------------
 

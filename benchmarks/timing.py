@@ -1,8 +1,9 @@
 """The one clock: monotonic, stopped only when every position is there and nothing works on.
 
 What it counts is `run()` and the touching of every frame. Loading, compiling, warming up, metrics and writing
-are outside. A method that comes back before its work is done is found out: its positions still change, its
-process still computes, or it has used more processor than one thread can.
+are outside. Short work is done again until enough time is measured. A method that comes back before its work
+is done is found out: its positions still change, its process still computes, it has used more processor than
+one thread can, or it gives again what it had kept.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import time
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from statistics import median
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
@@ -26,14 +28,20 @@ WATCHES = 3  # times in a row; a machine that is busy elsewhere lends its time t
 BUSY = 0.3  # share of AFTER which the processor may be at work
 CROWDED = 1.3  # processor seconds per second on the clock, beyond which more than one thread has worked
 GRAIN = 0.05  # [s] below which processor time is too coarse to be compared
+MOST = 1000  # runs, of what takes no time
 
 
 @dataclass(frozen=True)
 class Reading:
-    """seconds: on the clock. complaint: why they cannot be believed, or empty."""
+    """runs: [s] on the clock, of each run. complaint: why they cannot be believed, or empty."""
 
-    seconds: float
+    runs: tuple[float, ...]
     complaint: str = ""
+
+    @property
+    def seconds(self) -> float:
+        """The median run."""
+        return median(self.runs)
 
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -50,21 +58,39 @@ def one_thread() -> None:
         os.environ[name] = "1"
 
 
-def clocked(run: Callable[[], Made], *, of: Callable[[Made], np.ndarray]) -> tuple[Made, Reading]:
-    """What run() gives, and the time until all positions `of` it are there."""
+def clocked(
+    run: Callable[[], Made], *, of: Callable[[Made], np.ndarray], least: float = 0.0
+) -> tuple[Made, Reading]:
+    """What run() gives, and the time until all positions `of` it are there; called again, MOST times at most,
+    until `least` seconds are measured.
+    """
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())
     children = set(multiprocessing.active_children())
-    _synchronise()
-    used, clock = time.process_time(), time.perf_counter()
-    made = run()
-    touch(of(made))
-    _synchronise()
-    seconds, used = time.perf_counter() - clock, time.process_time() - used
+    used, runs, earlier = time.process_time(), [], None
+    while True:
+        _synchronise()
+        clock = time.perf_counter()
+        made = run()
+        touch(of(made))
+        _synchronise()
+        runs.append(time.perf_counter() - clock)
+        if earlier is not None and _same(of(earlier), of(made)):
+            return made, Reading(tuple(runs), "run() gave again what it had given before")
+        if sum(runs) >= least or len(runs) == MOST:
+            break
+        earlier = made  # held beyond the next run, so that what is new lies elsewhere
+    seconds, used = sum(runs), time.process_time() - used
     if used > CROWDED * seconds + GRAIN:
         crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked"
-        return made, Reading(seconds, crowd)
-    return made, Reading(seconds, _still_at_work(of(made), before, children))
+        return made, Reading(tuple(runs), crowd)
+    return made, Reading(tuple(runs), _still_at_work(of(made), before, children))
+
+
+def _same(one: np.ndarray, other: np.ndarray) -> bool:
+    import numpy as np
+
+    return np.may_share_memory(np.asarray(one), np.asarray(other))
 
 
 def touch(positions: np.ndarray) -> float:

@@ -11,6 +11,7 @@ from reports.data import Run
 from reports.means import means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
+WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
 ERRORS = ("gap/relative", "curvature/error", "distance/rms", "gradient/norm")
 PERTURBED = "simulation-perturbed"  # whose distance is the sensitivity of the reference, not an error
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
@@ -45,18 +46,25 @@ def points_of(
     whole = measured.index[measured == len(scenes) * len({metric, x})]
     in_all = rows.set_index(["method", "seed"]).index.isin(whole)
     rows = rows.assign(usable=rows["usable"] & in_all)
-    rows = rows[rows["metric"].isin([metric, x, REPEATS]) | ~rows["usable"]]
+    rows = rows[rows["metric"].isin([metric, x, TIME, REPEATS]) | ~rows["usable"]]
     wide = means(rows, "method", "metric")
     found = []
     for method in run.ordered(rows["method"]):
-        time, error, repeats = (wide.get((method, name)) for name in (x, metric, REPEATS))
+        time, error, own, repeats = (wide.get((method, name)) for name in (x, metric, TIME, REPEATS))
         if time is None or error is None:
             continue
         spread = 2.0 * (time.spread or 0.0)
-        if repeats is not None and x == TIME:
-            spread = time.value * repeats.value / 100.0
+        if repeats is not None and own is not None and x in (TIME, WHOLE):
+            spread = own.value * repeats.value / 100.0
         found.append(Point(method, time.value, error.value, spread, error.spread or 0.0, error.fewer))
     return found
+
+
+def run_time(rows: pd.DataFrame) -> str:
+    """The metric of run time that these rows share: from pose to vertices where every timed cell has that."""
+    usable = rows[rows["usable"]].set_index(["scene", "method", "seed"])
+    own, whole = (usable.index[usable["metric"] == name] for name in (TIME, WHOLE))
+    return WHOLE if len(whole) and own.isin(whole).all() else TIME
 
 
 def front(points: Iterable[Point]) -> list[Point]:

@@ -14,7 +14,17 @@ from benchmarks.results import ResultsError
 from reports.data import SUITES, Metric, Run
 from reports.means import value_of
 from reports.numbers import number
-from reports.pareto import ERRORS, PERTURBED, SMALLER_STEPS, TIME, Point, front, points_of
+from reports.pareto import (
+    ERRORS,
+    PERTURBED,
+    SMALLER_STEPS,
+    TIME,
+    WHOLE,
+    Point,
+    front,
+    points_of,
+    run_time,
+)
 from reports.plotting import (
     PAGE_WIDTH,
     Picture,
@@ -93,7 +103,7 @@ def metric_against_metric(folder: Path, run: Run, x: str, y: str, scenes: Sequen
 
 def _errors(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """The points of one panel. The reference's own error is zero by construction: it is drawn as a line."""
-    points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric)
+    points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric, run_time(rows))
     # Smaller steps have errors of the garment, but none of the reference's own step.
     left_out = (PERTURBED, SMALLER_STEPS) if metric in OWN_STEP else (PERTURBED,)
     reference = run.with_role("reference")
@@ -110,7 +120,9 @@ def _draw_errors(
 ) -> Picture:
     """All panels of one scene; as the lead of page one only some of them, with a short caption."""
     scene = rows["scene"].iloc[0]
-    reference = value_of(rows, run.reference, TIME)
+    time = run_time(rows)
+    words = "pose to vertices" if time == WHOLE else "own work"
+    reference = value_of(rows, run.reference, time)
     lines, columns = -(-len(panels) // 2), min(2, len(panels))
     figure = new_figure(PAGE_WIDTH * (1.0 if columns > 1 else 0.6), 0.9 + (1.7 if lead else 2.3) * lines)
     every = np.atleast_1d(figure.subplots(lines, columns)).ravel()
@@ -122,7 +134,7 @@ def _draw_errors(
     for axes, (metric, points) in zip(every, panels):
         below |= _draw_points(axes, run, points, reference, least if metric.name == DISTANCE else 0.0)
         unit = "" if metric.unit == "1" else f" [{metric.unit}]"
-        axes.set(xlabel="run time [ms per frame]", title=f"{metric.title}{unit}")
+        axes.set(xlabel=f"run time, {words} [ms per frame]", title=f"{metric.title}{unit}")
         grid(axes)
     shown = [p for _, points in panels for p in points]
     _legend(figure, run, shown, reference)

@@ -5,6 +5,7 @@ and its pelvis above the origin, for every shape, so a motion's translation is z
 A posed vertex is the skinned rest vertex plus the translation: joint 0 is at joints(betas)[0] + translation.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -79,17 +80,27 @@ class Body:
         poses: (T, 24, 3) [rad], axis-angle relative to the parent joint. translations: (T, 3) [m].
         betas: (S,). Raises BodyError.
         """
-        transforms = self.transforms(poses, translations, betas)
-        frames, joints = transforms.shape[:2]
+        return self.poser(betas)(poses, translations)
+
+    def poser(self, betas: ArrayLike | None = None) -> Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]:
+        """`vertices` of that shape for any poses and translations; what shape alone decides is computed here,
+        once: for whoever poses frame after frame. Raises BodyError.
+        """
         # sum_j w_ij T_j (p_i, 1) is one matrix product: (w_ij p_ik) over (j, k) times T over (j, k).
         points = np.concatenate([self.shaped(betas), np.ones((len(self.template), 1))], axis=1)
-        spread = (self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), joints * 4)
-        posed = np.empty((frames, len(points), 3))
-        for start in range(0, frames, _CHUNK):
-            part = transforms[start : start + _CHUNK]
-            columns = part.transpose(1, 3, 0, 2).reshape(joints * 4, -1)
-            posed[start : start + _CHUNK] = (spread @ columns).reshape(len(points), -1, 3).transpose(1, 0, 2)
-        return posed
+        spread = (self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), -1)
+
+        def pose(poses: ArrayLike, translations: ArrayLike) -> NDArray[np.float64]:
+            transforms = self.transforms(poses, translations, betas)
+            posed = np.empty((len(transforms), len(points), 3))
+            for start in range(0, len(transforms), _CHUNK):
+                part = transforms[start : start + _CHUNK]
+                columns = part.transpose(1, 3, 0, 2).reshape(spread.shape[1], -1)
+                each = (spread @ columns).reshape(len(points), -1, 3)
+                posed[start : start + _CHUNK] = each.transpose(1, 0, 2)
+            return posed
+
+        return pose
 
     def transforms(
         self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None

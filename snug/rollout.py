@@ -1,9 +1,12 @@
-"""Run a trained network over a motion, one frame at a time, as an application would."""
+"""Run a trained network over a motion, one frame at a time, as an application would.
+
+Times of frames are those of network and skinning; `frame_inputs` makes what they take as ready.
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +19,7 @@ from snug.skinning import skin
 from snug.trained_model import TrainedModel, find_kind
 
 WARM_UP = 10  # frames run and thrown away, before whoever times the rest starts a clock
+PAST = 2  # frames before one that its features are made from: accelerations are second differences
 QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
 
 
@@ -33,17 +37,17 @@ def roll_out(
 ) -> Trajectory:
     """Positions (T, V, 3) [m], world, float64; the state starts at zero and is carried from frame to frame.
 
-    Inputs and joint transforms are ready before the first frame; every method needs those. quasi_static gives
-    instead, for each frame, the output after that pose was held still for a second: what the network thinks
-    is static. Nothing is timed here (frame_seconds is NaN): see `predictions`. Raises RollOutError.
+    Inputs and joint transforms are ready before the first frame. quasi_static gives instead, for each frame,
+    the output after that pose was held still for a second: what the network thinks is static; nothing of it
+    is timed. Raises RollOutError.
     """
     if not quasi_static:
         return ready_to_roll_out(model, dressed, motion, betas)()
     features = _features(model, dressed, motion, betas, still=True)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
     posed = _quasi_static(model, features, rest, weights, dressed.transforms(motion.poses, betas))
-    origins = dressed.pelvis(motion, betas)
-    return _trajectory(model, dressed, motion, posed, origins)
+    positions = posed.astype(np.float64) + dressed.pelvis(motion, betas)[:, None]
+    return _trajectory(model, dressed, motion, positions, np.arange(motion.frames))
 
 
 def ready_to_roll_out(
@@ -54,24 +58,16 @@ def ready_to_roll_out(
     *,
     kept: np.ndarray | None = None,
 ) -> Callable[[], Trajectory]:
-    """What gives the trajectory of `roll_out` when it is called, once: all that comes before is done here.
+    """What gives the trajectory of `roll_out` whenever it is called: all that comes before is done here.
 
     kept: the frames that the trajectory holds, or None for all; every one is computed. Raises RollOutError.
     """
-    features = _features(model, dressed, motion, betas)
-    rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
-    transforms, origins = dressed.transforms(motion.poses, betas), dressed.pelvis(motion, betas)
-    frames = _one_by_one(model, features, rest, weights, transforms)
-    held = np.arange(len(features)) if kept is None else kept
-    places = {int(frame): place for place, frame in enumerate(held)}
+    frames = predictions(model, dressed, motion, betas)
+    held = np.arange(motion.frames) if kept is None else kept
 
     def run() -> Trajectory:
-        posed = np.empty((len(held), *rest.shape), np.float32)
-        for frame, vertices in enumerate(frames):
-            if frame in places:
-                posed[places[frame]] = vertices.numpy()
-        whole = _trajectory(model, dressed, motion, posed, origins[held])
-        return replace(whole, times=held / motion.fps)
+        positions, seconds = collected(frames(), held)
+        return _trajectory(model, dressed, motion, positions, held, seconds)
 
     return run
 
@@ -99,16 +95,36 @@ def ready_for_many(
     return run
 
 
+def collected(frames: Iterator[np.ndarray], held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of frames (V, 3) computed when asked for, those that `held` (T,) names, (T, V, 3), and the time of each
+    (T,) [s]; every one is computed.
+    """
+    places, seconds = {int(frame): place for place, frame in enumerate(held)}, np.empty(len(held))
+    positions, clock = np.empty(0), time.perf_counter()
+    for frame, x in enumerate(frames):
+        if not len(positions):
+            positions = np.empty((len(held), *x.shape))
+        before, clock = clock, time.perf_counter()
+        if frame in places:
+            positions[places[frame]], seconds[places[frame]] = x, clock - before
+    return positions, seconds
+
+
 def _trajectory(
-    model: TrainedModel, dressed: DressedBody, motion: Any, posed: np.ndarray, origins: np.ndarray
+    model: TrainedModel,
+    dressed: DressedBody,
+    motion: Any,
+    positions: np.ndarray,
+    held: np.ndarray,
+    seconds: np.ndarray | None = None,
 ) -> Trajectory:
-    """Vertices posed about the pelvis (T, V, 3), brought to where it is in each frame (T, 3)."""
-    positions = posed.astype(np.float64) + origins[:, None]
+    """World positions (T, V, 3) [m] of those frames of the motion."""
     finite = bool(np.isfinite(positions).all())
     return Trajectory(
         positions=positions,
         faces=np.asarray(dressed.garment.faces),
-        times=np.arange(len(positions)) / motion.fps,
+        times=held / motion.fps,
+        frame_seconds=np.empty(0) if seconds is None else seconds,
         status="ok" if finite else "diverged",
         reason="" if finite else "the network gave a position that is not finite",
         provenance={
@@ -123,29 +139,56 @@ def _trajectory(
 
 def predictions(
     model: TrainedModel, dressed: DressedBody, motion: Any, betas: np.ndarray | None = None
-) -> Iterator[np.ndarray]:
-    """The frames of `roll_out` one at a time: (V, 3) [m], world, float64, each computed when asked for.
+) -> Callable[[], Iterator[np.ndarray]]:
+    """What begins `roll_out` anew whenever it is called: its frames one at a time, (V, 3) [m], world,
+    float64, each computed when asked for.
 
     Inputs and joint transforms are made, and the network warmed up, before this returns. Raises RollOutError.
     """
     features = _features(model, dressed, motion, betas)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
     transforms = dressed.transforms(motion.poses, betas)
-    pelvis = dressed.pelvis(motion, betas)
-    frames = _one_by_one(model, features, rest, weights, transforms)
-    return (vertices.numpy().astype(np.float64) + origin for vertices, origin in zip(frames, pelvis))
+
+    @torch.inference_mode()
+    def step(frame: int, state: Any) -> tuple[Tensor, Any]:
+        offsets, state = model.network(features[frame][None, None], state)
+        return skin(rest + offsets[0, 0], weights, transforms[frame]), state
+
+    return _one_by_one(step, dressed.pelvis(motion, betas))
 
 
 def skinned_frames(
     dressed: DressedBody, motion: Any, smoothing: int, betas: np.ndarray | None = None
-) -> Iterator[np.ndarray]:
+) -> Callable[[], Iterator[np.ndarray]]:
     """As `predictions`, of skinning alone, with weights smoothed by that many sweeps."""
     rest, weights = dressed.rest(betas), dressed.weights(smoothing)
     transforms = dressed.transforms(motion.poses, betas)
-    pelvis = dressed.pelvis(motion, betas)
-    for transform in transforms[:WARM_UP]:
-        skin(rest, weights, transform)
-    return (skin(rest, weights, t).numpy().astype(np.float64) + at for t, at in zip(transforms, pelvis))
+
+    @torch.inference_mode()
+    def step(frame: int, state: Any) -> tuple[Tensor, Any]:
+        return skin(rest, weights, transforms[frame]), state
+
+    return _one_by_one(step, dressed.pelvis(motion, betas))
+
+
+def frame_inputs(
+    model: TrainedModel | None, dressed: DressedBody, motion: Any, betas: np.ndarray | None = None
+) -> Callable[[int], tuple[Tensor | None, Tensor, np.ndarray]]:
+    """What makes the inputs of one frame, as an application does, which has its pose and those before it.
+
+    Features (D,), none without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: those of the frame
+    that `predictions` and `skinned_frames` make for all frames at once. Raises RollOutError.
+    """
+
+    def inputs(frame: int) -> tuple[Tensor | None, Tensor, np.ndarray]:
+        now = motion.cut(frame, frame + 1)
+        transforms, pelvis = dressed.transforms(now.poses, betas)[0], dressed.pelvis(now, betas)[0]
+        if model is None:
+            return None, transforms, pelvis
+        recent = motion.cut(max(frame - PAST, 0), frame + 1)
+        return _features(model, dressed, recent, betas)[-1], transforms, pelvis
+
+    return inputs
 
 
 def _features(
@@ -170,24 +213,21 @@ def _features(
 
 
 def _one_by_one(
-    model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
-) -> Iterator[Tensor]:
-    """Skinned vertices (V, 3) of each frame, computed when asked for; the network is warmed up at once."""
+    step: Callable[[int, Any], tuple[Tensor, Any]], pelvis: np.ndarray
+) -> Callable[[], Iterator[np.ndarray]]:
+    """What begins the frames anew, from no state: step(frame, state) gives vertices (V, 3) about the pelvis
+    (T, 3) and the next state. It is warmed up at once.
+    """
 
-    @torch.inference_mode()
-    def step(frame: int, state: Any) -> tuple[Tensor, Any]:
-        offsets, state = model.network(features[frame][None, None], state)
-        return skin(rest + offsets[0, 0], weights, transforms[frame]), state
-
-    def frames() -> Iterator[Tensor]:
+    def frames() -> Iterator[np.ndarray]:
         state = None
-        for frame in range(len(features)):
+        for frame, origin in enumerate(pelvis):
             vertices, state = step(frame, state)
-            yield vertices
+            yield vertices.numpy().astype(np.float64) + origin
 
-    for frame in range(min(WARM_UP, len(features))):
+    for frame in range(min(WARM_UP, len(pelvis))):
         step(frame, None)
-    return frames()
+    return frames
 
 
 @torch.inference_mode()

@@ -127,6 +127,16 @@ def test_vertices_agree_with_the_skinning_used_in_training(body):
     np.testing.assert_allclose(body.vertices(poses, shifts, betas)[:, some], expected.numpy(), atol=1e-12)
 
 
+def test_a_body_posed_frame_after_frame_is_the_same(body):
+    rng = np.random.default_rng(4)
+    poses, translations = rng.normal(0, 0.5, (5, 24, 3)), rng.normal(0, 1, (5, 3))
+    for betas in (None, rng.normal(0, 1, body.shape_count)):
+        whole, pose = body.vertices(poses, translations, betas), body.poser(betas)
+        for frame in (3, 0):
+            one = pose(poses[frame : frame + 1], translations[frame : frame + 1])
+            assert np.abs(one - whole[frame]).max() < 1e-12
+
+
 def test_elbow_and_knee_bend_their_own_side(body):
     """An elbow turned by -90 degrees about y points forward; a knee by +90 about x puts the foot behind."""
     poses = np.zeros((1, 24, 3))

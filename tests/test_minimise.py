@@ -181,6 +181,28 @@ def test_too_few_iterations_is_said(method):
     assert "3 iterations" in result.reason and result.gradient_norm > TOLERANCE
 
 
+def test_few_iterations_assemble_no_hessian_that_nobody_uses(monkeypatch):
+    assembled = []
+    assemble = Run.assemble
+    monkeypatch.setattr(Run, "assemble", lambda run, share: assembled.append(share) or assemble(run, share))
+    potential, x0 = crumpled()
+    results = [
+        minimise(potential, x0, max_iterations=1, start_projected=projected) for projected in (False, True)
+    ]
+    assert assembled == [0.0, 0.15, 0.3, 0.6, 1.0, 1.0]  # one after another until one will do; then that one
+    assert [result.factorisations for result in results] == [5, 1]
+    assert (results[0].positions == results[1].positions).all()
+    assert {result.status for result in results} == {"max_iterations"}
+    assert_minimum(potential, x0, minimise(potential, x0, start_projected=True))
+
+
+def test_converged_in_the_very_last_iteration_is_converged():
+    potential, x0 = crumpled()
+    iterations = minimise(potential, x0).iterations
+    assert_minimum(potential, x0, minimise(potential, x0, max_iterations=iterations))
+    assert minimise(potential, x0, max_iterations=iterations - 1).status == "max_iterations"
+
+
 @both
 def test_too_little_time_is_said(method):
     potential, x0 = hanging()

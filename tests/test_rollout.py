@@ -9,9 +9,9 @@ import torch
 from dressing import swaying, tube_dress
 
 from snug.recipe import DEFAULT
-from snug.recipes import PAPER
-from snug.rollout import RollOutError, predictions, roll_out
-from snug.trained_model import TrainedModel, make_network
+from snug.recipes import PAPER, TRAININGS
+from snug.rollout import RollOutError, collected, frame_inputs, predictions, roll_out
+from snug.trained_model import TrainedModel, find_kind, make_network
 from snug.training import untrained_model
 
 
@@ -41,12 +41,48 @@ def test_frame_by_frame_equals_the_whole_sequence(kind):
 def test_predictions_are_the_roll_out_a_frame_when_it_is_asked_for():
     dressed, motion = tube_dress(), swaying()
     model = untrained_model("snug", dressed, [motion], seed=0)
-    run, frames = roll_out(model, dressed, motion), predictions(model, dressed, motion)
-    assert run.frame_seconds.shape == (motion.frames,) and np.isnan(run.frame_seconds).all()
     start = time.perf_counter()
-    first = next(frames)
-    assert time.perf_counter() - start < 0.05
-    assert np.array_equal([first, *frames], run.positions)
+    run = roll_out(model, dressed, motion)
+    assert run.frame_seconds.shape == (motion.frames,) and (run.frame_seconds > 0.0).all()
+    assert run.frame_seconds.sum() < time.perf_counter() - start
+    begin = predictions(model, dressed, motion)
+    for _ in range(2):  # the state begins at zero again
+        frames, start = begin(), time.perf_counter()
+        first = next(frames)
+        assert time.perf_counter() - start < 0.05
+        assert np.array_equal([first, *frames], run.positions)
+
+
+def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_computed_too():
+    computed = []
+
+    def frames():
+        for frame in range(6):
+            time.sleep(0.03 if frame == 4 else 0.0)
+            computed.append(frame)
+            yield np.full((2, 3), float(frame))
+
+    positions, seconds = collected(frames(), np.array([1, 4]))
+    assert computed == list(range(6)) and positions[:, 0, 0].tolist() == [1.0, 4.0]
+    assert seconds[1] > 0.03 > 3 * seconds[0]
+
+
+@pytest.mark.parametrize("kind", ["snug", "snug-dynamic", "pbns", "santesteban2019"])
+def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind):
+    dressed, motion = tube_dress(), swaying()
+    chosen = TRAININGS[kind]
+    model = untrained_model(chosen.kind, dressed, [motion], seed=0, recipe=chosen.recipe)
+    features = dressed.features(motion, model.recipe, kind=find_kind(model.kind).features)
+    transforms, pelvis = dressed.transforms(motion.poses), dressed.pelvis(motion)
+    make = frame_inputs(model, dressed, motion)
+    for frame in reversed(range(motion.frames)):
+        made = make(frame)
+        assert made[0].shape == features[frame].shape
+        assert torch.allclose(made[0], features[frame], rtol=1e-5, atol=1e-6)
+        assert torch.allclose(made[1], transforms[frame], rtol=1e-6, atol=1e-7)
+        assert np.array_equal(made[2], pelvis[frame])
+    assert features.diff(dim=0).abs().max() > 1e-2
+    assert frame_inputs(None, dressed, motion)(3)[0] is None
 
 
 def test_a_quasi_static_frame_forgets_the_past_and_the_velocity():

@@ -15,7 +15,7 @@ from benchmarks.execution import RunLog, accepted
 from benchmarks.methods import METHODS, find_method
 from benchmarks.plan import Motions
 from benchmarks.results import Row
-from benchmarks.rows import NOT_FALLING, rows_of
+from benchmarks.rows import NOT_FALLING, clock_costs, rows_of
 from benchmarks.scenes import SCENES
 from benchmarks.schedule import Schedule
 from benchmarks.tasks.cell import Cell, judge
@@ -57,7 +57,7 @@ def test_a_trajectory_is_judged_by_what_is_in_it():
 
 
 def test_a_time_that_cannot_be_believed_fails_the_cell():
-    status, reason = judge(trajectory(), Reading(1.0, "it went on"), FourFrames(), truncated=False)
+    status, reason = judge(trajectory(), Reading((1.0,), "it went on"), FourFrames(), truncated=False)
     assert status == "failed" and "it went on" in reason
 
 
@@ -86,6 +86,18 @@ def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
     assert skinned[0].dtype == "float32"
     skipped = rows(cell, Outcome("skipped", "why"))
     assert [(row.status, row.reason, row.value) for row in skipped] == [("skipped", "why", None)] * 2
+
+
+def test_inputs_are_added_to_a_methods_own_work_and_percentiles_are_medians_of_repeats():
+    cell = Cell(SHEET, find_method("newton-1"), 0, ("speed",))
+    found: dict = {("cell", cell.name): RAN}
+    assert set(clock_costs(cell, 3, found)[0]) == {"cost/frame", "cost/peak"}  # as an earlier run wrote it
+    late = [{"seconds": s, "frame_p95": p} for s, p in ((1.0, 0.3), (1.2, 0.5), (1.1, 0.4))]
+    found["cell", cell.name] = dataclasses.replace(RAN, result={**RAN.result, **late[0], "inputs": 0.002})
+    found |= {("repeat", f"{cell.name}-{n}"): Outcome(result=late[n]) for n in (1, 2)}
+    costs, remark = clock_costs(cell, 3, found)
+    assert costs["cost/frame"] == pytest.approx(275.0) and costs["cost/whole"] == pytest.approx(277.0)
+    assert costs["cost/frame_p95"] == pytest.approx(400.0) and remark == ""
 
 
 def test_rows_carry_what_scene_and_method_declare():

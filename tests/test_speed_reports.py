@@ -19,6 +19,7 @@ from reports.pareto import (
     front,
     overtaken,
     points_of,
+    run_time,
     solvers,
     truncated,
 )
@@ -100,6 +101,25 @@ def test_a_profile_counts_scenes_within_a_ratio_of_the_fastest():
     ratios, shares = stairs["newton"]
     assert ratios[:3] == [1.0, 180.0, 180.0] and shares[:3] == pytest.approx([1 / 3, 2 / 3, 1.0])
     assert stairs["snug"][1][-1] == pytest.approx(2 / 3)
+
+
+def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_path):
+    rows = all_rows()
+    own = [r for r in rows if r.metric == "cost/frame"]
+    whole = [dataclasses.replace(r, metric="cost/whole", value=r.value + 2.0) for r in own]
+    rows.append(row(SCENES[0], "skinning", "cost/spread", 50.0, "%"))
+    for added, shift in ((whole, 2.0), (whole[1:], 0.0), ([], 0.0)):
+        run = run_of([*rows, *added])
+        cells = run.cells("speed")
+        scene = cells[cells["scene"] == SCENES[0]]
+        (point,) = (
+            p
+            for p in points_of(run, scene, SCENES[:1], "gap/relative", run_time(scene))
+            if p.method == "skinning"
+        )
+        assert point.time == pytest.approx(0.1 + shift) and point.time_spread == pytest.approx(0.05)
+        assert run_time(scene) == ("cost/whole" if shift else "cost/frame")
+        assert error_against_time(tmp_path, run)
 
 
 def test_break_even_is_where_the_total_costs_cross():

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.timing import clocked
+from benchmarks.timing import MOST, clocked
 
 
 def positions_of(made):
@@ -40,6 +40,26 @@ def test_what_is_made_only_when_it_is_looked_at_is_made_on_the_clock():
 
     _, reading = clocked(Lazy, of=positions_of)
     assert reading.seconds >= 0.1
+
+
+def test_short_work_is_done_again_until_enough_is_measured_and_long_work_once():
+    def run():
+        work(0.02)
+        return np.zeros((2, 3, 3))
+
+    _, reading = clocked(run, of=positions_of, least=0.1)
+    assert 3 <= len(reading.runs) <= 5 and sum(reading.runs) >= 0.1 and reading.complaint == ""
+    assert reading.seconds == sorted(reading.runs)[len(reading.runs) // 2] or len(reading.runs) % 2 == 0
+    assert len(clocked(run, of=positions_of)[1].runs) == 1
+    _, reading = clocked(lambda: np.zeros(1), of=positions_of, least=60.0)
+    assert len(reading.runs) == MOST
+
+
+def test_an_answer_that_was_kept_from_the_first_run_is_found():
+    kept = np.zeros((2, 3, 3))
+    _, reading = clocked(lambda: kept[:], of=positions_of, least=1.0)
+    assert "what it had given before" in reading.complaint and len(reading.runs) == 2
+    assert clocked(lambda: kept, of=positions_of)[1].complaint == ""
 
 
 def test_a_thread_that_goes_on_is_found():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from reference_sim import Trajectory
 
-from ..method import Method
+from ..method import Method, posed_body
 from ..results import model_path
 from ..scene import BuiltScene
 
@@ -18,10 +19,7 @@ WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
 
 @dataclass
 class CleanedNetwork(Method):
-    """A model read from its file, and the body that its garment is pushed out of.
-
-    The posed body is ready before, as joint transforms are: whoever draws the body has it.
-    """
+    """A model read from its file, and the body that its garment is pushed out of, posed before run()."""
 
     path: Path
 
@@ -44,20 +42,30 @@ class CleanedNetwork(Method):
 
     def run(self) -> Trajectory:
         from snug.clean_up import MARGIN
+        from snug.rollout import collected
 
-        positions = np.empty((self.motion.frames, self.dressed.vertices, 3))
-        for frame in range(self.motion.frames):
-            positions[frame] = self.clean(next(self.frames), frame)
+        cleaned = (self.clean(x, frame) for frame, x in enumerate(self.frames()))
+        positions, seconds = collected(cleaned, np.arange(self.motion.frames))
         finite = bool(np.isfinite(positions).all())
         return Trajectory(
             positions=positions,
             faces=np.asarray(self.dressed.garment.faces),
             times=np.arange(len(positions)) / self.motion.fps,
+            frame_seconds=seconds,
             status="ok" if finite else "diverged",
             reason="" if finite else "the network gave a position that is not finite",
             provenance={"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN},
             frame_fields={},
         )
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Features, joint transforms and the posed body."""
+        from snug.rollout import frame_inputs
+
+        assert scene.dressed is not None
+        own = frame_inputs(self.model, self.dressed, self.motion, self.betas)
+        body = posed_body(scene.dressed)
+        return lambda frame: (own(frame), body(frame))
 
     def quasi_static(self) -> Trajectory:
         """What the network holds to be static, cleaned up as well. Never on the clock."""

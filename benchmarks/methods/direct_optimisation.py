@@ -79,7 +79,6 @@ class DirectOptimisation(Method):
             *declared_energies(self.cloth),
             ClipInertia(self.cloth, scene.dt, frames),
         ]
-        self.sums: list[float] = []
         # What the pelvis's own height adds to gravity: large, the same for all, and no measure of a fall.
         gravity = next(term for term in scene.energies if isinstance(term, Gravity))
         heights = np.zeros(frames) if scene.origin_heights is None else scene.origin_heights
@@ -87,6 +86,7 @@ class DirectOptimisation(Method):
 
     def run(self) -> Trajectory:
         x = self.start.reshape(-1, 3)
+        self.sums: list[float] = []
         potential = Potential(self.terms)
         descent = make_minimiser(
             potential, "lbfgs", finish=False, max_iterations=ITERATIONS, memory=MEMORY, tolerance=TOLERANCE

@@ -17,7 +17,7 @@ from ..scene import BuiltScene
 
 @dataclass
 class Network(Method):
-    """A model read from its file. Features are made and the network is warmed up before the clock runs."""
+    """A model read from its file. Features are made and the network is warmed up before run()."""
 
     path: Path
 
@@ -34,6 +34,12 @@ class Network(Method):
 
     def run(self) -> Trajectory:
         return self.frames()
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Features and joint transforms."""
+        from snug.rollout import frame_inputs
+
+        return frame_inputs(self.model, self.dressed, self.motion, self.betas)
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
         """What computes so many bodies in this motion at once when called: (T, copies, V, 3) [m]."""

@@ -14,6 +14,7 @@ says so. Copies into and out of newton are on the clock.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -83,7 +84,8 @@ class NewtonSolver(Method):
         scene = self.scene
         x = scene.start
         v = scene.start_velocity
-        positions, status, reason = [x], "ok", ""
+        positions, seconds, status, reason = [x], [0.0], "ok", ""
+        clock = time.perf_counter()
         for frame in range(1, scene.frames):
             if scene.pin_positions is not None:
                 x = x.copy()
@@ -93,10 +95,13 @@ class NewtonSolver(Method):
                 status, reason = "diverged", f"frame {frame}: a vertex is nowhere, or 100 m away"
                 break
             positions.append(x)
+            before, clock = clock, time.perf_counter()
+            seconds.append(clock - before)
         return Trajectory(
             positions=np.array(positions),
             faces=scene.cloth.faces,
             times=scene.dt * np.arange(len(positions)),
+            frame_seconds=np.array(seconds),
             status=status,
             reason=reason,
             provenance=self._provenance(),

@@ -6,6 +6,7 @@ skinning is all that tells them apart.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,6 @@ from reference_sim import Trajectory
 from ..method import Method
 from ..scene import BuiltScene
 
-WARM_UP = 10
-
 
 class Skinning(Method):
     """One linear blend a frame; joint transforms are ready before, as for the networks."""
@@ -24,37 +23,31 @@ class Skinning(Method):
     def prepare(self, scene: BuiltScene) -> None:
         from snug.dressed_body import DressedBody
         from snug.recipe import DEFAULT
-        from snug.skinning import skin
+        from snug.rollout import skinned_frames
 
         assert scene.dressed is not None
-        self.motion, betas = scene.dressed.motion, scene.dressed.betas
-        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.rest, self.weights = dressed.rest(betas), dressed.weights(DEFAULT.smoothing)
-        self.transforms = dressed.transforms(self.motion.poses, betas)
-        self.pelvis = dressed.pelvis(self.motion, betas)
+        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
+        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.frames = skinned_frames(self.dressed, self.motion, DEFAULT.smoothing, self.betas)
         self.faces = np.asarray(scene.cloth.faces)
-        for frame in range(min(WARM_UP, self.motion.frames)):
-            skin(self.rest, self.weights, self.transforms[frame])
 
     def run(self) -> Trajectory:
-        import torch
+        from snug.rollout import collected
 
-        from snug.skinning import skin
-
-        frames = self.motion.frames
-        posed = np.empty((frames, *self.rest.shape))
-        with torch.inference_mode():
-            for frame in range(frames):
-                posed[frame] = skin(self.rest, self.weights, self.transforms[frame]).numpy()
+        positions, seconds = collected(self.frames(), np.arange(self.motion.frames))
         return Trajectory(
-            positions=posed + self.pelvis[:, None],
+            positions=positions,
             faces=self.faces,
-            times=np.arange(frames) / self.motion.fps,
-            status="ok",
-            reason="",
+            times=np.arange(len(positions)) / self.motion.fps,
+            frame_seconds=seconds,
             provenance={"method": "skinning"},
-            frame_fields={},
         )
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Joint transforms."""
+        from snug.rollout import frame_inputs
+
+        return frame_inputs(None, self.dressed, self.motion, self.betas)
 
     def quasi_static(self) -> Trajectory:
         """Its answer to poses held still: the same."""

@@ -3,7 +3,7 @@
 The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while the
 network sees what it always sees. The potential of the step is frozen as for every solver (contact planes at
 the guess that the body carries), and only the starting point differs. The time of the network or of skinning
-is on the clock; features and joint transforms are ready before, as they are for the network alone.
+is that of run(); posed body, features and joint transforms are ready before.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from reference_sim import Potential, Trajectory
 from reference_sim.minimise import Minimiser, Result, make_minimiser
 
-from ..method import Method
+from ..method import Method, posed_body
 from ..results import model_path
 from ..scene import BuiltScene
 from .simulation import Simulation
@@ -47,14 +47,13 @@ class WarmStarted(Method):
     path: Path
     solver: dict[str, Any]
     simulation: Simulation = field(init=False)
+    of_guess: Callable[[int], object] = field(init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
         frames = self._frames(scene)
-        # Inputs, transforms and the network's warm-up are made here: a set for the warm-up, one for the run.
-        ready = [frames(), frames()]
 
         def from_elsewhere(potential: Potential, **options: Any) -> FromElsewhere:
-            starts = ready.pop()
+            starts = frames()
             next(starts)  # frame 0 is the scene's start, as for every solver
             inner = make_minimiser(potential, **self.solver)
             return FromElsewhere(inner, starts, np.asarray(potential.cloth.pins))
@@ -65,25 +64,31 @@ class WarmStarted(Method):
     def run(self) -> Trajectory:
         return self.simulation.run()
 
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Those of the network or of skinning, and the posed body."""
+        assert scene.dressed is not None
+        body = posed_body(scene.dressed)
+        return lambda frame: (self.of_guess(frame), body(frame))
+
     def _frames(self, scene: BuiltScene) -> Callable[[], Iterator[np.ndarray]]:
-        """What gives world positions (V, 3) [m] frame after frame, from the first one on."""
+        """What gives world positions (V, 3) [m] frame after frame, from the first one on, at each call."""
         from snug.dressed_body import DressedBody
         from snug.recipe import DEFAULT
-        from snug.rollout import predictions, skinned_frames
+        from snug.rollout import frame_inputs, predictions, skinned_frames
         from snug.trained_model import TrainedModel
 
         assert scene.dressed is not None
         motion, betas = scene.dressed.motion, scene.dressed.betas
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        if self.guess == SKINNING:
-            return lambda: skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
-        model = TrainedModel.load(self.path)
-        return lambda: predictions(model, dressed, motion, betas)
+        model = None if self.guess == SKINNING else TrainedModel.load(self.path)
+        self.of_guess = frame_inputs(model, dressed, motion, betas)
+        if model is None:
+            return skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
+        return predictions(model, dressed, motion, betas)
 
 
 def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:
     """`iterations` of "newton" or "lbfgs" from the network of kind `guess`, or from "skinning"."""
     options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
-    if solver == "lbfgs":
-        options["finish"] = False
+    options |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
     return WarmStarted(guess, model_path(models, guess, seed), options)

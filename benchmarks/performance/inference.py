@@ -49,7 +49,7 @@ def _frame_seconds(model: TrainedModel, dressed: DressedBody, motion: Motion) ->
     """Wall time [s] of each frame of a roll-out; inputs and joint transforms are ready before."""
     from snug.rollout import predictions
 
-    frames, seconds = predictions(model, dressed, motion), []
+    frames, seconds = predictions(model, dressed, motion)(), []
     for _ in range(motion.frames):
         start = time.perf_counter()
         next(frames)

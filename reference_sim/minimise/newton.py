@@ -4,7 +4,8 @@ Each iteration solves H p = -g and takes the full step. Where the Cholesky facto
 a share of the elements' negative curvature is taken out, CONVEXITY at one projection level after another, and
 only when all of it was not enough (cloth without inertia) H is shifted by sigma M/dt^2. Taking all of it out
 always, as is common, needs several times the iterations once cloth wrinkles; shifts alone need a third more
-factorisations (measured on a T-shirt walking, running and jumping).
+factorisations (measured on a T-shirt walking, running and jumping). The first iteration of a step of moving
+cloth nearly always needs all of it out: with start_projected=True it begins so, which helps few iterations.
 
 The minimum of stiff cloth lies along a narrow, curved valley of the energy. A full step along it ends where
 stresses computed from the strain are false by orders of magnitude. So the Hessian takes the stresses that the
@@ -54,6 +55,8 @@ class Newton:
         timeout: seconds before giving up with status timeout.
         reference_dt: time [s] in the shift M/dt^2 where the potential has no inertia of its own.
         reuse: whether a factorisation serves further quasi-Newton steps, each of them an iteration.
+        start_projected: whether the first iterations take all negative curvature out: one Hessian is then
+            assembled where the search for the least projection assembles five.
         observe: called with every point (V, 3) [m] that was kept, the start included.
     """
 
@@ -66,10 +69,12 @@ class Newton:
         timeout: float = float("inf"),
         reference_dt: float = 1 / 30,
         reuse: bool = False,
+        start_projected: bool = False,
         observe: Observer | None = None,
     ) -> None:
         self.potential, self.reuse, self.observe = potential, reuse, observe
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
+        self.first_level = len(CONVEXITY) - 1 if start_projected else 0
         self.hessian = FactorisedHessian(potential, tolerance=tolerance, reference_dt=reference_dt)
         self.step_tolerance = STEP_TOLERANCE * float(potential.cloth.edge_lengths.mean())
 
@@ -88,8 +93,8 @@ class Run(FactorisedDescent):
         self.n = newton
         self.quasi_newton_steps = self.iterations
         self.history = LBFGSHistory(MEMORY)
-        self.projection_level = 0  # index into CONVEXITY at the last step
-        self.raised = False  # whether the last step needed a higher one than it began with
+        self.projection_level = newton.first_level  # index into CONVEXITY at the last step
+        self.raised = newton.first_level > 0  # whether the last step needed a higher one than it began with
         self.predicting = False  # whether the Hessian takes stresses that the last step predicted
         self.watchdog_steps = WATCHDOG_STEPS  # of the next watchdog: less after one that came to nothing
 
@@ -107,6 +112,10 @@ class Run(FactorisedDescent):
             # Wrinkled cloth stays wrinkled for a while: start near the level that the last step needed.
             projection = self.projection_level if self.raised else max(self.projection_level - 1, 0)
             small = self.gradient_norm() <= self.n.tolerance
+            spent = self.iterations >= self.n.max_iterations
+            # Round-off excuses no more than this (`target`): no Hessian is needed to say so.
+            if spent and self.gradient_norm() > max(self.n.tolerance, ROUND_OFF):
+                return self.given_up()
             if small:  # then the true Hessian decides
                 self.potential.forget()
             data = self.assemble(CONVEXITY[0 if small else projection])
@@ -126,8 +135,8 @@ class Run(FactorisedDescent):
                 self.predicting, data = False, self.assemble(CONVEXITY[projection])
             elif self.late(self.n.timeout):
                 return self.result("timeout", f"gave up after {self.n.timeout:g} s")
-            if self.iterations >= self.n.max_iterations:
-                return self.result("max_iterations", f"gave up after {self.iterations} iterations")
+            if spent:
+                return self.given_up()
             x, g, predicted = self.x, self.g, self.predicting
             if not (self.full_steps(data, projection) or self.line_search_step(projection, predicted)):
                 return self.result("stalled", "no convexified Newton direction lowers the energy")
@@ -137,6 +146,9 @@ class Run(FactorisedDescent):
                 self.history.clear()
                 self.history.add((self.x - x)[self.free].ravel(), self.g - g)
                 self.reuse_factorisation(tolerance)
+
+    def given_up(self) -> Result:
+        return self.result("max_iterations", f"gave up after {self.iterations} iterations")
 
     def reuse_factorisation(self, tolerance: float) -> None:
         """Quasi-Newton steps on the last factorisation, until a new one would serve better."""
