@@ -10,7 +10,7 @@ from .methods.learned import LEARNED, RECIPE_DEVIATIONS
 from .plan import Motions
 from .presets import Preset
 from .scenes import GARMENT_SCENES
-from .scenes.further import OUT_OF_DISTRIBUTION, SHEETS, meshes_and_steps, there_and_back
+from .scenes.further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
 from .scenes.further import SMALL as SMALL_OUT_OF_DISTRIBUTION
 
 
@@ -108,9 +108,9 @@ def _solvers(extent: Extent) -> list[str]:
 
 
 def _dependence(extent: Extent) -> list[str]:
-    """Meshes and steps of the preset; sheets of up to 16,000 vertices only for whoever names scenes."""
-    sheets = SHEETS if extent.further else ()
-    return [scene.name for scene in (*meshes_and_steps(extent.preset.dependence), *sheets)]
+    """Meshes and steps of the preset; drapes of up to 16,000 vertices where scenes are named, or at paper."""
+    drapes = DRAPES if extent.further else ()
+    return [scene.name for scene in (*meshes_and_steps(extent.preset.dependence), *drapes)]
 
 
 # --- out of distribution ------------------------------------------------------------------------------------

@@ -109,9 +109,9 @@ def _dependence(name: str, description: str, **options: int) -> Scene:
 
 
 # How much the bending of a drape is the mesh's: by size, on a regular and on an unstructured mesh.
-SHEETS = tuple(
+DRAPES = tuple(
     Scene(
-        name=f"dependence/sheet/{family}/{count}",
+        name=f"dependence/drape/{family}/{count}",
         description=f"a sheet of about {count} vertices on a sphere, {words}",
         module="benchmarks.scenes.sheet_on_sphere",
         sizes=("sheet_frames",),
