@@ -112,7 +112,7 @@ def _dependence(name: str, description: str, **options: int) -> Scene:
 DRAPES = tuple(
     Scene(
         name=f"dependence/drape/{family}/{count}",
-        description=f"a sheet of about {count} vertices on a sphere, {words}",
+        description=f"a sheet of about {count} vertices draped over a sphere, {words}",
         module="benchmarks.scenes.sheet_on_sphere",
         sizes=("sheet_frames",),
         options={"sheet_cells": round(count**0.5) - 1, "family": family},

@@ -19,14 +19,20 @@ GAP = 0.02  # [m] between sphere and sheet at the start
 def build(
     scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int, family: str = ""
 ) -> BuiltScene:
-    """The built scene; no assets are needed. family: triangles as `rectangle` has them, else `sheet`'s."""
+    """The built scene; no assets are needed.
+
+    family: of triangles, as `rectangle` has them; such a sheet lies on the sphere and is held at its middle,
+    so that it drapes and does not slide off.
+    """
     positions, faces = square_sheet(sheet_cells, SIZE)
+    gap, pins = GAP, []
     if family:
         flat, faces = rectangle(family, sheet_cells, sheet_cells, SIZE, SIZE)
         positions = in_space(flat - SIZE / 2)[:, [1, 2, 0]]  # faces up
+        gap, pins = 0.0, [int(np.argmin(np.linalg.norm(positions, axis=1)))]
     # Off the sphere's axis by a little: centred, it would balance on a symmetry.
-    positions += [0.004, RADIUS + GAP, 0.002]
-    cloth = Cloth(positions, faces, Material())
+    positions += [0.004, RADIUS + gap, 0.002]
+    cloth = Cloth(positions, faces, Material(), pins=pins)
     points, triangles = sphere(RADIUS, 24)
     frames = sheet_frames
     obstacle = Obstacle(points, triangles)
