@@ -117,6 +117,7 @@ SOLVERS = (
             options={"shift": shift},
             role="reference-variant",
             family="simulation-perturbed",
+            timed=False,
             level=shift,
         )
         for shift in SHIFTS
@@ -129,6 +130,7 @@ SOLVERS = (
         options={"refreeze": 1},
         role="reference-variant",
         family="simulation-refrozen",
+        timed=False,
     ),
     # A variant of the physics, set beside its base: a "reference-variant" would be read as an uncertainty of
     # the reference, and a "solver" as an approximation of it.
