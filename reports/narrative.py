@@ -51,7 +51,9 @@ def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
     if not order:
         return ""
     best = found[order[0]]
-    text = f"{run.label(order[0])} has {with_spread(best.value, best.spread)} {unit}{best.fewer}"
+    text = (
+        f"{run.label(order[0])} has {with_spread(best.value, best.spread_or_uncertainty)} {unit}{best.fewer}"
+    )
     said = {name: f"{run.label(name)} {number(mean.value)}{mean.fewer}" for name, mean in found.items()}
     after, beside = (", ".join(said[name] for name in names if name in said) for names in (order[1:], others))
     text += f", {after}." if after else "."
@@ -71,7 +73,7 @@ def run_time(run: Run, frame: pd.DataFrame) -> str:
 def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
     """By each error, what beats the network, and the fastest truncated solver that is as accurate."""
     text = ""
-    for metric in ("gap/relative", CURVATURE):
+    for metric in ("gap/energy", CURVATURE):
         points = points_of(run, frame, scenes, metric)
         own = next((p for p in points if p.method == NETWORK), None)
         if own is None:

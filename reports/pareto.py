@@ -12,8 +12,10 @@ from reports.means import means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
 WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
-ERRORS = ("gap/relative", "curvature/error", "distance/rms", "gradient/norm")
-PERTURBED = "simulation-perturbed"  # whose distance is the sensitivity of the reference, not an error
+# Of the method's own step first: no chaos blurs them. Then those of the roll-out against the simulation's.
+ERRORS = (
+    "gap/energy", "step/curvature", "step/distance", "curvature/error", "distance/rms", "curvature/histogram",
+)  # fmt: skip
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 
 
@@ -25,7 +27,8 @@ class Point:
     """A method's run time [ms per frame] and error.
 
     time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
-    standard deviations over seeds. error_spread: one standard deviation over seeds. Both 0 where unknown.
+    standard deviations over seeds. error_spread: one standard deviation over seeds or, where that is more,
+    how far another simulation as right as the reference moves it. Both 0 where unknown.
     fewer: words on seeds that are missing, empty where none is.
     """
 
@@ -56,7 +59,9 @@ def points_of(
         spread = 2.0 * (time.spread or 0.0)
         if repeats is not None and own is not None and x in (TIME, WHOLE):
             spread = own.value * repeats.value / 100.0
-        found.append(Point(method, time.value, error.value, spread, error.spread or 0.0, error.fewer))
+        found.append(
+            Point(method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0, error.fewer)
+        )
     return found
 
 
@@ -83,8 +88,8 @@ def fastest(points: Iterable[Point], error: float) -> Point | None:
 
 
 def of_one_problem(run: Run, points: Iterable[Point]) -> list[Point]:
-    """Those that solve what the reference solves, from where it starts."""
-    return [p for p in points if run.methods[p.method].family not in (PERTURBED, SMALLER_STEPS)]
+    """Those that solve what the reference solves."""
+    return [p for p in points if run.methods[p.method].family != SMALLER_STEPS]
 
 
 def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
