@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from benchmarks.results import AS_RIGHT
 from reports.data import Run
 from reports.means import means
 
@@ -16,6 +17,8 @@ WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to wo
 ERRORS = (
     "gap/energy", "step/curvature", "step/distance", "curvature/error", "distance/rms", "curvature/histogram",
 )  # fmt: skip
+PLANES = {"gap/energy": "gap/refrozen"}  # what the reference leaves where its planes are searched at its end
+LOOSER = "simulation-tolerance"  # a family of simulations that is a curve of its own
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 
 
@@ -101,6 +104,18 @@ def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
 def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
     """Of the solvers alone those that differ from others of their family by one number."""
     return [p for p in solvers(run, points) if run.methods[p.method].level is not None]
+
+
+def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
+    """The error [unit of the metric] below which a method is as near to the reference as another right one.
+
+    The largest of simulations from moved starts and with planes searched twice; of the gap what the
+    reference leaves on planes searched at its end. 0 where none is known.
+    """
+    twins = [m.name for m in run.methods.values() if m.family in AS_RIGHT and m.family != LOOSER]
+    who, what = ([run.reference], PLANES[metric]) if metric in PLANES else (twins, metric)
+    kept = rows[rows["usable"] & (rows["metric"] == what) & rows["method"].isin(who)]["value"]
+    return float(kept.max()) if len(kept) else 0.0
 
 
 def beaten_by(points: Sequence[Point], own: Point) -> Point | None:

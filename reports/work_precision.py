@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from benchmarks.results import AS_RIGHT, ResultsError
+from benchmarks.results import ResultsError
 from reports.data import SUITES, Metric, Run
 from reports.means import value_of
 from reports.numbers import number
@@ -21,6 +21,7 @@ from reports.pareto import (
     WHOLE,
     Point,
     front,
+    indistinct,
     points_of,
     run_time,
 )
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
 # Of the step's own potential, which another step size changes.
 OWN_STEP = ("gap/energy", "gap/relative", "step/curvature", "step/distance", "gradient/norm")
 DECADES = 9  # below the largest error; what is smaller is drawn on the lower edge
-PLANES = {"gap/energy": "gap/refrozen"}  # what the reference leaves where its planes are searched at its end
-LOOSER = "simulation-tolerance"  # a curve of its own
 GREY = "#B4B4B4"
 
 
@@ -109,18 +108,6 @@ def _errors(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     reference = run.with_role("reference")
     kept = [p for p in points if run.methods[p.method].family not in left_out and p.method not in reference]
     return [p for p in kept if p.time > 0.0]
-
-
-def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
-    """The error [unit of the metric] below which a method is as near to the reference as another right one.
-
-    The largest of simulations from moved starts and with planes searched twice; of the gap what the
-    reference leaves on planes searched at its end. 0 where none is known.
-    """
-    twins = [m.name for m in run.methods.values() if m.family in AS_RIGHT and m.family != LOOSER]
-    who, what = ([run.reference], PLANES[metric]) if metric in PLANES else (twins, metric)
-    kept = rows[rows["usable"] & (rows["metric"] == what) & rows["method"].isin(who)]["value"]
-    return float(kept.max()) if len(kept) else 0.0
 
 
 def _draw_errors(

@@ -55,8 +55,8 @@ DECLARED: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 TABLES = {
     "energy": "energies", "curvature": "curvature", "cost": "cost", "distance": "penetration",
-    "penetration": "penetration", "gap": "speed", "step": "speed", "gradient": "speed", "roll_out": "extrapolation",
-    "conservation": "conservation", "dynamics": "dynamics", "train": "training",
+    "penetration": "penetration", "gap": "speed", "step": "speed", "gradient": "speed",
+    "roll_out": "extrapolation", "conservation": "conservation", "dynamics": "dynamics", "train": "training",
 }  # fmt: skip
 TITLES = {
     "gap/energy": "Energy gap",

@@ -17,6 +17,7 @@ from reports.pareto import (
     beaten_by,
     fastest,
     front,
+    indistinct,
     overtaken,
     points_of,
     run_time,
@@ -25,7 +26,7 @@ from reports.pareto import (
 )
 from reports.plotting import _columns
 from reports.profile import performance_profile, staircases, times_to_reach
-from reports.work_precision import error_against_time, indistinct
+from reports.work_precision import error_against_time
 
 # method: ms a frame, relative gap, curvature error
 WORN = {
