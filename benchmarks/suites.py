@@ -131,7 +131,9 @@ SUITES = (
         name="garments",
         description="all methods on unseen motions: energies, curvature, cost",
         scenes=_whole_motions,
-        methods=lambda extent: ["simulation", *FEW_AGAIN, "skinning", "untrained", "snug", "supervised", "pbns"],
+        methods=lambda extent: [
+            "simulation", *FEW_AGAIN, "skinning", "untrained", "snug", "supervised", "pbns",
+        ],
         more_methods=(
             *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
         ),

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.results import COLUMNS, ROLES, Row
+from benchmarks.results import AS_RIGHT, COLUMNS, ROLES, Row
 
 USABLE = ("ok", "stalled")
 SUITES = ("garments", "speed", "validation", "extremes", "performance")
@@ -100,6 +100,12 @@ class Run:
     def reference(self) -> str:
         """The name of the simulation that others are measured against; empty where it did not run."""
         return next(iter(self.with_role("reference")), "")
+
+    @property
+    def twins(self) -> list[str]:
+        """Simulations as right as the reference, those to another tolerance left out: they are a curve."""
+        families = set(AS_RIGHT) - {"simulation-tolerance"}
+        return [name for name, method in self.methods.items() if method.family in families]
 
     def label(self, method: str) -> str:
         return self.methods[method].label if method in self.methods else method

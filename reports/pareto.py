@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from benchmarks.results import AS_RIGHT
 from reports.data import Run
 from reports.means import means
 
@@ -18,7 +17,6 @@ ERRORS = (
     "gap/energy", "step/curvature", "step/distance", "curvature/error", "distance/rms", "curvature/histogram",
 )  # fmt: skip
 PLANES = {"gap/energy": "gap/refrozen"}  # what the reference leaves where its planes are searched at its end
-LOOSER = "simulation-tolerance"  # a family of simulations that is a curve of its own
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 
 
@@ -112,8 +110,7 @@ def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     The largest of simulations from moved starts and with planes searched twice; of the gap what the
     reference leaves on planes searched at its end. 0 where none is known.
     """
-    twins = [m.name for m in run.methods.values() if m.family in AS_RIGHT and m.family != LOOSER]
-    who, what = ([run.reference], PLANES[metric]) if metric in PLANES else (twins, metric)
+    who, what = ([run.reference], PLANES[metric]) if metric in PLANES else (run.twins, metric)
     kept = rows[rows["usable"] & (rows["metric"] == what) & rows["method"].isin(who)]["value"]
     return float(kept.max()) if len(kept) else 0.0
 

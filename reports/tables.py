@@ -41,12 +41,14 @@ def make_tables(run: Run) -> dict[str, Table]:
 
 
 def by_garment(run: Run, name: str) -> list[Table]:
-    """Means over the scenes of each garment in suite garments. Ablations beside their base stand apart."""
+    """Means over the scenes of each garment in suite garments. Ablations beside their base stand apart, and
+    simulations that are as right as the reference are what a number's uncertainty says.
+    """
     rows = run.worn[run.worn["table"] == name]
     place = {garment: place for place, garment in enumerate(run.garments(rows))}
     apart = {garment: run.standing_apart(own) for garment, own in rows.groupby("garment")}
     columns, lines = _pivot(run, _with_failed(run.worn, rows), rows, ("garment", "method"))
-    lines = [line for line in lines if line[1] not in apart[line[0]]]
+    lines = [line for line in lines if line[1] not in (*apart[line[0]], *run.twins)]
     lines.sort(key=lambda line: place[line[0]])
     title = name.replace("_", " ").capitalize()
     return table(
