@@ -102,6 +102,9 @@ def style(run: Run, method: str) -> Style:
 
 
 def leading(run: Run, methods: Iterable[str]) -> list[str]:
-    """In order; those of leading roles alone where there are more than a figure has room for."""
-    found = run.ordered(methods)
+    """In order; those of leading roles alone where there are more than a figure has room for.
+
+    Never the simulations that only say how uncertain the reference is.
+    """
+    found = run.ordered(set(methods) - set(run.twins))
     return found if len(found) <= ROOM else [name for name in found if run.methods[name].role in LEADING]

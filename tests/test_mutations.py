@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from faults import FAULTS, Fault
+from metric_faults import METRIC_FAULTS
 from witnesses import WITNESSES
 
 from benchmarks.validation.registry import KNOWN_ANSWERS
@@ -99,8 +100,49 @@ def test_a_fault_is_caught_by_the_check_made_for_it(fault, tmp_path):
     assert [name for name, _ in caught] == list(fault.fast)
 
 
+OF_METRICS = [(file, fault) for file, faults in METRIC_FAULTS.items() for fault in faults]
+
+
+def notices(file: str, fault: Fault | None, folder: Path) -> bool:
+    """Whether a test of tests/<file>.py fails on the copy with the fault."""
+    copy = planted(fault, folder)
+    shutil.copytree(ROOT / "tests", copy / "tests", ignore=shutil.ignore_patterns("__pycache__"))
+    environment = os.environ | {"PYTHONPATH": str(copy), "OMP_NUM_THREADS": "1"}
+    options = (
+        "-x",
+        "-q",
+        "-p",
+        "no:xdist",
+        "-p",
+        "no:cacheprovider",
+        "-o",
+        "addopts=",
+        "--rootdir",
+        str(copy),
+    )
+    command = [sys.executable, "-m", "pytest", *options, f"tests/{file}.py"]
+    done = subprocess.run(
+        command, cwd=copy, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode in (0, 1), done.stdout + done.stderr  # else nothing could be collected
+    return done.returncode == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", METRIC_FAULTS)
+def test_no_test_of_metrics_fails_where_nothing_is_planted(file, tmp_path):
+    assert not notices(file, None, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("file", "fault"), OF_METRICS, ids=[fault.title for _, fault in OF_METRICS])
+def test_a_fault_of_a_metric_is_noticed(file, fault, tmp_path):
+    assert notices(file, fault, tmp_path), f"{fault.title}: tests/{file}.py does not notice"
+
+
 def test_there_are_enough_faults_and_each_still_has_its_line():
     assert len({fault.title for fault in FAULTS}) == len(FAULTS) >= 20
-    lost = [f.title for f in FAULTS if f.right not in (ROOT / f.file).read_text(encoding="utf-8")]
+    every = [*FAULTS, *(fault for _, fault in OF_METRICS)]
+    lost = [f.title for f in every if f.right not in (ROOT / f.file).read_text(encoding="utf-8")]
     assert not lost
-    assert all(fault.right != fault.wrong for fault in FAULTS)
+    assert len(OF_METRICS) >= 12 and all(fault.right != fault.wrong for fault in every)
