@@ -81,8 +81,9 @@ class MethodEntry:
     needs_no_obstacle: whether it knows no contact. package: what it needs installed besides this project.
     truncated: whether it stops before the minimum on purpose, so that running out of iterations is its end.
     batched: whether it computes many bodies at once. gives_first_frame: whether it computes frame 0 too; a
-    simulator is given it. conserving: whether conservation laws are asked of it. role, family, level, base,
-    pairing_group: see benchmarks.results.Row.
+    simulator is given it. conserving: whether conservation laws are asked of it. timed: whether its costs are
+    asked for where those of the scene are. role, family, level, base, pairing_group: see
+    benchmarks.results.Row.
     """
 
     name: str
@@ -100,6 +101,7 @@ class MethodEntry:
     batched: bool = False
     gives_first_frame: bool = False
     conserving: bool = False
+    timed: bool = True
     role: str = "baseline"
     family: str = ""
     level: float | None = None

@@ -56,7 +56,7 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
             if status == "ok":
                 status, reason = measured.status, measured.reason or reason
             metrics = dict(measured.result)
-            if cell.scene.timed:
+            if cell.timed:
                 costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
                 metrics |= {**costs, **model_costs(cell, schedule, outcomes)}
                 reason = reason or remark

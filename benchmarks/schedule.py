@@ -60,11 +60,11 @@ class Schedule:
         yield from map(self.start, ({scene.name: scene for scene in others} | settled).values())
         yield from (self.data(m, garment) for garment in plan.simulated for m in self._train(garment))
         yield from map(self.network, plan.networks)
-        for scene, cells in groupby(plan.cells, key=lambda cell: cell.scene):
-            own = list(cells) if scene.timed else []
+        for _, cells in groupby(plan.cells, key=lambda cell: cell.scene):
+            own = [cell for cell in cells if cell.timed]
             for first in range(0, len(own), AT_ONCE):
                 yield from self.cells(own[first : first + AT_ONCE])
-        yield from (self.cell(cell) for cell in plan.cells if not cell.scene.timed)
+        yield from (self.cell(cell) for cell in plan.cells if not cell.timed)
         yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and self._has_reference(s))
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
         for network in dict.fromkeys(network_of(c) for c in plan.cells if SUITE in c.suites):
@@ -138,7 +138,7 @@ class Schedule:
         needs = (self.start(cell.scene).id,) if cell.scene.simulated else ()
         if network := network_of(cell):
             needs = (*needs, self.network(network).id)
-        kind, process = (RunCell, cell.name) if cell.scene.timed else (RunUntimedCell, "")
+        kind, process = (RunCell, cell.name) if cell.timed else (RunUntimedCell, "")
         return kind(
             name=cell.name, label=cell.label, cell=cell, needs=needs, process=process,
             batch="" if process else cell.scene.name, deadline=self.preset.cell_seconds,

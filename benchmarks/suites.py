@@ -10,7 +10,7 @@ from .methods.learned import LEARNED, RECIPE_DEVIATIONS
 from .plan import Motions
 from .presets import Preset
 from .scenes import GARMENT_SCENES
-from .scenes.further import OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
+from .scenes.further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
 from .scenes.further import SMALL as SMALL_OUT_OF_DISTRIBUTION
 
 
@@ -108,6 +108,15 @@ def _solvers(extent: Extent) -> list[str]:
     return [*references, *families, *OTHER_SOLVERS, *EXTERNAL, *FAST]
 
 
+# --- validation --------------------------------------------------------------------------------------------
+
+
+def _dependence(extent: Extent) -> list[str]:
+    """Meshes and steps of the preset; drapes of up to 16,000 vertices where scenes are named, or at paper."""
+    drapes = DRAPES if extent.further else ()
+    return [scene.name for scene in (*meshes_and_steps(extent.preset.dependence), *drapes)]
+
+
 # --- out of distribution ------------------------------------------------------------------------------------
 
 
@@ -124,7 +133,7 @@ SUITES = (
         scenes=_whole_motions,
         methods=lambda extent: ["simulation", "skinning", "untrained", "snug", "supervised", "pbns"],
         more_methods=(
-            *(entry.name for entry in LEARNED), *AGAIN, "lbfgs-5", "lbfgs-10",
+            *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
         ),
         named_methods=tuple(entry.name for entry in RECIPE_DEVIATIONS),
     ),
@@ -144,8 +153,9 @@ SUITES = (
     Suite(
         name="validation",
         description="physics with an exact answer: measured, expected, tolerance; other meshes and steps",
-        scenes=lambda extent: [scene.name for scene in meshes_and_steps(extent.preset.dependence)],
+        scenes=_dependence,
         methods=lambda extent: ["simulation", "skinning", "newton-1"],
+        more_methods=("simulation-printed-bending",),
     ),
     Suite(
         name="extremes",

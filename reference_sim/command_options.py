@@ -17,7 +17,7 @@ UNITS_OF_MATERIAL = {
     "poisson_ratio": ("NU", "Poisson's ratio, in (-1, 0.5]"),
     "thickness": ("M", "thickness [m]"),
     "density": ("KG_M3", "volume density [kg/m^3]; times the thickness it is the areal density"),
-    "bending_stiffness": ("J", "k of the hinge energy k/2 theta^2 [J]"),
+    "bending_stiffness": ("J", "k of the hinges [J]"),
 }
 EXAMPLES = """examples:
   python -m reference_sim.simulate sheet.obj --pins top --frames 90 -o sheet.vtkhdf
@@ -91,9 +91,10 @@ def make_parser() -> argparse.ArgumentParser:
         )
     material.add_argument(
         "--bending-scaling",
-        choices=("none", "length_area"),
-        default="none",
-        help="none: the paper's; length_area: times l^2/(4 A), less dependent on the mesh",
+        choices=("length_area", "none"),
+        default="length_area",
+        help="length_area: k/2 theta^2 times l^2/(4 (A1 + A2)) (default); none: as the SNUG paper prints it, "
+        "without",
     )
     material.add_argument(
         "--rest-angles", choices=("flat", "rest"), default="flat", help="hinges at rest (default flat)"

@@ -18,7 +18,7 @@ class Material:
         poisson_ratio: nu [1], in (-1, 0.5].
         thickness: t [m].
         density: rho [kg/m^3].
-        bending_stiffness: k of the hinge energy k/2 theta^2 [J].
+        bending_stiffness: k of the hinges [J], see BendHinge.
 
     The paper prints lambda = 20.9 and mu = 11.1 and multiplies them by a volume; the printed numbers are
     only consistent with E = 70 kPa, nu = 0.485 if they are membrane constants in N/m, thickness included.
@@ -44,6 +44,35 @@ class Material:
             raise ValueError(
                 f"Material.bending_stiffness = {self.bending_stiffness!r}: must be finite, at least 0 [J]"
             )
+
+    @classmethod
+    def from_lame(
+        cls,
+        *,
+        lame_lambda: float,
+        lame_mu: float,
+        thickness: float,
+        areal_density: float,
+        bending_stiffness: float,
+    ) -> Material:
+        """The material from the numbers that SNUG's code and the methods after it give.
+
+        Args:
+            lame_lambda, lame_mu: of plane stress, not yet times the thickness [Pa]: 44,400 and 23,600 there.
+            thickness: [m], 0.47e-3 there.
+            areal_density: [kg/m^2], 0.20022 there.
+            bending_stiffness: k of scaled hinges [J], 3.96e-5 there.
+
+        nu = lambda / (lambda + 2 mu), E = 2 mu (1 + nu). Raises ValueError as the class does.
+        """
+        poisson_ratio = lame_lambda / (lame_lambda + 2 * lame_mu)
+        return cls(
+            young_modulus=2 * lame_mu * (1 + poisson_ratio),
+            poisson_ratio=poisson_ratio,
+            thickness=thickness,
+            density=areal_density / thickness,
+            bending_stiffness=bending_stiffness,
+        )
 
     @property
     def lame_mu(self) -> float:

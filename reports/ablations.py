@@ -1,4 +1,4 @@
-"""Variants of a method beside their base: what the variation makes worse, and better."""
+"""Variants of a method beside their base, and how far the variation moves what."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pandas as pd
 
 from reports.data import Run
 from reports.means import mean_of, pair
-from reports.significance import difference
+from reports.significance import effect
 from reports.table import Cell, Column, Table, metric_column, table
 
 SHOWN = (
@@ -17,7 +17,7 @@ SHOWN = (
 )  # fmt: skip
 # A term that is left out of the loss is of course larger; the total is the base's own loss, curvature error
 # (the paper's measure) is nobody's.
-JUDGED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
+COMPARED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
 HEAD = (
     Column("garment", "Garment", text=True),
     Column("method", "Method", text=True, method=True, width="1fr"),
@@ -37,23 +37,22 @@ def ablations(run: Run) -> list[Table]:
     return table("ablations", (*HEAD, *columns), lines, caption, grouped_by=("garment",))
 
 
-def ablations_judged(run: Run) -> list[Table]:
-    """In which measures each ablation is worse or better than its base by more than seeds scatter."""
+def ablation_effects(run: Run) -> list[Table]:
+    """Each ablation over its base, or less its base, with intervals."""
+    metrics = [run.metrics[name] for name in COMPARED if name in run.metrics]
     lines: list[tuple[Cell, ...]] = []
     for garment, base, below, rows in _families(run):
         for method in below:
-            ways: dict[int, list[str]] = {1: [], -1: [], 0: []}
-            for name in JUDGED:
-                own, full = pair(rows, method, base, name) if name in run.metrics else (None, None)
-                if own is not None and full is not None:
-                    ways[difference(own, full)].append(f"{run.metrics[name].title}{own.fewer}")
-            lines.append((garment, method, ", ".join(ways[1]), ", ".join(ways[-1])))
-    words = [Column(way, f"{way.capitalize()} in", text=True, width="1fr") for way in ("worse", "better")]
+            pairs = [pair(rows, method, base, metric.name) for metric in metrics]
+            effects = [effect(one, full) if one and full else None for one, full in pairs]
+            lines.append((garment, method, *effects))
     caption = (
-        "Where each variant is worse or better than its base by more than seeds scatter, over the scenes "
-        "that both have."
+        "Each variant beside its base, over the scenes that both have: × the variant over the base, of "
+        "geometric means; where a value is not positive, the variant less the base."
     )
-    return table("ablations_judged", (*HEAD, *words), lines, caption, grouped_by=("garment",))
+    note = "Differences in the unit above. Below: 95 % intervals over motions and seeds, each for itself."
+    columns = (*HEAD, *map(metric_column, metrics))
+    return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)
 
 
 def _families(run: Run) -> Iterator[tuple[str, str, list[str], pd.DataFrame]]:

@@ -25,6 +25,11 @@ class Metric:
     table: str = ""
     lower_is_better: bool | None = None
 
+    @property
+    def heading(self) -> str:
+        """Its title, and its unit where it has one."""
+        return f"{self.title} [{self.unit}]" if self.unit not in ("", "1") else self.title
+
 
 @dataclass(frozen=True)
 class Method:
@@ -110,7 +115,7 @@ def run_data(config: Mapping[str, Any], rows: Sequence[Row]) -> Run:
     frame = pd.DataFrame.from_records(
         [[getattr(row, name) for name in COLUMNS] for row in rows], columns=list(COLUMNS)
     )
-    numbers = ["value", "expected", "tolerance", "level"]
+    numbers = [name for name in ("value", "expected", "tolerance", "level", "uncertainty") if name in frame]
     frame[numbers] = frame[numbers].astype(float)
     finite = frame["value"].abs() < float("inf")
     frame["usable"] = frame["status"].isin(USABLE) & finite

@@ -46,7 +46,7 @@ def document(
     garments = [part for name in declared for part in (name if name != MAIN else "", *FIGURES.get(name, ()))]
     sections = {
         "Garments on moving bodies": blocks(
-            *(name for name in garments if name != "speed"), "findings", "ablations", "ablations_judged"
+            *(name for name in garments if name != "speed"), "findings", "ablations", "ablation_effects"
         ),
         "Speed: error against run time": blocks("break_even", "crossings", "profile", "speed"),
         "Validation: known answers": blocks("validation") + _of_suite(run, tables, "validation"),
@@ -134,6 +134,5 @@ def _definitions(run: Run, tables: Iterable[Table]) -> list[dict[str, Any]]:
     groups: dict[str, list[list[str]]] = {}
     for metric in run.metrics.values():
         if metric.name in printed and metric.table and metric.definition:
-            unit = f" [{metric.unit}]" if metric.unit not in ("", "1") else ""
-            groups.setdefault(metric.table, []).append([f"{metric.title}{unit}", metric.definition])
+            groups.setdefault(metric.table, []).append([metric.heading, metric.definition])
     return [{"title": name.replace("_", " ").capitalize(), "pairs": pairs} for name, pairs in groups.items()]

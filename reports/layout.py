@@ -11,6 +11,7 @@ from reports.data import Run
 from reports.means import Mean
 from reports.numbers import DASH, aligned, duration, number
 from reports.plotting import Picture
+from reports.significance import Effect
 from reports.table import Cell, Column, Table
 
 Block = dict[str, Any]
@@ -20,6 +21,8 @@ MOST = 8  # columns of numbers that fit on a page; a wider table goes on below
 REMARKS = {
     "*": "* A mean over fewer scenes or seeds than in the other rows, for want of the rest.",
     "†": "† The solver left some frames unconverged.",
+    "‡": "‡ The interval is over seeds alone: there is one motion, or motions make no difference.",
+    "§": "§ The interval is over motions alone: there is no second seed, or seeds make no difference.",
 }
 NOISE = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
 
@@ -71,8 +74,8 @@ def _block(run: Run, table: Table) -> Block:
 def _note(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
     """What the table says of itself, of its spreads and of the marks in it."""
     remarks = [table.note] if table.note else []
-    if any(cell["spread"] for line in lines for cell in line):
-        means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
+    means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
+    if any(mean.spread for mean in means):
         seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
         lone = " Without it: one seed, or nothing random." if any(m.spread is None for m in means) else ""
         remarks.append(f"±: standard deviation over {' or '.join(map(str, seeds))} seeds.{lone}")
@@ -90,9 +93,9 @@ def _widths(columns: Sequence[Column]) -> list[str]:
 def _column_texts(
     run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]
 ) -> list[dict[str, str]]:
-    """Text, spread over seeds and marks for each cell of a column; `printed` are rows of others below."""
+    """Text, spread or interval, and marks for each cell of a column; `printed` are rows of others below."""
     texts = [*(_text(run, column, cell) for cell in cells), *printed]
-    texts = texts if column.text else aligned(texts)
+    texts = texts if column.text or column.mixed else aligned(texts)
     found = []
     for text, cell in zip(texts, [*cells, *[None] * len(printed)]):
         spread, mark = "", ""
@@ -100,11 +103,17 @@ def _column_texts(
             mark = ("" if cell.complete else "*") + ("†" if cell.stalled else "")
             if cell.spread:
                 spread = f"± {duration(cell.spread) if column.unit == 's' else number(cell.spread, 1)}"
+        elif isinstance(cell, Effect):
+            mark = ("" if cell.complete else "*") + {"seeds": "‡", "motions": "§"}.get(cell.covers, "")
+            spread = " to ".join("∞" if end == math.inf else number(end) for end in cell.interval or ())
         found.append({"text": text, "spread": spread, "mark": mark})
     return found
 
 
 def _text(run: Run, column: Column, cell: Cell) -> str:
+    if isinstance(cell, Effect):
+        sign = "×" if cell.ratio else "+" if cell.value > 0.0 else ""
+        return sign + number(cell.shown, column.digits)
     value = cell.value if isinstance(cell, Mean) else cell
     if isinstance(value, str):
         return (run.label(value) if column.method else value) or DASH

@@ -20,9 +20,10 @@ class Mean:
 
     `complete` says that every seed has every scene in which anybody has the metric; otherwise the mean is
     over fewer cells than its neighbours in a table, and the table must say so. `stalled` says that a solver
-    left some frames of some cell unconverged, `seeded` that another seed would give another value. `by_seed`:
-    the mean over scenes of each seed. `lost`: seeds of which nothing usable is left, as of a network that
-    diverged. `pairing_group`: means of one group are compared seed by seed; empty for none.
+    left some frames of some cell unconverged, `seeded` that another seed would give another value. `cells`:
+    the value of each (scene, seed). `lost`: seeds of which nothing usable is left, as of a network that
+    diverged. `pairing_group`: means of one group are compared seed by seed; empty for none. `uncertainty`: in
+    the metric's unit, how far another reference, as right as the one taken, would move it; None if unknown.
     """
 
     value: float
@@ -32,9 +33,10 @@ class Mean:
     complete: bool
     stalled: bool = False
     seeded: bool = True
-    by_seed: Mapping[int, float] = field(default_factory=dict, compare=False)
+    cells: Mapping[tuple[str, int], float] = field(default_factory=dict, compare=False)
     lost: int = 0
     pairing_group: str = field(default="", compare=False)
+    uncertainty: float | None = None
 
     @property
     def fewer(self) -> str:
@@ -50,36 +52,39 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     The keys hold "method" and "metric". In the order of the rows.
     """
     own = list(keys)
-    places, cells = ([key for key in own if key != name] for name in ("method", "metric"))
+    places, ends = ([key for key in own if key != name] for name in ("method", "metric"))
     tried = frame[frame["status"] != "skipped"]
     asked = tried.groupby(places)["scene"].nunique()
-    failed = tried[~tried["usable"]].groupby(cells)["seed"].agg(set)
-    usable = frame[frame["usable"]].assign(stalled=frame["status"] == "stalled")
+    failed = tried[~tried["usable"]].groupby(ends)["seed"].agg(set)
+    usable = frame.assign(stalled=frame["status"] == "stalled")[frame["usable"]]
     of_seed, of_all = (usable.groupby(names, sort=False) for names in ([*own, "seed"], own))
     seeds = of_seed["value"].mean()
-    by_seed: dict[tuple, dict[int, float]] = {}
-    for (*key, seed), value in seeds.items():  # type: ignore[misc]
-        by_seed.setdefault(tuple(key), {})[int(seed)] = float(value)
+    cells: dict[tuple, dict[tuple[str, int], float]] = {}
+    for *key, scene, seed, value in usable[[*own, "scene", "seed", "value"]].itertuples(index=False):
+        cells.setdefault(tuple(key), {})[scene, int(seed)] = float(value)
     across = seeds.groupby(own, sort=False)
+    unsure = of_all["uncertainty"].mean() if "uncertainty" in frame else [None] * len(cells)
     columns = (
         across.mean(), across.std(), of_seed.size().groupby(own, sort=False).min(), of_all["scene"].nunique(),
-        of_all["stalled"].any(), of_all["seeded"].any(), of_all["pairing_group"].first(),
+        of_all["stalled"].any(), of_all["seeded"].any(), of_all["pairing_group"].first(), unsure,
     )  # fmt: skip
     found = {}
-    for key, value, spread, fewest, scenes, stalled, seeded, pairing_group in zip(by_seed, *columns):
+    for key, value, spread, fewest, scenes, stalled, seeded, pairing_group, moved in zip(cells, *columns):
         group = dict(zip(own, key))
-        lost = failed.get(_key(group, cells), set()) - by_seed[key].keys()
+        own_seeds = {seed for _, seed in cells[key]}
+        lost = failed.get(_key(group, ends), set()) - own_seeds
         found[key] = Mean(
             value=float(value),
             spread=None if pd.isna(spread) else float(spread),
             scenes=int(scenes),
-            seeds=len(by_seed[key]),
+            seeds=len(own_seeds),
             complete=not lost and fewest == asked[_key(group, places)],
             stalled=bool(stalled),
             seeded=bool(seeded),
-            by_seed=by_seed[key],
+            cells=cells[key],
             lost=len(lost),
             pairing_group=pairing_group,
+            uncertainty=None if pd.isna(moved) else float(moved),
         )
     index = pd.MultiIndex.from_arrays([list(column) for column in zip(*found)] or [[]] * len(own), names=own)
     return pd.Series(list(found.values()), index=index, dtype=object)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from reports import tables
+from reports import claims, tables
 from reports.break_even import NETWORK, compared_scenes, cost_of, crossing, frames_text, rivals
 from reports.data import Run
 from reports.means import mean_of, pair, shared_scenes
@@ -30,6 +30,7 @@ def summary(run: Run) -> list[tuple[str, str]]:
         ("Run time", run_time(run, worn if has_network else cells[cells["scene"].isin(compared)])),
         ("Error against time", fronts(run, cells, compared)),
         ("When training pays", training_pays(run, cells, compared)),
+        ("Claims of the paper", claims.counts(run)),
         ("Known answers", checks(run).strip()),
         ("Not finished", trouble(run)),
     ]
@@ -80,8 +81,8 @@ def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
         if best is None:
             text += "nothing as fast as SNUG is nearer"
         else:
-            tie = " is nearer and no slower within repeats" if best.time > own.time else " beats SNUG"
-            text += f"{run.label(best.method)}{tie} ({_both(best)})"
+            within = " within repeats" if best.time > own.time else ""
+            text += f"{run.label(best.method)} is nearer and no slower{within} ({_both(best)})"
         text += f"; the fastest solver as near is {run.label(solver.method)}, " if solver else ""
         text += f"{number(solver.time)} ms." if solver else "."
     return text.strip()

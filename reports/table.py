@@ -16,8 +16,10 @@ from benchmarks.results import replacing
 from reports.data import Metric
 from reports.means import Mean
 from reports.numbers import CSV_DASH, csv_number
+from reports.significance import Effect
 
-Cell = float | int | str | Mean | None
+EFFECT_PARTS = ("kind", "low", "high", "covers")
+Cell = float | int | str | Mean | Effect | None
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,8 @@ class Column:
     """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
 
     text: words, set from the left; method: names of methods, printed by their labels. width: "auto", or a
-    share of the page's width as "1fr". digits: of its numbers; trim: without zeros at their end.
+    share of the page's width as "1fr". digits: of its numbers; trim: without zeros at their end; mixed: of
+    several units, whose decimal points need not stand in a column.
     """
 
     name: str
@@ -36,6 +39,7 @@ class Column:
     width: str = "auto"
     digits: int = 3
     trim: bool = False
+    mixed: bool = False
 
 
 @dataclass(frozen=True)
@@ -55,15 +59,21 @@ class Table:
     note: str = ""
 
     def write_csv(self, folder: Path) -> Path:
-        """Write <folder>/<name>.csv, whole or not at all. A mean with seeds gets a column for its spread."""
+        """Write <folder>/<name>.csv, whole or not at all.
+
+        A mean with seeds gets a column for its spread, an effect columns for what it is and its interval.
+        """
         path = folder / f"{self.name}.csv"
         texts: dict[str, list[str]] = {}
         for column, cells in zip(self.columns, zip(*self.rows)):
             title = f"{column.name} [{column.unit}]" if column.unit else column.name
-            texts[title] = [_csv_text(cell.value if isinstance(cell, Mean) else cell) for cell in cells]
+            texts[title] = [_csv_text(cell) for cell in cells]
             if any(isinstance(cell, Mean) for cell in cells):
                 spreads = [cell.spread if isinstance(cell, Mean) else None for cell in cells]
                 texts[f"{column.name}_spread"] = [csv_number(spread) for spread in spreads]
+            if any(isinstance(cell, Effect) for cell in cells):
+                parts = zip(*map(_parts_of_effect, cells))
+                texts |= {f"{column.name}_{part}": list(own) for part, own in zip(EFFECT_PARTS, parts)}
         with replacing(path) as temporary:
             pd.DataFrame(texts).to_csv(temporary, index=False, lineterminator="\n")
         return path
@@ -80,7 +90,20 @@ def table(
     return [Table(name, tuple(columns), tuple(rows), caption, **more)] if rows else []
 
 
-def _csv_text(cell: float | int | str | None) -> str:
+def _csv_text(cell: Cell) -> str:
+    if isinstance(cell, Mean):
+        return csv_number(cell.value)
+    if isinstance(cell, Effect):
+        return csv_number(cell.shown)
     if isinstance(cell, str):
         return cell or CSV_DASH
     return str(cell) if isinstance(cell, int) or cell == math.inf else csv_number(cell)
+
+
+def _parts_of_effect(cell: Cell) -> tuple[str, ...]:
+    """The texts of EFFECT_PARTS."""
+    if not isinstance(cell, Effect):
+        return (CSV_DASH,) * len(EFFECT_PARTS)
+    low, high = cell.interval or (None, None)
+    kind = "ratio" if cell.ratio else "difference"
+    return kind, csv_number(low), csv_number(high), cell.covers or CSV_DASH

@@ -14,8 +14,9 @@ import numpy as np
 import pandas as pd
 
 from reports import paper
-from reports.ablations import ablations, ablations_judged
+from reports.ablations import ablation_effects, ablations
 from reports.break_even import crossings
+from reports.claims import findings
 from reports.data import SUITES, Run
 from reports.means import means
 from reports.pareto import ERRORS, TIME
@@ -32,7 +33,7 @@ def make_tables(run: Run) -> dict[str, Table]:
     names = list(dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table))
     found = [made for name in names for made in (*by_garment(run, name), *by_scene(run, name))]
     for make in (
-        paper.findings, ablations, ablations_judged, crossings, speed, validation, extremes, unfinished,
+        findings, ablations, ablation_effects, crossings, speed, validation, extremes, unfinished,
         metrics,
     ):  # fmt: skip
         found += make(run)

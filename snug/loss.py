@@ -46,21 +46,24 @@ from snug.trainable_energies import find_energy
 STATIC = ("strain", "bending", "gravity")
 Planes = tuple[Any, Any] | Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-# What the terms STATIC are of each material.
-MATERIALS: dict[str, Callable[[Cloth], Sequence[Energy]]] = {
-    "stvk": lambda cloth: (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
-    "springs": lambda cloth: (StretchSpring(cloth), BendHinge(cloth), Gravity(cloth)),
-    "pbns": spring_terms,
-}
+MEMBRANES = {"stvk": StretchStVK, "springs": StretchSpring}
 
 
 def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
     """The recipe's terms of single frames without contact, by name: those of its material, then any other
     energy of the simulator that it names.
     """
-    of_material = dict(zip(STATIC, MATERIALS[recipe.material](cloth)))
+    of_material = dict(zip(STATIC, _terms_of_material(cloth, recipe)))
     terms = {name: of_material[name] for name in STATIC if name in recipe.terms}
     return terms | {name: find_energy(name)(cloth) for name in recipe.terms if name not in TERMS}
+
+
+def _terms_of_material(cloth: Cloth, recipe: Recipe) -> Sequence[Energy]:
+    """What the terms STATIC are."""
+    if recipe.material == "pbns":
+        return spring_terms(cloth)
+    membrane = MEMBRANES[recipe.material](cloth)
+    return membrane, BendHinge(cloth, scaling=recipe.bending), Gravity(cloth)
 
 
 def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:

@@ -53,6 +53,8 @@ class Recipe:
     material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
         (edges, hinges, uniform mass and squared contact of PBNS, see snug.baselines.springs; it has its own
         stiffness and margin of contact).
+    bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints them; of
+        no account with material `pbns`.
     detached: previous frames are given to inertia, not moved by it: without it a network makes its past agree
         with a still present instead of learning to move.
     pca_dynamics, pca_components, pretraining: weight, number of components and updates, see
@@ -88,6 +90,7 @@ class Recipe:
     mixed_lift: float = 1.0
     terms: tuple[str, ...] = TERMS
     material: str = "stvk"
+    bending: str = "length_area"
     detached: bool = False
     pca_dynamics: float = 0.0
     pca_components: int = 16
@@ -102,6 +105,7 @@ class Recipe:
             ("schedule", ("cosine", "epochs", "constant")),
             ("contact_samples", ("all", "vertices")),
             ("material", ("stvk", "springs", "pbns")),
+            ("bending", ("length_area", "none")),
         ):
             if getattr(self, option) not in allowed:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")

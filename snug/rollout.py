@@ -57,12 +57,14 @@ def ready_to_roll_out(
     betas: np.ndarray | None = None,
     *,
     kept: np.ndarray | None = None,
+    before: Any = None,
 ) -> Callable[[], Trajectory]:
     """What gives the trajectory of `roll_out` whenever it is called: all that comes before is done here.
 
-    kept: the frames that the trajectory holds, or None for all; every one is computed. Raises RollOutError.
+    kept: the frames that the trajectory holds, or None for all; every one is computed. before: as in
+    `predictions`. Raises RollOutError.
     """
-    frames = predictions(model, dressed, motion, betas)
+    frames = predictions(model, dressed, motion, betas, before=before)
     held = np.arange(motion.frames) if kept is None else kept
 
     def run() -> Trajectory:
@@ -138,23 +140,35 @@ def _trajectory(
 
 
 def predictions(
-    model: TrainedModel, dressed: DressedBody, motion: Any, betas: np.ndarray | None = None
+    model: TrainedModel,
+    dressed: DressedBody,
+    motion: Any,
+    betas: np.ndarray | None = None,
+    *,
+    before: Any = None,
 ) -> Callable[[], Iterator[np.ndarray]]:
     """What begins `roll_out` anew whenever it is called: its frames one at a time, (V, 3) [m], world,
     float64, each computed when asked for.
 
-    Inputs and joint transforms are made, and the network warmed up, before this returns. Raises RollOutError.
+    before: the motion until then, or None; it is known to the inputs, and the state that it leaves is the
+    first one. That, inputs and joint transforms are made, and the network warmed up, before this returns.
+    Raises RollOutError.
     """
-    features = _features(model, dressed, motion, betas)
+    features = _features(model, dressed, _joined(before, motion), betas)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
     transforms = dressed.transforms(motion.poses, betas)
+    past, features = features[: -motion.frames], features[-motion.frames :]
+    start = None
+    with torch.inference_mode():
+        for earlier in past:
+            _, start = model.network(earlier[None, None], start)
 
     @torch.inference_mode()
     def step(frame: int, state: Any) -> tuple[Tensor, Any]:
         offsets, state = model.network(features[frame][None, None], state)
         return skin(rest + offsets[0, 0], weights, transforms[frame]), state
 
-    return _one_by_one(step, dressed.pelvis(motion, betas))
+    return _one_by_one(step, dressed.pelvis(motion, betas), start)
 
 
 def skinned_frames(
@@ -172,23 +186,34 @@ def skinned_frames(
 
 
 def frame_inputs(
-    model: TrainedModel | None, dressed: DressedBody, motion: Any, betas: np.ndarray | None = None
+    model: TrainedModel | None,
+    dressed: DressedBody,
+    motion: Any,
+    betas: np.ndarray | None = None,
+    *,
+    before: Any = None,
 ) -> Callable[[int], tuple[Tensor | None, Tensor, np.ndarray]]:
     """What makes the inputs of one frame, as an application does, which has its pose and those before it.
 
     Features (D,), none without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: those of the frame
     that `predictions` and `skinned_frames` make for all frames at once. Raises RollOutError.
     """
+    whole = _joined(before, motion)
+    first = whole.frames - motion.frames
 
     def inputs(frame: int) -> tuple[Tensor | None, Tensor, np.ndarray]:
         now = motion.cut(frame, frame + 1)
         transforms, pelvis = dressed.transforms(now.poses, betas)[0], dressed.pelvis(now, betas)[0]
         if model is None:
             return None, transforms, pelvis
-        recent = motion.cut(max(frame - PAST, 0), frame + 1)
+        recent = whole.cut(max(first + frame - PAST, 0), first + frame + 1)
         return _features(model, dressed, recent, betas)[-1], transforms, pelvis
 
     return inputs
+
+
+def _joined(before: Any, motion: Any) -> Any:
+    return motion if before is None else before.followed_by(motion)
 
 
 def _features(
@@ -213,14 +238,14 @@ def _features(
 
 
 def _one_by_one(
-    step: Callable[[int, Any], tuple[Tensor, Any]], pelvis: np.ndarray
+    step: Callable[[int, Any], tuple[Tensor, Any]], pelvis: np.ndarray, start: Any = None
 ) -> Callable[[], Iterator[np.ndarray]]:
-    """What begins the frames anew, from no state: step(frame, state) gives vertices (V, 3) about the pelvis
-    (T, 3) and the next state. It is warmed up at once.
+    """What begins the frames anew, from the state `start`: step(frame, state) gives vertices (V, 3) about the
+    pelvis (T, 3) and the next state. It is warmed up at once.
     """
 
     def frames() -> Iterator[np.ndarray]:
-        state = None
+        state = start
         for frame, origin in enumerate(pelvis):
             vertices, state = step(frame, state)
             yield vertices.numpy().astype(np.float64) + origin

@@ -22,7 +22,7 @@ from snug.regressor import Regressor, parameter_megabytes
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.two_stage_regressor import TwoStageRegressor
 
-FORMAT = "snug-model-6"
+FORMAT = "snug-model-7"
 KEPT = ("seed", "steps", "seconds", "setup_seconds", "history", "summary")  # in the file as in the model
 
 

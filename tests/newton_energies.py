@@ -5,12 +5,12 @@ SolverVBD (evaluate_neo_hookean_membrane_force_hessian), per triangle of rest ar
 with tri_ke = mu and tri_ka = lambda [N/m]; its stress vanishes at rest, and its second derivatives there are
 those of StVK. Left out: its floor of 1e-10 under J. Constant chosen so that E = 0 at rest. Its bending
 (evaluate_dihedral_angle_based_bending_force_hessian) is edge_ke l0/2 theta^2: our BendHinge for
-edge_ke = k/l0. Damping 0.
+edge_ke = k s/l0, s = l0^2/(4 (A1 + A2)). Damping 0.
 
 SolverXPBD has no triangles. Its springs (solve_springs) are constraints |d| - l0 of compliance
 1/spring_ke, whose fixed point is the minimum of inertia + sum spring_ke/2 (|d| - l0)^2. Its bending
 (bending_constraint) moves vertices along the gradient of theta times twice the area of the triangle, so it
-has no exact energy; for edge_ke = k/(A1 + A2) it pulls as BendHinge does while triangles keep their area.
+has no exact energy; for edge_ke = k s/(A1 + A2) it pulls as BendHinge does while triangles keep their area.
 """
 
 from __future__ import annotations

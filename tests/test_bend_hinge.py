@@ -27,7 +27,8 @@ def hinge_at(phi: float) -> np.ndarray:
 
 
 def one_hinge(rest: float) -> BendHinge:
-    cloth = Cloth(hinge_at(0.0), np.array([(0, 1, 2), (1, 0, 3)]), Material(bending_stiffness=2.0))
+    # The edge has length 1 and each face half a square metre: scaled by 1/4, k is 2 J.
+    cloth = Cloth(hinge_at(0.0), np.array([(0, 1, 2), (1, 0, 3)]), Material(bending_stiffness=8.0))
     return BendHinge(cloth, rest_angles=rest)
 
 
@@ -71,9 +72,11 @@ def test_a_hinge_folded_flat_is_finite_and_the_same_in_both_forms():
     assert np.abs(expected).max() > 1.0 and close(gradient, expected, 1e-12)
 
 
-def test_length_area_scaling_is_the_rest_shape_of_the_hinge():
+def test_the_default_is_scaled_by_the_rest_shape_of_the_hinge_and_the_printed_form_by_nothing():
     cloth = curved_cloth()
-    plain, scaled = BendHinge(cloth), BendHinge(cloth, scaling="length_area")
+    plain, scaled = BendHinge(cloth, scaling="none"), BendHinge(cloth)
+    assert plain.stiffness == pytest.approx(cloth.material.bending_stiffness, rel=1e-15)
+    assert (plain.parameters()["scaling"], scaled.parameters()["scaling"]) == ("none", "length_area")
     x = cloth.rest_positions
     for h, (a, b, first, second) in enumerate(cloth.hinges):
         area = [np.linalg.norm(np.cross(x[b] - x[a], x[tip] - x[a])) / 2 for tip in (first, second)]
@@ -84,7 +87,7 @@ def test_length_area_scaling_is_the_rest_shape_of_the_hinge():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"scaling": "area"}, "choose one of none, length_area"),
+        ({"scaling": "area"}, "choose one of length_area, none"),
         ({"rest_angles": "flat"}, "give an array, a number or 'rest'"),
         ({"rest_angles": np.zeros(3)}, "shape|broadcast"),
     ],

@@ -14,6 +14,7 @@ from benchmarks.plan import Motions
 from benchmarks.presets import PRESETS, Dependence, find_preset
 from benchmarks.scenes import dependence as module
 from benchmarks.scenes import find_scene
+from benchmarks.scenes.further import DRAPES
 from benchmarks.selection import Request, choose
 from benchmarks.tasks.metrics import measured
 from snug.body import Body
@@ -89,9 +90,28 @@ def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
     assert {cell.scene.name for cell in found} == {
         *(f"dependence/mesh/{count}" for count in sizes.meshes),
         *(f"dependence/dt/{30 * count}" for count in sizes.substeps[1:]),
+        *(scene.name for scene in DRAPES if preset.further),
     }
-    assert {cell.method for cell in found} == {"simulation", "skinning", "newton-1"}
+    printed = {"simulation-printed-bending"} if preset.further else set()
+    assert {cell.method for cell in found} == {"simulation", "skinning", "newton-1"} | printed
     assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
+
+
+def test_drapes_of_each_size_and_family_run_where_they_are_named():
+    words = {"suites": ("validation",), "preset": find_preset("quick"), "motions": Motions()}
+    methods = ("simulation", "simulation-printed-bending")
+    found = choose(Request(**words, scenes=("dependence/drape/*",), methods=methods))[0]
+    assert {(cell.scene.name, cell.method) for cell in found} == {
+        (scene.name, method) for scene in DRAPES for method in methods
+    }
+    for scene in DRAPES[::4]:
+        made = scene.at(find_preset("smoke")).build()
+        x, faces = made.cloth.rest_positions, made.cloth.faces
+        assert abs(len(x) - int(scene.name.rpartition("/")[2])) < 0.05 * len(x)
+        normals = np.cross(x[faces[:, 1]] - x[faces[:, 0]], x[faces[:, 2]] - x[faces[:, 0]])
+        assert (normals[:, 1] > 0).all() and made.cloth.areas.sum() == pytest.approx(0.25)
+        inner = np.ptp(made.cloth.areas)
+        assert (inner < 1e-12) == ("union_jack" in scene.name)
 
 
 def test_no_network_meets_a_garment_that_it_was_not_trained_for():

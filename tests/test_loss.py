@@ -1,6 +1,8 @@
 """The loss is the simulator's energy, its fast backward is the derivative of the definition, and contact
 planes are where an independent search finds them."""
 
+from dataclasses import replace
+
 import igl
 import numpy as np
 import pytest
@@ -8,10 +10,11 @@ import torch
 from dressing import swaying, tube_dress
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
+from reference_sim.energies.bend_hinge import dihedral_angles
 from snug.contact import EXACT, PARTS, ContactCache, Patch, quantised
-from snug.loss import PhysicsLoss, make_contact, summed
+from snug.loss import PhysicsLoss, make_contact, static_terms, summed
 from snug.recipe import DEFAULT, Recipe
-from snug.recipes import PAPER, PBNS_SPRINGS
+from snug.recipes import PAPER, PBNS_SPRINGS, RECIPES
 from snug.skinning import skin
 
 DT = 1 / 30
@@ -100,6 +103,28 @@ def test_leaving_out_a_term_leaves_it_out():
     recipe = Recipe(terms=("strain", "collision"))
     terms = PhysicsLoss(dressed.cloth, recipe, dt=DT)(x, torch.zeros(1, 3, 3), (points, normals))
     assert set(terms) == {"strain", "collision"}
+
+
+@pytest.mark.parametrize("material", ["stvk", "springs"])
+def test_hinges_are_those_of_the_recipe(material):
+    dressed, x, *_ = posed_batch()
+    recipes = [
+        Recipe(terms=("bending",), material=material, bending=form) for form in ("length_area", "none")
+    ]
+    scaled, printed = (PhysicsLoss(dressed.cloth, r, dt=DT)(x, torch.zeros(1, 3, 3), None) for r in recipes)
+    angles = dihedral_angles(x[0, 0].numpy(), dressed.cloth.hinges)
+    k, lengths, areas = 3.96e-5, dressed.cloth.hinge_lengths, dressed.cloth.hinge_areas
+    assert float(printed["bending"][0, 0]) == pytest.approx(0.5 * k * angles @ angles, rel=1e-12)
+    scale = lengths**2 / (4 * areas)
+    assert float(scaled["bending"][0, 0]) == pytest.approx(0.5 * k * angles @ (scale * angles), rel=1e-12)
+    assert DEFAULT.bending == PAPER.bending == "length_area" != RECIPES["printed-bending"].bending
+
+
+def test_pbns_keeps_its_own_hinges():
+    cloth = tube_dress().cloth
+    forms = ("length_area", "none")
+    made = [static_terms(cloth, replace(PBNS_SPRINGS, bending=form))["bending"] for form in forms]
+    assert all((term.stiffness == 1e-4).all() for term in made)  # 5e-5 theta^2
 
 
 def test_paper_recipe_has_the_papers_contact():

@@ -20,6 +20,19 @@ def test_the_default_cotton_has_the_constants_that_the_paper_prints():
     assert cotton.bending_stiffness == pytest.approx(50 * E * t**3 / (12 * (1 - nu**2)), rel=2e-3)
 
 
+def test_the_numbers_of_later_methods_are_the_default_cotton():
+    given = {"lame_lambda": 44_400.0, "lame_mu": 23_600.0, "areal_density": 0.20022}
+    field = Material.from_lame(**given, thickness=0.47e-3, bending_stiffness=3.96e-5)
+    cotton = Material()
+    # Given with three digits; the density with all.
+    assert field.lame_lambda == pytest.approx(44_400 * 0.47e-3, rel=1e-14)
+    assert field.lame_mu == pytest.approx(23_600 * 0.47e-3, rel=1e-14)
+    assert cotton.lame_lambda / cotton.thickness == pytest.approx(44_400, abs=50)
+    assert cotton.lame_mu / cotton.thickness == pytest.approx(23_600, abs=50)
+    assert field.areal_density == pytest.approx(cotton.areal_density, rel=1e-14)
+    assert (field.thickness, field.bending_stiffness) == (cotton.thickness, cotton.bending_stiffness)
+
+
 def test_constants_of_a_material_with_round_numbers():
     # mu = 2 * 9 / (2 * 1.5) = 6, lambda = 2 * 9 * 0.5 / 0.75 = 12, E2 = E t = 18, nu2 = nu.
     m = Material(young_modulus=9.0, poisson_ratio=0.5, thickness=2.0, density=3.0, bending_stiffness=0.0)

@@ -220,6 +220,27 @@ def test_a_warm_started_solver_goes_on_from_skinning_and_has_its_time_on_the_clo
     assert warm.frame_fields["iterations"].tolist() == [0] + [1] * (scenes[BODY].frames - 1)
 
 
+def test_printed_bending_is_simulated_and_judged_by_the_scenes_own():
+    scene = small_scene("hanging_sheet", cells=4, frames=5)
+    entry = find_method("simulation-printed-bending")
+    made = entry.make(models=None, seed=0)
+    made.prepare(scene)
+    own, declared = made.scene.energies, scene.energies
+    k = scene.cloth.material.bending_stiffness
+    assert [term.name for term in own] == [term.name for term in declared] == ["strain", "bending", "gravity"]
+    assert (own[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
+    assert own[0] is declared[0] and own[2] is declared[2] and made.scene.start is scene.start
+    group = SceneRollOuts(scene)
+    group.roll_outs.append(RollOut(group, entry, made.run(), suites=("validation",)))
+    values = measured(group.roll_outs[0], ("energy",))[0]
+    x = group.roll_outs[0].positions
+    judged = np.mean([declared[1].value_and_gradient(frame)[0] for frame in x[2:]])
+    assert values["energy/bending"] == pytest.approx(judged, rel=1e-9)
+    # No uncertainty of the reference and no approximation of it: a variant that stands beside its base.
+    assert group.reference is None and group.find(role="reference-variant") is None
+    assert (entry.role, entry.base) == ("ablation", "simulation")
+
+
 def test_every_method_has_the_whole_protocol(tmp_path):
     for entry in METHODS:
         if entry.package is None:

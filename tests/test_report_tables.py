@@ -14,7 +14,7 @@ from test_cell_tasks import plan_of
 from benchmarks.rows import described
 from benchmarks.validation.registry import CASES
 from reports import numbers
-from reports.ablations import ablations, ablations_judged
+from reports.ablations import ablation_effects, ablations
 from reports.data import run_data
 from reports.document import document
 from reports.layout import table_blocks
@@ -45,7 +45,7 @@ def test_mean_and_spread_over_seeds():
     rows = [row(scene, seed=s, value=v) for scene in SCENES for s, v in ((0, 1.0), (1, 3.0), (2, 8.0))]
     mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
     assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), scenes=2, seeds=3, complete=True)
-    assert dict(mean.by_seed) == {0: 1.0, 1: 3.0, 2: 8.0}
+    assert dict(mean.cells) == {(scene, s): v for scene in SCENES for s, v in enumerate((1.0, 3.0, 8.0))}
     assert mean_of(run_of(rows[:1]).frame, "snug", "energy/strain", SCENES[:1]).spread is None
     assert mean_of(run_of(rows).frame, "snug", "energy/bending") is None
 
@@ -155,14 +155,19 @@ def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
     made = make_tables(run_of(rows))
     assert [line[1] for line in made["energies"].rows] == ["snug"]
     assert [line[1] for line in made["ablations"].rows] == ["snug", "snug-no-noise", "snug-window6"]
-    captions = made["ablations"].caption + made["ablations_judged"].caption
+    captions = made["ablations"].caption + made["ablation_effects"].caption
     assert "recipe" not in captions and "ingredient" not in captions  # a variant may have more of it
     full = made["ablations"].rows[0]
     assert full[-1] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, complete=True)
-    assert made["ablations_judged"].rows == (
-        ("tshirt", "snug-no-noise", "Total", "Drift"),
-        ("tshirt", "snug-window6", "", ""),
-    )
+    lines = {line[1]: line[2:] for line in made["ablation_effects"].rows}
+    assert list(lines) == ["snug-no-noise", "snug-window6"]
+    total, drift = lines["snug-no-noise"]
+    assert total.shown == pytest.approx((2.0 * 2.2 * 2.4 / (1.0 * 1.1 * 1.2)) ** (1 / 3))
+    assert total.interval[0] > 1.0 > drift.interval[1] and total.covers == "seeds"
+    assert lines["snug-window6"][1] is None
+    # They are described: no word says which of them is better.
+    (block,) = table_blocks(run_of(rows), made["ablation_effects"])
+    assert not re.search("better|worse|significant", json.dumps(block))
 
 
 def test_without_the_full_recipe_ablations_stand_in_the_other_tables():
@@ -171,16 +176,17 @@ def test_without_the_full_recipe_ablations_stand_in_the_other_tables():
     full = [row(metric=r.metric) for r in rows]
     assert [line[1] for line in make_tables(run_of(rows))["energies"].rows] == ["snug-springs"]
     assert [line[1] for line in make_tables(run_of([*rows, *full]))["energies"].rows] == ["snug"]
-    assert ablations(run_of(rows)) == ablations_judged(run_of(rows)) == ablations(run_of(full)) == []
+    assert ablations(run_of(rows)) == ablation_effects(run_of(rows)) == ablations(run_of(full)) == []
 
 
 def on_two_scenes(method, *values, metric="energy/total"):
     return [row(scene, method, metric, value) for scene, value in zip(SCENES, values)]
 
 
-def test_ablations_are_judged_over_the_scenes_that_both_have():
+def test_ablations_are_compared_over_the_scenes_that_both_have():
     run = run_of(on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("snug-no-noise", 2.0))
-    assert ablations_judged(run)[0].rows == (("tshirt", "snug-no-noise", "Total (1 scene only)", ""),)
+    (line,) = ablation_effects(run)[0].rows
+    assert line[2].shown == pytest.approx(2.0) and not line[2].complete
     assert [line[2].value for line in ablations(run)[0].rows] == [5.0, 2.0]
 
 

@@ -53,6 +53,21 @@ def test_predictions_are_the_roll_out_a_frame_when_it_is_asked_for():
         assert np.array_equal([first, *frames], run.positions)
 
 
+@pytest.mark.parametrize("kind", ["snug", "dynamic", "pbns"])
+def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model(kind, dressed, [motion], seed=2)
+    whole = roll_out(model, dressed, motion).positions[5:]
+    before, rest = motion.cut(0, 5), motion.cut(5, motion.frames)
+    begin = predictions(model, dressed, rest, before=before)
+    for _ in range(2):
+        assert np.abs(np.array(list(begin())) - whole).max() < 1e-6
+    forgetful = np.array(list(predictions(model, dressed, rest)()))
+    assert kind == "pbns" or np.abs(forgetful - whole).max() > 1e-5
+    make, known = frame_inputs(model, dressed, motion), frame_inputs(model, dressed, rest, before=before)
+    assert torch.allclose(known(0)[0], make(5)[0], atol=1e-6)
+
+
 def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_computed_too():
     computed = []
 

@@ -1,99 +1,218 @@
-"""When two means are called different: by a test of scipy.stats, or by a share where nothing was repeated."""
+"""Effects, their intervals and p-values over motions and seeds, and Holm's correction, by known answers."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from report_folder import row, run_of
 from scipy import stats
 
-from reports.means import mean_of
-from reports.significance import TIE, difference, p_value, relative_difference
+from reports import significance
+from reports.means import Mean, mean_of, pair
+from reports.significance import TIE, effect, holm, within_uncertainty
 
 
-def mean_of_seeds(values, method="snug"):
-    rows = [row(method=method, value=value, seed=k) for k, value in enumerate(values)]
+def mean_over(grid, method="snug"):
+    """Of rows with the values grid[motion][seed]."""
+    rows = [
+        row(f"tshirt/{m}", method, value=float(value), seed=s)
+        for m, values in enumerate(np.atleast_2d(grid))
+        for s, value in enumerate(values)
+    ]
     mean = mean_of(run_of(rows).frame, method, "energy/strain")
     assert mean is not None
     return mean
 
 
-ONE = (1.0, 1.3, 1.1)
+ONE = np.array((1.0, 1.3, 1.1))
+LESS = ONE * (0.98, 0.985, 0.975)  # 2 % below with every seed, between which there are 30 %
+NOISE = 0.02  # relative, of an error that 10,000 draws estimate; three standard deviations
 
 
-@pytest.mark.parametrize("shift", [0.1, 0.4, 0.5, 0.9])
-def test_two_networks_are_told_apart_by_welchs_test(shift):
-    """Of the numbers themselves where one is not positive: t_{.975, nu} sqrt(s1^2/n1 + s2^2/n2) by hand."""
-    one, other = np.array(ONE) - 1.2, np.array((0.9, 1.5, 1.0, 1.1)) + shift - 1.2
+def t_interval(value, error, freedom):
+    return value + stats.t.ppf((0.025, 0.975), freedom) * error
+
+
+def test_of_one_motion_the_interval_is_welchs_over_seeds():
+    """Numbers that are not all positive: sqrt(s1^2/n1 + s2^2/n2) and its degrees of freedom by hand."""
+    one, other = ONE - 1.2, np.array((0.9, 1.5, 1.0, 1.1)) - 0.7
     parts = [values.var(ddof=1) / len(values) for values in (one, other)]
     freedom = sum(parts) ** 2 / sum(part**2 / (len(v) - 1) for part, v in zip(parts, (one, other)))
-    threshold = stats.t.ppf(0.975, freedom) * math.sqrt(sum(parts))
-    apart = other.mean() - one.mean()
-    expected = 0 if abs(apart) <= threshold else -int(np.sign(apart))
-    assert difference(mean_of_seeds(one), mean_of_seeds(other, "pbns")) == expected
+    found = effect(mean_over(one), mean_over(other, "pbns"))
+    assert not found.ratio and found.covers == "seeds" and found.shown == one.mean() - other.mean()
+    assert found.freedom == pytest.approx(freedom, rel=3 * NOISE)
+    low, high = t_interval(found.shown, math.sqrt(sum(parts)), found.freedom)
+    assert found.interval == pytest.approx((low, high), abs=NOISE * (high - low))
+
+
+def test_of_one_seed_the_interval_is_of_pairs_of_motions():
+    """Motions are drawn for both at once, so what one of them asks of both is no scatter."""
+    one, other = np.array([[0.1], [5.0], [-3.0], [9.0]]), np.array([[0.0], [4.8], [-3.2], [8.9]])
+    apart = (one - other).ravel()
+    found = effect(mean_over(one), mean_over(other, "pbns"))
+    low, high = t_interval(apart.mean(), apart.std(ddof=1) / 2.0, 3)
+    assert found.covers == "motions" and found.freedom == pytest.approx(3.0)
+    assert found.interval == pytest.approx((low, high), abs=NOISE * (high - low))
+
+
+def test_seeds_of_a_pairing_group_are_drawn_at_once_and_others_by_themselves():
+    alike = effect(mean_over(LESS, "snug-no-inertia"), mean_over(ONE))
+    logs = np.log(LESS) - np.log(ONE)
+    low, high = np.exp(t_interval(logs.mean(), logs.std(ddof=1) / math.sqrt(3.0), 2))
+    assert alike.interval == pytest.approx((low, high), rel=NOISE) and alike.p_value() < 0.05
+    later = [row(method="snug-no-inertia", value=v, seed=k) for k, v in enumerate(LESS, 1)]
+    later = mean_of(run_of(later).frame, "snug-no-inertia", "energy/strain")
+    for other in (mean_over(LESS, "pbns"), mean_over([*LESS, 1.1], "snug-no-inertia"), later):
+        assert effect(other, mean_over(ONE)).p_value() > 0.5  # other networks and seeds draw other numbers
+    rows = [row(method="snug-no-inertia", value=LESS[k], seed=k) for k in (2, 0, 1)]
+    turned = mean_of(run_of(rows).frame, "snug-no-inertia", "energy/strain")
+    assert effect(turned, mean_over(ONE)) == alike  # by their number, not their order
 
 
 @pytest.mark.parametrize(("method", "freed"), [("simulation", 1 / 3), ("pbns", 1 + 1 / 3)])
 def test_one_number_beside_several_seeds(method, freed):
     """What no seed changes is a known number; what could have seeds is one draw more of the same scatter."""
-    several = mean_of_seeds(np.array(ONE) - 1.2)
-    threshold = stats.t.ppf(0.975, 2) * several.spread * math.sqrt(freed)
-    for share, expected in ((0.99, 0), (1.01, 1)):
-        one = mean_of_seeds((several.value + share * threshold,), method)
-        assert difference(one, several) == expected and difference(several, one) == -expected
+    found = effect(mean_over([[-0.4]], method), mean_over(ONE - 1.2))
+    half = stats.t.ppf(0.975, 2) * ONE.std(ddof=1) * math.sqrt(freed)
+    assert found.interval[1] - found.interval[0] == pytest.approx(2.0 * half, rel=NOISE)
+    assert found.freedom == pytest.approx(2.0)
 
 
-def test_where_no_seeds_tell_it_the_scatter_is_a_share():
-    for other, expected in ((1.0 - 1.01 * TIE, 1), (1.0 - 0.99 * TIE, 0)):
-        assert difference(mean_of_seeds((1.0,)), mean_of_seeds((other,), "pbns")) == expected
-    assert p_value(mean_of_seeds((1.0,)), mean_of_seeds((1.0,), "pbns")) is None
-    # Two that give the same with every seed have no scatter at all.
-    assert difference(mean_of_seeds((1.0, 1.0)), mean_of_seeds((1.001, 1.001), "pbns")) == -1
-    assert difference(mean_of_seeds((1.0, 1.0)), mean_of_seeds((1.0, 1.0), "pbns")) == 0
+def random_means(random, motions, seeds, spread, paired):
+    """Two means of a crossed design: what a motion asks of both, and of each; seeds; and a rest."""
+    shared = random.normal(0.0, 5.0, (motions, 1))
+    shapes = {"motions": (motions, 1), "seeds": (1, seeds), "rest": (motions, seeds)}
+    means = []
+    for name in ("one", "other"):
+        parts = (random.normal(0.0, spread[part], shape) for part, shape in shapes.items())
+        grid = sum(parts, shared)
+        cells = {(str(m), s): float(grid[m, s]) for m in range(motions) for s in range(seeds)}
+        group = "both" if paired else name
+        means.append(Mean(float(grid.mean()), None, motions, seeds, True, cells=cells, pairing_group=group))
+    return means
 
 
-def test_positive_numbers_are_told_apart_by_their_factors():
-    sound, broken = mean_of_seeds((0.36, 0.35, 0.37)), mean_of_seeds((1e7, 2e3, 6e6), "pbns")
-    values = [[*mean.by_seed.values()] for mean in (sound, broken)]
-    assert stats.ttest_ind(*values, equal_var=False).pvalue > 0.05  # the spread of what broke hides it
-    assert difference(sound, broken) == -1 and difference(broken, sound) == 1
-    factor = np.log(values[0]).mean() - np.log(values[1]).mean()
-    assert relative_difference(sound, broken) == pytest.approx(np.exp(factor) - 1)
-    for shift in (0.05, 0.1, 0.2, 0.3, 0.4, 0.5):
-        one, other = mean_of_seeds(ONE), mean_of_seeds((0.9 + shift, 1.5 + shift, 1.0 + shift), "pbns")
-        logs = [np.log([*mean.by_seed.values()]) for mean in (one, other)]
-        p = stats.ttest_ind(*logs, equal_var=False).pvalue
-        assert bool(difference(one, other)) == (p < 0.05)
+def covered(paired, spread, times=400):
+    random = np.random.default_rng(3)
+    intervals = [effect(*random_means(random, 4, 3, spread, paired)).interval for _ in range(times)]
+    return np.mean([low <= 0.0 <= high for low, high in intervals])
 
 
-def test_other_numbers_are_told_apart_by_their_difference():
-    one, other = mean_of_seeds((-0.1, 0.1, 0.0)), mean_of_seeds((1.0, 1.2, 1.1), "pbns")
-    assert difference(one, other) == -1
-    assert relative_difference(one, other) == pytest.approx(-1.0)
-    nothing = mean_of_seeds((0.0,), "simulation")
-    assert relative_difference(other, nothing) is None
-    assert difference(other, nothing) == 1 and difference(one, nothing) == 0
-    assert difference(nothing, mean_of_seeds((0.0,), "pbns")) == 0
+@pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.parametrize("spread", [(1.0, 1.0, 0.0), (1.0, 0.3, 0.3), (0.3, 1.0, 0.3)])
+def test_of_four_motions_and_three_seeds_95_percent_of_the_intervals_hold_the_truth(
+    paired, spread, monkeypatch
+):
+    spread = dict(zip(("motions", "seeds", "rest"), spread))
+    assert 0.90 <= covered(paired, spread) <= 0.98
+    if spread["seeds"] == 1.0:
+        return
+    # Seeds alone cover too little where motions scatter.
+    weights = significance._weights
+    monkeypatch.setattr(
+        significance, "_weights", lambda n, s: np.full((10_000, n), 1.0 / n) if s == 0 else weights(n, s)
+    )
+    assert covered(paired, spread) < 0.9
 
 
-def test_what_a_pairing_group_draws_alike_is_no_scatter_between_its_methods():
-    """Every seed is 2 % better without the ingredient; between the seeds there are 30 %."""
-    full, less = (1.0, 1.3, 1.1), (0.98, 1.275, 1.077)
-    own = mean_of_seeds(full)
-    assert difference(mean_of_seeds(less, "snug-no-inertia"), own) == -1
-    assert p_value(mean_of_seeds(less, "snug-no-inertia"), own) == stats.ttest_rel(less, full).pvalue
-    share = relative_difference(mean_of_seeds(less, "snug-no-inertia"), own)
-    assert share == pytest.approx(np.expm1((np.log(less) - np.log(full)).mean()))
-    assert difference(mean_of_seeds(less, "snug+cleanup"), own) == -1
-    # Other networks draw other numbers, and so do other seeds.
-    assert difference(mean_of_seeds(less, "pbns"), own) == 0
-    assert difference(mean_of_seeds((*less, 1.1), "snug-no-inertia"), own) == 0
-    assert difference(mean_of_seeds(full, "snug-no-inertia"), own) == 0
+def test_the_same_numbers_give_the_same_interval_and_the_interval_agrees_with_the_p_value():
+    random = np.random.default_rng(5)
+    spread = {"motions": 1.0, "seeds": 1.0, "rest": 0.2}
+    signs = set()
+    for _ in range(40):
+        one, other = random_means(random, 4, 3, spread, True)
+        found = effect(one, other)
+        low, high = found.interval
+        signs.add(found.p_value() < 0.05)
+        assert (found.p_value() < 0.05) == (not low <= float(found.ratio) <= high)
+    assert signs == {True, False}
+    significance._weights.cache_clear()
+    assert effect(one, other) == found
 
 
-def test_the_order_of_the_seeds_does_not_pair_them():
-    rows = [row(method="snug-no-inertia", value=v, seed=k) for k, v in ((2, 1.077), (0, 0.98), (1, 1.275))]
-    turned = mean_of(run_of(rows).frame, "snug-no-inertia", "energy/strain")
-    assert difference(turned, mean_of_seeds((1.0, 1.3, 1.1))) == -1
+def test_positive_numbers_are_compared_by_their_factors():
+    sound, broken = mean_over((0.36, 0.35, 0.37)), mean_over((1e7, 2e3, 6e6), "pbns")
+    found = effect(sound, broken)
+    logs = [np.log([*mean.cells.values()]) for mean in (sound, broken)]
+    assert found.ratio and found.shown == pytest.approx(np.exp(logs[0].mean() - logs[1].mean()))
+    assert found.p_value() < 0.05  # though the spread of what broke is larger than the difference
+    low, high = found.interval
+    assert 0.0 < low < found.shown < high < 1.0
+    back = effect(broken, sound)
+    assert np.log(back.interval) == pytest.approx(-np.log((high, low)), rel=3 * NOISE)
+    # A claimed factor lies on the interval's end where its p-value is the level.
+    assert found.p_value(factor=1.0 / high) == pytest.approx(0.05)
+    assert found.p_value(factor=1.01 / high) > 0.05 > found.p_value(factor=0.99 / high)
+    assert not effect(mean_over((0.0, 1.0)), mean_over((1.0, 1.0), "pbns")).ratio
+
+
+def test_where_nothing_is_repeated_there_is_no_interval_and_no_p_value():
+    for other, equal in ((1.0 - 1.01 * TIE, False), (1.0 - 0.99 * TIE, True)):
+        found = effect(mean_over(1.0), mean_over(other, "pbns"))
+        assert found.interval is None and found.p_value() is None and found.covers == ""
+        assert found.equal() == equal
+    assert effect(mean_over(0.0), mean_over(0.0, "pbns")).equal()
+    assert not effect(mean_over(0.0), mean_over(1e-9, "pbns")).equal()
+
+
+def test_what_is_the_same_with_every_motion_was_not_repeated():
+    """A training has one time, whatever the motions that its network is tested on; a size is one number."""
+    times = [np.repeat([values], 4, axis=0) for values in (ONE, 50.0 * ONE)]
+    several = effect(mean_over(times[0]), mean_over(times[1], "pbns"))
+    alone = effect(mean_over(times[0][:1]), mean_over(times[1][:1], "pbns"))
+    assert several.covers == "seeds" and several.interval == pytest.approx(alone.interval, rel=1e-9)
+    for cut in (np.s_[:, :1], np.s_[:, [0, 0, 0]]):
+        found = effect(mean_over(times[0][cut]), mean_over(times[1][cut], "pbns"))
+        assert (found.covers, found.interval, found.p_value()) == ("", None, None)
+
+
+def test_what_every_motion_repeats_exactly_is_certain():
+    twice = effect(mean_over([[1.0], [2.0], [4.0]]), mean_over([[2.0], [4.0], [8.0]], "pbns"))
+    assert twice.covers == "motions" and twice.interval == pytest.approx((0.5, 0.5))
+    assert twice.p_value() == pytest.approx(0.0)
+    same = mean_over([[1.0], [2.0], [4.0]])
+    assert effect(same, replace(same, pairing_group="")).p_value() == 1.0
+
+
+def test_equal_is_what_lies_in_the_tie_with_all_of_its_interval():
+    near, wide = 1.0 + np.array((-0.001, 0.0, 0.001)), 1.0 + np.array((-0.3, 0.0, 0.3))
+    assert effect(mean_over(near), mean_over(near[::-1], "pbns")).equal()
+    assert not effect(mean_over(wide), mean_over(wide[::-1], "pbns")).equal()
+    hundredth = effect(mean_over(near / 100.0), mean_over(near, "pbns"))
+    assert hundredth.equal(factor=100.0) and not hundredth.equal()
+
+
+def test_holm_by_hand():
+    """Four tests: the least times 4, the next times 3 ...; never less than one before it, never above one."""
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.6, 0.9]) == [1.0, 1.0] and holm([0.04]) == [0.04] and holm([]) == []
+    # Bonferroni's first step, then larger levels: 11 of 12 at .004 each would all stay, at .0045 none.
+    assert max(holm([0.004] * 12)) < 0.05 < min(holm([0.0045] * 12))
+
+
+def test_over_scenes_and_seeds_that_are_left_in_both():
+    """A seed that diverged is in no mean; scenes that one of the two lacks are in neither."""
+    rows = [row(f"tshirt/{m}", value=1.0 + m + 0.1 * s, seed=s) for m in range(3) for s in range(3)]
+    rows += [row(f"tshirt/{m}", "pbns", value=2.0 + m + 0.1 * s, seed=s) for m in range(2) for s in range(2)]
+    rows += [row("tshirt/0", "pbns", value=None, seed=2, status="diverged", reason="no end")]
+    one, other = pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
+    assert set(one.cells) == {(f"tshirt/{m}", s) for m in range(2) for s in range(3)}
+    assert set(other.cells) == {(f"tshirt/{m}", s) for m in range(2) for s in range(2)} and other.lost == 1
+    found = effect(one, other)
+    assert found.covers == "motions and seeds" and not found.complete
+    rows = [r for r in rows if r.scene != "tshirt/2"]
+    one, other = pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
+    assert one.complete and not effect(one, other).complete and not effect(other, one).complete
+
+
+def test_a_difference_within_what_another_reference_would_change():
+    rows = [row(method=method, value=v) for method, v in (("snug", 1.0), ("pbns", 1.3))]
+    frame = run_of(rows).frame
+    assert not within_uncertainty(*pair(frame, "snug", "pbns", "energy/strain"))  # nobody measured it
+    for moved, within in ((0.1, False), (0.2, True)):
+        one, other = pair(frame.assign(uncertainty=moved), "snug", "pbns", "energy/strain")
+        assert one.uncertainty == moved and within_uncertainty(one, other) == within
+        assert not within_uncertainty(one, other, factor=3.0)

@@ -135,11 +135,11 @@ def test_options_reach_the_simulation(folder):
         "--poisson-ratio",
         "0.3",
     ]
-    bending = ["--bending-stiffness", "1e-5", "--bending-scaling", "length_area", "--rest-angles", "rest"]
+    bending = ["--bending-stiffness", "1e-5", "--bending-scaling", "none", "--rest-angles", "rest"]
     assert main([*words, *material, *bending, "--tolerance", "1e-8", "--quiet", "-o", "a.vtkhdf"]) == 0
     made = Trajectory.load("a.vtkhdf").provenance
     assert (made["dt_s"], made["substeps"], made["options"]["tolerance"]) == (1 / 60, 2, 1e-8)
-    assert made["terms"]["bending"]["scaling"] == "length_area"
+    assert made["terms"]["bending"]["scaling"] == "none"
     assert list(made["material"].values()) == [50e3, 0.3, 0.001, 300.0, 1e-5]
 
 

@@ -34,7 +34,8 @@ class CleanedNetwork(Method):
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         body, garment = scene.dressed.body, scene.dressed.garment
         self.dressed = DressedBody(body, garment)
-        self.frames = predictions(self.model, self.dressed, self.motion, self.betas)
+        before = scene.dressed.before
+        self.frames = predictions(self.model, self.dressed, self.motion, self.betas, before=before)
         positions = np.asarray(scene.obstacle.positions)
         self.clean = CleanUp(garment.rest_positions, body.shaped(), body.faces, positions)
         for frame in range(min(WARM_UP, self.motion.frames)):
@@ -63,7 +64,7 @@ class CleanedNetwork(Method):
         from snug.rollout import frame_inputs
 
         assert scene.dressed is not None
-        own = frame_inputs(self.model, self.dressed, self.motion, self.betas)
+        own = frame_inputs(self.model, self.dressed, self.motion, self.betas, before=scene.dressed.before)
         body = posed_body(scene.dressed)
         return lambda frame: (own(frame), body(frame))
 

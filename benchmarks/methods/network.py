@@ -30,7 +30,9 @@ class Network(Method):
         self.model = TrainedModel.load(self.path)
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.frames = ready_to_roll_out(self.model, self.dressed, self.motion, self.betas, kept=scene.kept)
+        self.frames = ready_to_roll_out(
+            self.model, self.dressed, self.motion, self.betas, kept=scene.kept, before=scene.dressed.before
+        )
 
     def run(self) -> Trajectory:
         return self.frames()
@@ -39,7 +41,8 @@ class Network(Method):
         """Features and joint transforms."""
         from snug.rollout import frame_inputs
 
-        return frame_inputs(self.model, self.dressed, self.motion, self.betas)
+        assert scene.dressed is not None
+        return frame_inputs(self.model, self.dressed, self.motion, self.betas, before=scene.dressed.before)
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
         """What computes so many bodies in this motion at once when called: (T, copies, V, 3) [m]."""

@@ -4,10 +4,11 @@ How our material becomes newton's (its units are SI; tri_ and edge_ parameters a
     particle mass   our lumped mass; 0 at pins, which makes a particle kinematic
     gravity         (0, -9.81, 0) m/s^2
     tri_ke, tri_ka  mu, lambda of the membrane [N/m]                       VBD
-    edge_ke         k / l0 [J/m], k / (A1 + A2) [J/m^2] per inner edge      VBD, XPBD
+    edge_ke         k s / l0 [J/m], k s / (A1 + A2) [J/m^2] per inner edge  VBD, XPBD
     spring_ke       E2 (A1 + A2) / l0^2 [N/m] per edge                     XPBD, which ignores triangles
     damping, drag, lift, particle radius, contacts: 0, none
-So VBD's membrane is stable Neo-Hookean, close to ours at small strain and not at large, and XPBD has springs.
+with s = l0^2 / (4 (A1 + A2)). So VBD's membrane is stable Neo-Hookean, close to ours at small strain and not
+at large, and XPBD has springs.
 Sub-steps are those of newton's examples: a frame is not the minimum of one step of ours, and its energy gap
 says so. Copies into and out of newton are on the clock.
 """
@@ -147,8 +148,10 @@ def build_model(cloth: Cloth, solver: str) -> Any:
     edges = np.array(builder.edge_indices)
     rest_angle = builder.edge_rest_angle
     rest_angle[:] = [0.0] * len(rest_angle)  # what BendHinge takes by default
-    scale = np.array(builder.edge_rest_length) if solver == "VBD" else _two_areas(cloth, edges)
-    stiffness = np.where((edges >= 0).all(axis=1), cloth.material.bending_stiffness / scale, 0.0)
+    length, areas = np.array(builder.edge_rest_length), _two_areas(cloth, edges)
+    stiffness = cloth.material.bending_stiffness * length**2 / (4 * areas)  # and this
+    stiffness = stiffness / (length if solver == "VBD" else areas)
+    stiffness = np.where((edges >= 0).all(axis=1), stiffness, 0.0)
     builder.edge_bending_properties[:] = [(float(ke), 0.0) for ke in stiffness]
     if solver == "XPBD":
         for (i, j), ke in zip(cloth.edges.tolist(), spring_stiffness(cloth)):

@@ -78,13 +78,13 @@ class WarmStarted(Method):
         from snug.trained_model import TrainedModel
 
         assert scene.dressed is not None
-        motion, betas = scene.dressed.motion, scene.dressed.betas
+        motion, betas, before = scene.dressed.motion, scene.dressed.betas, scene.dressed.before
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         model = None if self.guess == SKINNING else TrainedModel.load(self.path)
-        self.of_guess = frame_inputs(model, dressed, motion, betas)
+        self.of_guess = frame_inputs(model, dressed, motion, betas, before=before)
         if model is None:
             return skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
-        return predictions(model, dressed, motion, betas)
+        return predictions(model, dressed, motion, betas, before=before)
 
 
 def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..presets import PRESETS
 from ..registry import by_name
 from ..scene import Scene
-from .further import OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
+from .further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
 
 SHEET = ("sheet_cells", "sheet_frames")
 
@@ -48,6 +48,7 @@ SCENES = (
 FURTHER = (
     *OUT_OF_DISTRIBUTION,
     *{scene.name: scene for preset in PRESETS for scene in meshes_and_steps(preset.dependence)}.values(),
+    *DRAPES,
 )
 
 

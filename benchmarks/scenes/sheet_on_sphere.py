@@ -8,6 +8,7 @@ from reference_sim import Cloth, Material, Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 
 from ..scene import BuiltScene, Scene
+from ..validation.meshes import in_space, rectangle
 from .sheet import square_sheet
 
 RADIUS = 0.12  # [m]
@@ -15,12 +16,23 @@ SIZE = 0.5  # [m]
 GAP = 0.02  # [m] between sphere and sheet at the start
 
 
-def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
-    """The built scene; no assets are needed."""
+def build(
+    scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int, family: str = ""
+) -> BuiltScene:
+    """The built scene; no assets are needed.
+
+    family: of triangles, as `rectangle` has them; such a sheet lies on the sphere and is held at its middle,
+    so that it drapes and does not slide off.
+    """
     positions, faces = square_sheet(sheet_cells, SIZE)
+    gap, pins = GAP, []
+    if family:
+        flat, faces = rectangle(family, sheet_cells, sheet_cells, SIZE, SIZE)
+        positions = in_space(flat - SIZE / 2)[:, [1, 2, 0]]  # faces up
+        gap, pins = 0.0, [int(np.argmin(np.linalg.norm(positions, axis=1)))]
     # Off the sphere's axis by a little: centred, it would balance on a symmetry.
-    positions += [0.004, RADIUS + GAP, 0.002]
-    cloth = Cloth(positions, faces, Material())
+    positions += [0.004, RADIUS + gap, 0.002]
+    cloth = Cloth(positions, faces, Material(), pins=pins)
     points, triangles = sphere(RADIUS, 24)
     frames = sheet_frames
     obstacle = Obstacle(points, triangles)

@@ -56,6 +56,11 @@ class Cell:
         """<scene>/<method>, and the seed where it is not 0: as part of a path."""
         return f"{flat(self.scene.name)}/{flat(self.method)}" + (f"-seed{self.seed}" if self.seed else "")
 
+    @property
+    def timed(self) -> bool:
+        """Whether its costs are measured; others run side by side."""
+        return self.scene.timed and self.entry.timed
+
     def trajectory(self, folder: RunFolder) -> Path:
         return folder.trajectory_path(self.scene.name, self.method, self.seed)
 
@@ -145,7 +150,7 @@ class RunCell(CellTask):
     def _run(self, context: Context) -> Outcome:
         cell, folder = self.cell, context.folder
         scene, method = self.scene(context), self.ready(context)
-        if cell.scene.timed:
+        if cell.timed:
             trajectory, reading, frames = self.timed(method, 0.0)
         else:
             trajectory, reading = method.run(), Reading((math.nan,))
@@ -156,7 +161,7 @@ class RunCell(CellTask):
             "peak": peak,
             "terms": "+".join(scene.terms),
         }
-        if cell.scene.timed and not reading.complaint:
+        if cell.timed and not reading.complaint:
             if reading.seconds < self.least:
                 _, again, further = self.timed(method, self.least - reading.seconds)
                 reading, frames = Reading(reading.runs + again.runs, again.complaint), frames + further

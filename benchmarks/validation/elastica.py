@@ -25,7 +25,7 @@ K = 1e-3  # [J] hinge stiffness
 # 330 N/m: at Gamma = 1000 the strip weighs 0.9 N per metre of width, and stretches by 0.3 %.
 MATERIAL = Material(young_modulus=700e3, poisson_ratio=0.0, bending_stiffness=K)
 ROWS = 2  # narrow, so that the cross-section never has to stay flat
-COLUMNS = 96
+COLUMNS = 120
 SYMMETRIC = ("cross", "union_jack", "equilateral", "delaunay")
 
 
@@ -40,7 +40,7 @@ class Strip:
 
 
 @cache
-def strip(family: str) -> Strip:
+def strip(family: str, scaling: str = "length_area") -> Strip:
     """Two pinned columns, half a cell to each side of the clamp: there the first hinge's share begins."""
     h = 1 / (COLUMNS - 0.5)
     width = ROWS * h * (ROW if family == "equilateral" else 1.0)
@@ -48,12 +48,13 @@ def strip(family: str) -> Strip:
     points[:, 0] -= h / 2
     x = in_space(points)[:, [0, 2, 1]]  # the strip lies in the plane y = 0
     cloth = Cloth(x, faces[:, ::-1], MATERIAL, pins=np.flatnonzero(points[:, 0] < 0.51 * h))
-    return Strip(cloth, h, width, _calibrated(cloth, width))
+    return Strip(cloth, h, width, _calibrated(BendHinge(cloth, scaling=scaling), width))
 
 
-def _calibrated(cloth: Cloth, width: float) -> float:
+def _calibrated(bend: BendHinge, width: float) -> float:
     """D from the tip's small deflection under a unit load per area: 1/(8 D)."""
-    stiffness = Potential([BendHinge(cloth)]).hessian(cloth.rest_positions).tocsr()[1::3][:, 1::3]
+    cloth = bend.cloth
+    stiffness = Potential([bend]).hessian(cloth.rest_positions).tocsr()[1::3][:, 1::3]
     free = np.setdiff1d(np.arange(cloth.vertex_count), cloth.pins)
     w = np.zeros(cloth.vertex_count)
     w[free] = spla.spsolve(stiffness[free][:, free].tocsc(), cloth.vertex_areas[free])
@@ -138,7 +139,7 @@ def _miss(family: str, weight: float, load: float) -> float:
     return float(np.linalg.norm(ours - exact))
 
 
-def stiffness_spread() -> float:
+def stiffness_spread(scaling: str) -> float:
     """Largest over smallest D of the five families at one k."""
-    found = [strip(family).D for family in FAMILIES]
+    found = [strip(family, scaling).D for family in FAMILIES]
     return max(found) / min(found)

@@ -19,8 +19,7 @@ def folded(scaling: str, fold: float) -> float:
     """
     cloth, x = _folded(fold)
     edges = (COLUMNS - 1) * ROWS
-    length = DEPTH / ROWS
-    scale = length**2 / (4 * CELL * length) if scaling == "length_area" else 1.0
+    scale = _scale() if scaling == "length_area" else 1.0
     exact = edges * scale * cloth.material.bending_stiffness / 2 * fold**2
     return BendHinge(cloth, scaling=scaling).value_and_gradient(x)[0] / exact
 
@@ -32,7 +31,7 @@ def past_half_a_turn() -> float:
     # The sign of a hinge's angle follows from its numbering; a fold of -3 is -3 or 3 there.
     angles = np.where(upright, -_signs(cloth) * 3.0, 0.0)
     bend = BendHinge(cloth, rest_angles=angles)
-    exact = upright.sum() * cloth.material.bending_stiffness / 2 * (2 * np.pi - 6) ** 2
+    exact = upright.sum() * _scale() * cloth.material.bending_stiffness / 2 * (2 * np.pi - 6) ** 2
     return bend.value_and_gradient(x)[0] / exact
 
 
@@ -42,6 +41,12 @@ def rest_shape_force() -> float:
     curved = Cloth(x, cloth.faces, cloth.material)
     bend = BendHinge(curved, rest_angles="rest")
     return float(np.abs(Potential([bend]).gradient(x @ random_rotation(5).T)).max())
+
+
+def _scale() -> float:
+    """l^2 / (4 (A1 + A2)) of an upright edge."""
+    length = DEPTH / ROWS
+    return length**2 / (4 * CELL * length)
 
 
 def _folded(fold: float) -> tuple[Cloth, np.ndarray]:

@@ -1,7 +1,7 @@
 """Lateral buckling: a strip on edge, clamped at one end and loaded at the other, gives way sideways.
 
 P = 4.0126 (EI GJ)^0.5 / L^2 (Michell 1899, Prandtl 1899). On equilateral triangles the hinges are an
-isotropic plate (see plates.py) with D = 3^0.5/2 k and nu = -1/3, so for a narrow strip of width b
+isotropic plate (see plates.py) with D = k/4 and nu = -1/3, so for a narrow strip of width b
 EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
 """
 
@@ -41,7 +41,7 @@ def _ratio(rows: int) -> float:
     points, faces = rectangle("equilateral", columns, rows, columns * h, width)
     points -= [h / 2, width / 2]
     cloth = Cloth(in_space(points), faces, MATERIAL, pins=np.flatnonzero(points[:, 0] < 0.51 * h))
-    D, nu = 3**0.5 / 2 * K, -1 / 3
+    D, nu = K / 4, -1 / 3
     exact = MICHELL * width * D * np.sqrt((1 - nu**2) * 2 * (1 - nu))
     tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
     forces = np.zeros((len(points), 3))

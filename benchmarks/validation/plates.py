@@ -4,7 +4,8 @@ Kirchhoff's plate has the energy D/2 [(w_xx + w_yy)^2 - 2 (1 - nu) (w_xx w_yy - 
 plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles, and on
 equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn - w_tt/3) at the edges of
 direction t, summed over the three directions of an equilateral mesh of spacing l:
-C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5.
+C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and with l^2/(4 (A1 + A2)), there
+1/(2 3^0.5), C11 = k/4.
 
 Squares with both diagonals, w = x^2/2 at the corners and d above that at the centres: per cell the hinges
 of the sides turn by 4 d +- 1/2 and those of the four half diagonals by 8^0.5 (1/8 - d), so the energy over

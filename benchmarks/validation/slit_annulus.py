@@ -35,7 +35,7 @@ def corner(which: str) -> float:
 @cache
 def _lifted() -> tuple[float, float]:
     D = YOUNG * THICKNESS**3 / 12
-    k = D / (3**0.5 / 2 * (1 - 1 / 9))
+    k = D / (1 / 4 * (1 - 1 / 9))
     material = Material(
         young_modulus=YOUNG, poisson_ratio=0.0, thickness=THICKNESS, density=1.0, bending_stiffness=k
     )

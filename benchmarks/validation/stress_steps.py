@@ -64,7 +64,7 @@ def sheet(
     pins: str = "corners",
     start: str = "noisy",
     speed: float | str = 1.0,
-    scaling: str = "none",
+    scaling: str = "length_area",
     rest_angles: float | str = 0.0,
     shape: str = "even",
     size: float = 1.0,

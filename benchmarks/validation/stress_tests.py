@@ -139,7 +139,7 @@ STEPS = (
     sheet("rest_angles_random", "rest angles anywhere within half a turn", rest_angles="random",
            bending=100.0),
     sheet("bowl", "a rest shape that no flat sheet has", shape="bowl", start="very noisy"),
-    sheet("length_area_scaling", "hinges scaled by length and area, x1e4", scaling="length_area",
+    sheet("printed_bending", "hinges not scaled, as the SNUG paper prints them, x1e4", scaling="none",
            bending=1e4),
     # What collapses without the area barrier, with it
     sheet("stiffness_x0.001_barrier", "stiffness x0.001 with the area barrier", stiffness=1e-3, terms=ALL),

@@ -3,9 +3,10 @@
     theta = atan2(e . (n1 x n2) / |e|, n1 . n2)
     E = k/2 s (theta - theta_0)^2
 
-with the edge e = x1 - x0 and the face normals n1 = e x (x2 - x0), n2 = (x3 - x0) x e. The paper (SNUG,
-eq. 11) has s = 1: the plate it stands for then depends on the shape of the triangles. scaling="length_area"
-gives s = l^2 / (4 (A1 + A2)), the form that most cloth codes use.
+with the edge e = x1 - x0 and the face normals n1 = e x (x2 - x0), n2 = (x3 - x0) x e. By default
+s = l^2 / (4 (A1 + A2)) of the rest state. The authors of SNUG have since stated that this is what their code
+computes and that the printed form is a typo; their k belongs to it. scaling="none" is s = 1, as the paper
+prints it (eq. 11): some three times as stiff.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from .energy import Energy
 if TYPE_CHECKING:
     from torch import Tensor
 
-SCALINGS = ("none", "length_area")
+SCALINGS = ("length_area", "none")
 
 
 class BendHinge(Energy):
@@ -29,7 +30,7 @@ class BendHinge(Energy):
 
     Args:
         cloth: the rest state; its material gives k [J].
-        scaling: "none" (the paper's) or "length_area".
+        scaling: "length_area" or "none" (as the paper prints it).
         rest_angles: (H,) [rad], "rest" for the angles of rest_positions, or 0 (default: flat).
 
     Raises:
@@ -39,16 +40,16 @@ class BendHinge(Energy):
     name = "bending"
 
     def __init__(
-        self, cloth: Cloth, *, scaling: str = "none", rest_angles: np.ndarray | str | float = 0.0
+        self, cloth: Cloth, *, scaling: str = "length_area", rest_angles: np.ndarray | str | float = 0.0
     ) -> None:
         if scaling not in SCALINGS:
             raise ValueError(f"BendHinge scaling {scaling!r}: choose one of {', '.join(SCALINGS)}")
         self.cloth = cloth
         self.stencils = cloth.hinges
         self.scaling = scaling
-        scale = np.ones(len(self.stencils))
-        if scaling == "length_area":
-            scale = cloth.hinge_lengths**2 / (4 * cloth.hinge_areas)
+        scale = cloth.hinge_lengths**2 / (4 * cloth.hinge_areas)
+        if scaling == "none":
+            scale = np.ones(len(self.stencils))
         self.stiffness = cloth.material.bending_stiffness * scale
         if isinstance(rest_angles, str):
             if rest_angles != "rest":

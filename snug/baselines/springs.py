@@ -37,7 +37,7 @@ def spring_terms(cloth: Cloth) -> tuple[Energy, Energy, Energy]:
     gravity = Gravity(own)
     uniform = AREAL_DENSITY * cloth.areas.sum() / cloth.vertex_count
     gravity.weights = np.full(cloth.vertex_count, uniform * GRAVITY)
-    return StretchSpring(own), BendHinge(own), gravity
+    return StretchSpring(own), BendHinge(own, scaling="none"), gravity
 
 
 class SquaredContact(ContactPenalty):

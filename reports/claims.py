@@ -1,0 +1,197 @@
+"""What the paper claims of its method, as data, and whether each claim holds in a run.
+
+Santesteban, Otaduy, Casas: SNUG, CVPR 2022. Nothing else in a report is judged.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+
+import pandas as pd
+
+from reports.data import Metric, Run
+from reports.means import Mean, pair
+from reports.significance import LEVEL, Effect, effect, holm, within_uncertainty
+from reports.table import Cell, Column, Table, table
+
+HOLDS, FAILS, EQUAL, OPEN = "holds", "does not hold", "tie", "cannot be told"
+BEFORE = Metric("cost/before", "s", "Data, setup and training", lower_is_better=True)  # the sum of:
+PARTS = ("cost/data", "cost/setup", "cost/train")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """`lower` has less of the metric than `higher`: less than its `factor`-th part, or `on_par` no more."""
+
+    says: str
+    metric: str
+    lower: str
+    higher: str
+    factor: float = 1.0
+    on_par: bool = False
+
+    @property
+    def relation(self) -> str:
+        if self.on_par:
+            return "≤"
+        return "<" if self.factor == 1.0 else f"< 1/{self.factor:g} of"
+
+
+ENERGIES = "Table 1: lower energies than PBNS"
+TERMS = "Table 2: each term of the loss brings the curvature nearer to the simulation's"
+COSTS = "Table 3: smaller, faster and sooner trained than supervised methods"
+SPEED_UP = "Abstract: training two orders of magnitude faster than supervised methods, their data included"
+SIMULATOR = "Section 4.3: the simulation is several orders of magnitude slower; at least two"
+SMOOTH = "Figure 5: vertex-wise supervision smooths, SNUG learns more realistic detail"
+UNSEEN = "Section 1: generalises better than supervision to unseen motion"
+SPRINGS = "Figure 3: springs deform less expressively than StVK; here, networks trained on either"
+DYNAMICS = "Sections 3.3, 3.5: without the inertia term, or with longer windows, there is less true dynamics"
+PAR = "Section 5: dynamics on par with other data-driven methods"
+STATES = "Section 3.5: first states of noise, not of zeros, let long sequences go well"
+SUPERVISED = ("santesteban2019", "tailornet")
+CLAIMS = (
+    *(Claim(ENERGIES, f"energy/{t}", "snug", "pbns") for t in ("strain", "bending", "gravity", "inertia")),
+    *(
+        Claim(TERMS, "curvature/error", "snug", f"snug-no-{term}")
+        for term in ("bending", "strain", "gravity", "inertia")
+    ),
+    *(
+        Claim(COSTS, f"cost/{what}", "snug", method)
+        for what in ("train", "frame", "memory")
+        for method in SUPERVISED
+    ),
+    *(Claim(SPEED_UP, BEFORE.name, "snug", method, factor=100.0) for method in (*SUPERVISED, "supervised")),
+    Claim(SIMULATOR, "cost/frame", "snug", "simulation", factor=100.0),
+    Claim(SMOOTH, "curvature/mean", "supervised", "simulation"),
+    Claim(SMOOTH, "curvature/mean", "supervised", "snug"),
+    Claim(SMOOTH, "curvature/error", "snug", "supervised"),
+    Claim(UNSEEN, "energy/total", "snug", "supervised"),
+    Claim(SPRINGS, "curvature/mean", "snug-springs", "snug"),
+    *(
+        Claim(DYNAMICS, "dynamics/amplitude", f"snug-{name}", "snug")
+        for name in ("no-inertia", "window6", "window12")
+    ),
+    Claim(PAR, "dynamics/amplitude", "santesteban2019", "snug", on_par=True),
+    *(
+        Claim(STATES, metric, "snug-noise-alone", "snug-no-noise")
+        for metric in ("energy/total", "roll_out/drift", "roll_out/last")
+    ),
+)
+NOTE = (
+    "Effect: × the first over the second, of geometric means over motions and seeds; where a value is not "
+    "positive, the first less the second. Below it the 95 % interval over motions and seeds, of the line by "
+    "itself. p: corrected by Holm for all lines; a claim holds, or does not hold, where p is below .05. Tie: "
+    "p is not, and all of the interval is within 5 % of equality; or the difference is within the "
+    "uncertainty of the reference. Cannot be told: neither. Where nothing was repeated, 5 % decide."
+)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A claim, the two means, None where all of one diverged, and what came out."""
+
+    claim: Claim
+    metric: Metric
+    one: Mean | None
+    other: Mean | None
+    effect: Effect | None
+    p: float | None
+    verdict: str
+
+
+def findings(run: Run) -> list[Table]:
+    """The claims that this run can judge, over the scenes of the first garment that both methods share."""
+    columns = (
+        Column("claim", "Claim", text=True),
+        Column("metric", "Measure", text=True, width="1.2fr"),
+        Column("lower", "First", text=True, method=True, width="1fr"),
+        Column("claimed", "Claim", text=True),
+        Column("higher", "Second", text=True, method=True, width="1fr"),
+        Column("first", "Of the first", mixed=True),
+        Column("second", "Of the second", mixed=True),
+        Column("difference", "Difference", mixed=True),
+        Column("effect", "Effect", mixed=True),
+        Column("p", "p", digits=2, mixed=True),
+        Column("verdict", "Here", text=True, width="1fr"),
+    )
+    rows: list[tuple[Cell, ...]] = [
+        (
+            found.claim.says, found.metric.heading, found.claim.lower, found.claim.relation,
+            found.claim.higher, found.one, found.other,
+            None if found.one is None or found.other is None else found.one.value - found.other.value,
+            found.effect, found.p, found.verdict,
+        )
+        for found in judged(run)
+    ]  # fmt: skip
+    caption = "Claims of the paper, and whether they hold here."
+    return table("findings", columns, rows, caption, grouped_by=("claim",), note=NOTE)
+
+
+def counts(run: Run) -> str:
+    """How many claims came out how; empty where none was judged."""
+    found = Counter(re.split(r"[:(]", line.verdict)[0].strip() for line in judged(run))
+    words = ", ".join(f"{word} {found[word]}" for word in (HOLDS, FAILS, EQUAL, OPEN) if found[word])
+    return f"Of {found.total()}: {words}." if found else ""
+
+
+def judged(run: Run) -> list[Judged]:
+    """Of all claims whose two methods ran, as one family."""
+    first = next(iter(run.garments(run.worn)), None)
+    frame = with_before(run.worn[run.worn["garment"] == first])
+    ran = set(frame["method"])
+    asked = []
+    for claim in CLAIMS:
+        if {claim.lower, claim.higher} <= ran:
+            own = frame[(frame["metric"] == claim.metric) | ~frame["usable"]]
+            asked.append((claim, *pair(own, claim.lower, claim.higher, claim.metric)))
+    effects = [effect(one, other) if one and other else None for _, one, other in asked]
+    p_values = [found.p_value(claim.factor) if found else None for (claim, *_), found in zip(asked, effects)]
+    corrected = iter(holm([p for p in p_values if p is not None]))
+    diverged = set(frame[frame["status"] == "diverged"]["method"])
+    metrics = {**run.metrics, BEFORE.name: BEFORE}
+    lines = []
+    for (claim, one, other), found, alone in zip(asked, effects, p_values):
+        metric = metrics.get(claim.metric, Metric(claim.metric))
+        p = None if alone is None else next(corrected)
+        if found is not None and one is not None and other is not None:
+            said = verdict(claim, one, other, found, p) + one.fewer
+        else:
+            said = of_diverged(claim, metric, one, other, diverged)
+        if said:
+            lines.append(Judged(claim, metric, one, other, found, p, said))
+    return lines
+
+
+def verdict(claim: Claim, one: Mean, other: Mean, found: Effect, p: float | None) -> str:
+    """In words, by the p-value after Holm's correction; None where nothing was repeated."""
+    if claim.factor != 1.0 and not found.ratio:
+        return OPEN  # no factor between numbers of which some are zero
+    equal = found.equal(claim.factor)
+    if within_uncertainty(one, other, claim.factor) or (equal and (p is None or p >= LEVEL or claim.on_par)):
+        return HOLDS if claim.on_par else EQUAL
+    if p is not None and p >= LEVEL:
+        return OPEN
+    return HOLDS if found.above(claim.factor) < 0.0 else FAILS
+
+
+def of_diverged(
+    claim: Claim, metric: Metric, one: Mean | None, other: Mean | None, diverged: set[str]
+) -> str:
+    """Of a metric of which less is better, a method that diverged has more; else nothing can be said."""
+    if not metric.lower_is_better:
+        return ""
+    if one is not None and claim.higher in diverged:
+        return f"{HOLDS}: the second diverged"
+    return f"{FAILS}: the first diverged" if other is not None and claim.lower in diverged else ""
+
+
+def with_before(frame: pd.DataFrame) -> pd.DataFrame:
+    """The rows, and what each trained network cost before its first frame, where all parts are known."""
+    rows = frame[frame["usable"] & frame["metric"].isin(PARTS)]
+    cell = ["scene", "method", "seed"]
+    parts = rows.groupby(cell)["value"]
+    whole = rows.assign(value=parts.transform("sum"))[parts.transform("size") == len(PARTS)]
+    before = whole.drop_duplicates(cell).assign(metric=BEFORE.name, unit=BEFORE.unit)
+    return pd.concat([frame, before], ignore_index=True)
