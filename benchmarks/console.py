@@ -14,7 +14,7 @@ COLUMNS = (
     ("energy/strain", "strain J"),
     ("energy/bending", "bend J"),
     ("energy/inertia", "inertia J"),
-    ("gap/relative", "gap"),
+    ("gap/energy", "gap J"),
     ("curvature/error", "dH 1/m"),
     ("distance/rms", "rms mm"),
     ("penetration/vertices", "inside %"),

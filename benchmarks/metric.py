@@ -30,6 +30,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from .results import AS_RIGHT
+
 if TYPE_CHECKING:
     from reference_sim import Trajectory
 
@@ -39,9 +41,6 @@ if TYPE_CHECKING:
 Made = TypeVar("Made")
 WHOLE = ("ok", "stalled")  # statuses of cells that came to their last frame
 COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what others are measured beside
-# Families of simulations that are as right as the reference. Those of another time step are not: they solve
-# another discrete problem, and how far they are from it is the time error.
-AS_RIGHT = ("simulation-perturbed", "simulation-tolerance", "simulation-refrozen")
 
 
 class Estimate(NamedTuple):

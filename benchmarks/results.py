@@ -31,6 +31,10 @@ ROLES = (
     "warm-started", "",
 )  # fmt: skip
 
+# Families of simulations that are as right as the reference. Those of another time step are not: they solve
+# another discrete problem, and how far they are from it is the time error.
+AS_RIGHT = ("simulation-perturbed", "simulation-tolerance", "simulation-refrozen")
+
 
 class ResultsError(ValueError):
     """A run folder or one of its files is absent or not what it should be; the message names it."""

@@ -11,10 +11,9 @@ from typing import Any
 from snug.recipes import learns_from_simulation
 
 from .methods import find_method
-from .metric import AS_RIGHT
 from .metrics import declared, find_metric
 from .plan import Plan, network_of
-from .results import Row
+from .results import AS_RIGHT, Row
 from .schedule import Schedule
 from .tasks.cell import Cell
 from .tasks.task import Outcome, Task, TaskId

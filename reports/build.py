@@ -182,7 +182,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--axes",
         nargs=2,
         metavar=("X", "Y"),
-        help="draw only metric Y against metric X (names as in results.csv, say cost/frame gap/relative), "
+        help="draw only metric Y against metric X (names as in results.csv, say cost/whole gap/energy), "
         "means over --scenes, into figures/",
     )
     parser.add_argument(

@@ -75,10 +75,16 @@ def _note(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
     """What the table says of itself, of its spreads and of the marks in it."""
     remarks = [table.note] if table.note else []
     means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
+    words = []
     if any(mean.spread for mean in means):
         seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
-        lone = " Without it: one seed, or nothing random." if any(m.spread is None for m in means) else ""
-        remarks.append(f"±: standard deviation over {' or '.join(map(str, seeds))} seeds.{lone}")
+        words.append(f"standard deviation over {' or '.join(map(str, seeds))} seeds")
+    if any(mean.uncertainty for mean in means):
+        words.append("what another simulation as right as the reference changes, or a sample's error")
+    if words:
+        lone = any(m.spread_or_uncertainty is None for m in means)
+        without = " Without it: one seed, or nothing random." if lone and len(words) == 1 else ""
+        remarks.append(f"±: {' or, where larger, '.join(words)}.{without}")
     marks = {mark for line in lines for cell in line for mark in cell["mark"]}
     return " ".join([*remarks, *(REMARKS[mark] for mark in sorted(marks))])
 
@@ -101,8 +107,8 @@ def _column_texts(
         spread, mark = "", ""
         if isinstance(cell, Mean):
             mark = ("" if cell.complete else "*") + ("†" if cell.stalled else "")
-            if cell.spread:
-                spread = f"± {duration(cell.spread) if column.unit == 's' else number(cell.spread, 1)}"
+            if apart := cell.spread_or_uncertainty:
+                spread = f"± {duration(apart) if column.unit == 's' else number(apart, 1)}"
         elif isinstance(cell, Effect):
             mark = ("" if cell.complete else "*") + {"seeds": "‡", "motions": "§"}.get(cell.covers, "")
             spread = " to ".join("∞" if end == math.inf else number(end) for end in cell.interval or ())

@@ -39,6 +39,11 @@ class Mean:
     uncertainty: float | None = None
 
     @property
+    def spread_or_uncertainty(self) -> float | None:
+        """The larger of the two, None where there is neither."""
+        return max((x for x in (self.spread, self.uncertainty) if x is not None), default=None)
+
+    @property
     def fewer(self) -> str:
         """Words behind a number or verdict: over how many scenes or seeds, where these are not all."""
         if self.lost:

@@ -10,11 +10,11 @@ import pandas as pd
 from reports import claims, tables
 from reports.break_even import NETWORK, compared_scenes, cost_of, crossing, frames_text, rivals
 from reports.data import Run
-from reports.means import mean_of, pair, shared_scenes
+from reports.means import mean_of, pair, shared_scenes, value_of
 from reports.numbers import duration, number, with_spread
-from reports.pareto import TIME, Point, beaten_by, fastest, points_of, truncated
+from reports.pareto import SMALLER_STEPS, TIME, Point, beaten_by, fastest, indistinct, points_of, truncated
 
-TOTAL, CURVATURE = "energy/total", "curvature/error"
+TOTAL, CURVATURE, DISTANCE = "energy/total", "curvature/error", "distance/rms"
 
 
 def summary(run: Run) -> list[tuple[str, str]]:
@@ -30,6 +30,7 @@ def summary(run: Run) -> list[tuple[str, str]]:
         ("Run time", run_time(run, worn if has_network else cells[cells["scene"].isin(compared)])),
         ("Error against time", fronts(run, cells, compared)),
         ("When training pays", training_pays(run, cells, compared)),
+        ("The reference", reference(run, cells[cells["scene"].isin(compared)])),
         ("Claims of the paper", claims.counts(run)),
         ("Known answers", checks(run).strip()),
         ("Not finished", trouble(run)),
@@ -51,7 +52,9 @@ def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
     if not order:
         return ""
     best = found[order[0]]
-    text = f"{run.label(order[0])} has {with_spread(best.value, best.spread)} {unit}{best.fewer}"
+    text = (
+        f"{run.label(order[0])} has {with_spread(best.value, best.spread_or_uncertainty)} {unit}{best.fewer}"
+    )
     said = {name: f"{run.label(name)} {number(mean.value)}{mean.fewer}" for name, mean in found.items()}
     after, beside = (", ".join(said[name] for name in names if name in said) for names in (order[1:], others))
     text += f", {after}." if after else "."
@@ -71,7 +74,7 @@ def run_time(run: Run, frame: pd.DataFrame) -> str:
 def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
     """By each error, what beats the network, and the fastest truncated solver that is as accurate."""
     text = ""
-    for metric in ("gap/relative", CURVATURE):
+    for metric in ("gap/energy", CURVATURE):
         points = points_of(run, frame, scenes, metric)
         own = next((p for p in points if p.method == NETWORK), None)
         if own is None:
@@ -105,6 +108,22 @@ def training_pays(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
     if not parts:
         return ""
     return f"SNUG's {duration(own.before)} of training pay {', '.join(parts)}."
+
+
+def reference(run: Run, frame: pd.DataFrame) -> str:
+    """How far other right simulations are from it, and that of the smallest time step."""
+    apart = [indistinct(run, frame, metric) for metric in (CURVATURE, DISTANCE)]
+    if not all(apart):
+        return ""
+    text = f"Simulations as right as it lie up to {number(apart[0])} 1/m and {number(apart[1])} mm from it: "
+    text += "what is nearer cannot be told from it."
+    steps = [m for m in run.methods.values() if m.family == SMALLER_STEPS and m.level]
+    finest = max(steps, key=lambda m: m.level or 0.0, default=None)
+    found = [value_of(frame, finest.name, metric) for metric in (CURVATURE, DISTANCE)] if finest else []
+    if finest is None or None in found:
+        return text
+    text += f" It is not converged in time: with {finest.level:g} steps a frame it is itself "
+    return text + f"{number(found[0])} 1/m and {number(found[1])} mm away."
 
 
 def checks(run: Run) -> str:

@@ -7,13 +7,18 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from benchmarks.results import AS_RIGHT
 from reports.data import Run
 from reports.means import means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
 WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
-ERRORS = ("gap/relative", "curvature/error", "distance/rms", "gradient/norm")
-PERTURBED = "simulation-perturbed"  # whose distance is the sensitivity of the reference, not an error
+# Of the method's own step first: no chaos blurs them. Then those of the roll-out against the simulation's.
+ERRORS = (
+    "gap/energy", "step/curvature", "step/distance", "curvature/error", "distance/rms", "curvature/histogram",
+)  # fmt: skip
+PLANES = {"gap/energy": "gap/refrozen"}  # what the reference leaves where its planes are searched at its end
+LOOSER = "simulation-tolerance"  # a family of simulations that is a curve of its own
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 
 
@@ -25,7 +30,8 @@ class Point:
     """A method's run time [ms per frame] and error.
 
     time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
-    standard deviations over seeds. error_spread: one standard deviation over seeds. Both 0 where unknown.
+    standard deviations over seeds. error_spread: one standard deviation over seeds or, where that is more,
+    how far another simulation as right as the reference moves it. Both 0 where unknown.
     fewer: words on seeds that are missing, empty where none is.
     """
 
@@ -56,7 +62,9 @@ def points_of(
         spread = 2.0 * (time.spread or 0.0)
         if repeats is not None and own is not None and x in (TIME, WHOLE):
             spread = own.value * repeats.value / 100.0
-        found.append(Point(method, time.value, error.value, spread, error.spread or 0.0, error.fewer))
+        found.append(
+            Point(method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0, error.fewer)
+        )
     return found
 
 
@@ -83,8 +91,8 @@ def fastest(points: Iterable[Point], error: float) -> Point | None:
 
 
 def of_one_problem(run: Run, points: Iterable[Point]) -> list[Point]:
-    """Those that solve what the reference solves, from where it starts."""
-    return [p for p in points if run.methods[p.method].family not in (PERTURBED, SMALLER_STEPS)]
+    """Those that solve what the reference solves."""
+    return [p for p in points if run.methods[p.method].family != SMALLER_STEPS]
 
 
 def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
@@ -96,6 +104,18 @@ def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
 def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
     """Of the solvers alone those that differ from others of their family by one number."""
     return [p for p in solvers(run, points) if run.methods[p.method].level is not None]
+
+
+def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
+    """The error [unit of the metric] below which a method is as near to the reference as another right one.
+
+    The largest of simulations from moved starts and with planes searched twice; of the gap what the
+    reference leaves on planes searched at its end. 0 where none is known.
+    """
+    twins = [m.name for m in run.methods.values() if m.family in AS_RIGHT and m.family != LOOSER]
+    who, what = ([run.reference], PLANES[metric]) if metric in PLANES else (twins, metric)
+    kept = rows[rows["usable"] & (rows["metric"] == what) & rows["method"].isin(who)]["value"]
+    return float(kept.max()) if len(kept) else 0.0
 
 
 def beaten_by(points: Sequence[Point], own: Point) -> Point | None:

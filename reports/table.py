@@ -61,7 +61,8 @@ class Table:
     def write_csv(self, folder: Path) -> Path:
         """Write <folder>/<name>.csv, whole or not at all.
 
-        A mean with seeds gets a column for its spread, an effect columns for what it is and its interval.
+        A mean gets a column for its spread over seeds, and one for its uncertainty where there is any; an
+        effect columns for what it is and its interval.
         """
         path = folder / f"{self.name}.csv"
         texts: dict[str, list[str]] = {}
@@ -71,6 +72,9 @@ class Table:
             if any(isinstance(cell, Mean) for cell in cells):
                 spreads = [cell.spread if isinstance(cell, Mean) else None for cell in cells]
                 texts[f"{column.name}_spread"] = [csv_number(spread) for spread in spreads]
+                moved = [cell.uncertainty if isinstance(cell, Mean) else None for cell in cells]
+                if any(x is not None for x in moved):
+                    texts[f"{column.name}_uncertainty"] = [csv_number(x) for x in moved]
             if any(isinstance(cell, Effect) for cell in cells):
                 parts = zip(*map(_parts_of_effect, cells))
                 texts |= {f"{column.name}_{part}": list(own) for part, own in zip(EFFECT_PARTS, parts)}

@@ -16,12 +16,12 @@ from reports.means import value_of
 from reports.numbers import number
 from reports.pareto import (
     ERRORS,
-    PERTURBED,
     SMALLER_STEPS,
     TIME,
     WHOLE,
     Point,
     front,
+    indistinct,
     points_of,
     run_time,
 )
@@ -42,10 +42,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-OWN_STEP = ("gap/relative", "gradient/norm")  # of the step's own potential, which another step size changes
+# Of the step's own potential, which another step size changes.
+OWN_STEP = ("gap/energy", "gap/relative", "step/curvature", "step/distance", "gradient/norm")
 DECADES = 9  # below the largest error; what is smaller is drawn on the lower edge
-DISTANCE = "distance/rms"
-SENSITIVITY = "distance/sensitivity"  # [mm] between two references that began a nanometre apart
 GREY = "#B4B4B4"
 
 
@@ -105,7 +104,7 @@ def _errors(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """The points of one panel. The reference's own error is zero by construction: it is drawn as a line."""
     points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric, run_time(rows))
     # Smaller steps have errors of the garment, but none of the reference's own step.
-    left_out = (PERTURBED, SMALLER_STEPS) if metric in OWN_STEP else (PERTURBED,)
+    left_out = (SMALLER_STEPS,) if metric in OWN_STEP else ()
     reference = run.with_role("reference")
     kept = [p for p in points if run.methods[p.method].family not in left_out and p.method not in reference]
     return [p for p in kept if p.time > 0.0]
@@ -129,10 +128,10 @@ def _draw_errors(
     for axes in every[len(panels) :]:
         axes.set_axis_off()
     below: set[str] = set()
-    sensitivities = rows[rows["usable"] & (rows["metric"] == SENSITIVITY)]["value"]
-    least = float(sensitivities.max()) if len(sensitivities) else 0.0
+    bands = []
     for axes, (metric, points) in zip(every, panels):
-        below |= _draw_points(axes, run, points, reference, least if metric.name == DISTANCE else 0.0)
+        bands.append(indistinct(run, rows, metric.name))
+        below |= _draw_points(axes, run, points, reference, bands[-1])
         unit = "" if metric.unit == "1" else f" [{metric.unit}]"
         axes.set(xlabel=f"run time, {words} [ms per frame]", title=f"{metric.title}{unit}")
         grid(axes)
@@ -147,9 +146,11 @@ def _draw_errors(
         caption += (
             " Bars: run time, the range of repeats (without them, two standard deviations over seeds); "
         )
-        caption += "error, one standard deviation over seeds."
-    if least:
-        caption += f" Grey: under {number(least)} mm, as far as two simulations that start 1 nm apart drift."
+        caption += "error, one standard deviation over seeds or, where larger, what another simulation as "
+        caption += "right as the reference changes."
+    if any(bands):
+        caption += " Grey: as near as such simulations are to each other; of the gap, what the reference "
+        caption += "leaves where contact planes are searched at the end of its steps."
     if lead:
         return save(figure, folder, "error_against_time", caption=brief, kind="lead")
     name = f"error_against_time_{file_name(scene)}"
@@ -175,7 +176,7 @@ def _legend(figure: Figure, run: Run, points: Sequence[Point], reference: float 
 
 
 def _draw_points(
-    axes: Axes, run: Run, points: Sequence[Point], reference: float | None, sensitivity: float
+    axes: Axes, run: Run, points: Sequence[Point], reference: float | None, band: float
 ) -> set[str]:
     """The markers of one panel; returns the methods whose error is too small for it."""
     least = max((p.error for p in points), default=1.0) * 10.0**-DECADES
@@ -187,7 +188,7 @@ def _draw_points(
     for point in points:
         look = style(run, point.method)
         hollow = point.error <= least
-        colour = GREY if point.error < sensitivity else look.colour
+        colour = GREY if point.error < band else look.colour
         axes.errorbar(
             point.time,
             edge if hollow else point.error,
@@ -200,8 +201,8 @@ def _draw_points(
             families.setdefault(run.methods[point.method].family, []).append(point)
     for members in families.values():
         _join(axes, run, sorted(members, key=lambda p: run.methods[p.method].level or 0.0), least, edge)
-    if sensitivity:
-        axes.axhspan(edge / 10.0, sensitivity, color="#F4F4F4", zorder=0)
+    if band:
+        axes.axhspan(edge / 10.0, band, color="#F0F0F0", zorder=0)
     if reference:
         axes.axvline(reference, color="black", linestyle=":", linewidth=1.0)
     log_axis(axes, "x")

@@ -23,7 +23,9 @@ FRAMES = 5
 SOLVERS = {"newton": "Newton", "lbfgs": "L-BFGS", "vbd": "VBD"}
 DECLARED: dict[str, dict[str, Any]] = {
     "simulation": {"label": "Simulation", "role": "reference"},
-    "simulation-perturbed": {"label": "Simulation, start moved", "role": "reference-variant"},
+    "simulation-perturbed-1e-9": {
+        "label": "Simulation, start moved", "role": "reference-variant", "family": "simulation-perturbed",
+    },
     "direct-optimisation": {"label": "Vertices optimised directly", "role": "bound"},
     "skinning": {"label": "Skinning alone", "role": "baseline"},
     "untrained": {"label": "SNUG, untrained", "role": "baseline", "seeded": True},
@@ -53,11 +55,12 @@ DECLARED: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 TABLES = {
     "energy": "energies", "curvature": "curvature", "cost": "cost", "distance": "penetration",
-    "penetration": "penetration", "gap": "speed", "gradient": "speed", "roll_out": "extrapolation",
-    "conservation": "conservation", "dynamics": "dynamics", "train": "training",
+    "penetration": "penetration", "gap": "speed", "step": "speed", "gradient": "speed",
+    "roll_out": "extrapolation", "conservation": "conservation", "dynamics": "dynamics", "train": "training",
 }  # fmt: skip
 TITLES = {
-    "gap/relative": "Energy gap",
+    "gap/energy": "Energy gap",
+    "gap/relative": "Relative gap",
     "curvature/error": "Curvature error",
     "energy/total": "Total",
     "roll_out/drift": "Drift",

@@ -16,7 +16,7 @@ def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
     axes = new_figure(3, 3).subplots()
     run = run_of([row(method=method) for method in ("snug", "newton-8")])
     points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
-    hollow = work_precision._draw_points(axes, run, points, 20.0, sensitivity=0.0)
+    hollow = work_precision._draw_points(axes, run, points, 20.0, band=0.0)
     assert hollow == {"newton-8"}
     low, high = axes.get_ylim()
     shown = [

@@ -61,7 +61,7 @@ def test_a_row_that_says_nothing_true_is_refused(changes, word):
         ("", "line 1: the columns"),
         ("a,b\n1,2\n", "line 1: the columns"),
         (",".join(COLUMNS) + "\n1,2\n", f"line 2: {len(COLUMNS)} cells"),
-        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,1,,,,,,,,,false,\n", "line 2: column seed"),
+        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,,1,,,,,,,,,false,\n", "line 2: column seed"),
     ],
 )
 def test_a_broken_file_is_named_with_its_line(tmp_path, text, word):
