@@ -19,7 +19,7 @@ from reports.break_even import crossings
 from reports.claims import findings
 from reports.data import SUITES, Run
 from reports.means import means
-from reports.pareto import ERRORS, TIME
+from reports.pareto import ERRORS, TIME, WHOLE
 from reports.table import Cell, Column, Table, metric_column, table
 
 BY_SCENE = ("suite", "scene")  # what groups the lines of a table that is not averaged over scenes
@@ -101,8 +101,9 @@ def speed(run: Run) -> list[Table]:
     cells = run.cells("speed", "garments")
     rows = cells[cells["scene"].isin(run.suite("speed")["scene"])]
     own = [name for name, metric in run.metrics.items() if metric.table == "speed"]
-    names = dict.fromkeys((TIME, *ERRORS, *own))
-    columns, lines = _pivot(run, rows, rows[rows["metric"].isin(names)], ("scene", "method"), (TIME, *ERRORS))
+    first = (TIME, WHOLE, *ERRORS)
+    kept = rows[rows["metric"].isin([*first, *own])]
+    columns, lines = _pivot(run, rows, kept, ("scene", "method"), first)
     timed = [place for place, column in enumerate(columns, 2) if column.name == TIME]
     lines = [line for line in lines if timed and line[timed[0]] is not None]
     caption = "Run time of a frame and errors, scene by scene: the points of the plots."

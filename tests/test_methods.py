@@ -105,12 +105,15 @@ def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
         assert np.isfinite(trajectory.positions).all() and np.array_equal(trajectory.faces, scene.cloth.faces)
         seconds, result = trajectory.frame_seconds[1:], outcome.result  # as the method says
         told = bool(np.isfinite(seconds).all())
-        assert told == (method != "direct-optimisation") == ("frame_p95" in result)
-        if told:
+        assert told == (method != "direct-optimisation")
+        timed = find_method(method).timed
+        assert ("frame_p95" in result) == (told and timed) and ("inputs" in result) == timed
+        if told and timed:
             assert 0.0 < result["frame_p50"] <= result["frame_p95"] <= result["frame_worst"]
             assert result["frame_p50"] * len(seconds) / 2 <= result["seconds"] and (seconds > 0).all()
-        assert result["runs"] > 1 or result["seconds"] >= TINY.least_seconds
-        assert (result["inputs"] > 0.0) == (scene.dressed is not None)
+        if timed:
+            assert result["runs"] > 1 or result["seconds"] >= TINY.least_seconds
+            assert (result["inputs"] > 0.0) == (scene.dressed is not None)
         assert trajectory.provenance["scene"] == name
         given = 0 if find_method(method).gives_first_frame else 1
         assert outcome.result["frames"] == scene.frames - given
@@ -120,10 +123,10 @@ def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
 
 
 def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows, scenes):
+    costs = {"cost/frame", "cost/whole", "cost/peak"}
     expected = {
-        "cost/frame", "cost/whole", "cost/peak", "curvature/mean", "energy/total", "gap/relative",
-        "gap/local", "gradient/norm", "deformation/edges", "deformation/areas", "dihedral/mean",
-        "intersections/triangles",
+        "curvature/mean", "energy/total", "gap/relative", "gap/local", "gradient/norm", "deformation/edges",
+        "deformation/areas", "dihedral/mean", "intersections/triangles",
     }  # fmt: skip
     against = {"distance/rms", "distance/p95", "curvature/error", "curvature/histogram"}
     for name, scene in scenes.items():
@@ -133,7 +136,8 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
             own = [r for r in rows if (r.suite, r.scene, r.method) == ("speed", name, method)]
             values = {row.metric: row.value for row in own}
             entry, on_body = find_method(method), scene.dressed is not None
-            assert (values["cost/whole"] > values["cost/frame"]) == on_body
+            assert costs & set(values) == (costs if entry.timed else set())
+            assert not entry.timed or (values["cost/whole"] > values["cost/frame"]) == on_body
             assert {f"energy/{term}" for term in scene.terms} | expected <= set(values)
             assert ("penetration/vertices" in values) == (scene.obstacle is not None)
             assert len(against & set(values)) == (0 if method == "simulation" else len(against))
@@ -161,8 +165,8 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
         errors = [r for r in rows if r.scene == name and r.metric == "distance/rms" and r.suite == "speed"]
         twins = {r.method: r.value for r in errors if r.family == "simulation-perturbed"}
         # So few frames do not drive two runs apart [mm]; as little is what a distance to the reference means.
-        assert len(twins) == 1 and 0.0 < twins.popitem()[1] < 1e-3
-        assert all(0.0 < r.uncertainty < 0.1 for r in errors)
+        assert 0.0 < twins["simulation-perturbed-1e-9"] < 1e-3
+        assert all(0.0 < r.uncertainty < 1.0 for r in errors)
 
 
 def test_the_settled_shirt_is_at_rest_outside_of_the_body(scenes):
@@ -183,7 +187,8 @@ def test_all_solvers_start_where_the_scene_starts(run, scenes):
         for method, outcome in outcomes_of(run, name).items():
             if outcome.files and find_method(method).dtype == "float64":
                 first = trajectory_of(run, name, method).positions[0]
-                assert np.abs(first - scene.start).max() <= 1.01e-9, f"{name} x {method}"
+                shift = find_method(method).options.get("shift", 0.0)
+                assert np.abs(first - scene.start).max() <= 1.01 * shift, f"{name} x {method}"
 
 
 @pytest.mark.parametrize(
@@ -229,7 +234,7 @@ def test_printed_bending_is_simulated_and_judged_by_the_scenes_own():
     k = scene.cloth.material.bending_stiffness
     assert [term.name for term in own] == [term.name for term in declared] == ["strain", "bending", "gravity"]
     assert (own[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
-    assert own[0] is declared[0] and own[2] is declared[2] and made.scene.start is scene.start
+    assert own[0] is declared[0] and own[2] is declared[2] and np.array_equal(made.scene.start, scene.start)
     group = SceneRollOuts(scene)
     group.roll_outs.append(RollOut(group, entry, made.run(), suites=("validation",)))
     values = measured(group.roll_outs[0], ("energy",))[0]

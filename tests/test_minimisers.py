@@ -199,17 +199,22 @@ def test_a_hybrid_starts_each_step_from_the_next_frame_with_the_pins_of_the_step
 
 def test_a_warm_started_solver_has_its_first_guesses_ready_before_the_clock_starts(monkeypatch, tmp_path):
     scene = small_scene("hanging_sheet")
-    made = []
+    made, begun = [], []
+
+    def ready(scene):
+        made.append("on the clock" if warm_started.prepared else "before")
+        return frames
 
     def frames():
-        made.append("on the clock" if warm_started.prepared else "before")
+        begun.append(True)
         return (scene.start.copy() for _ in range(scene.frames))
 
     warm_started = WarmStarted(
         "skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1, "finish": False}
     )
     warm_started.prepared = False
-    monkeypatch.setattr(warm_started, "_frames", lambda scene: frames)
+    monkeypatch.setattr(warm_started, "_frames", ready)
     warm_started.prepare(scene)
-    warm_started.prepared = True
-    assert warm_started.run().frames == scene.frames and set(made) == {"before"}
+    warm_started.prepared, warm = True, len(begun)
+    assert warm_started.run().frames == warm_started.run().frames == scene.frames
+    assert made == ["before"] and len(begun) == warm + 2  # each run begins them anew
