@@ -166,7 +166,8 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
         twins = {r.method: r.value for r in errors if r.family == "simulation-perturbed"}
         # So few frames do not drive two runs apart [mm]; as little is what a distance to the reference means.
         assert 0.0 < twins["simulation-perturbed-1e-9"] < 1e-3
-        assert all(0.0 < r.uncertainty < 1.0 for r in errors)
+        unsure = {r.method: r.uncertainty for r in errors}
+        assert all(0.0 < u < 10.0 for u in unsure.values()), (name, unsure)
 
 
 def test_the_settled_shirt_is_at_rest_outside_of_the_body(scenes):
