@@ -133,5 +133,4 @@ def _bar(frames: range, label: str | None) -> Iterator[int] | range:
         return frames
     from tqdm import tqdm
 
-    # Runs of less than a second are often done again and again: they need no bar.
-    return tqdm(frames, desc=label, unit="frame", initial=frames.start, total=frames.stop, delay=1.0)
+    return tqdm(frames, desc=label, unit="frame", initial=frames.start, total=frames.stop)
