@@ -242,15 +242,19 @@ def test_the_gap_is_taken_to_the_lowest_minimum_found_and_distances_to_the_one_b
     potential = Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
     guess = first_guess(scene, scene.start, still, 2)
     potential.prepare(Step(scene.start, still, guess, scene.dt, None, 2))
+    folded = minimise(potential, crumpled, "lbfgs").positions
+    crumpled = folded + 1e-4 * np.random.default_rng(1).standard_normal(folded.shape)
+    crumpled[scene.cloth.pins] = scene.start[scene.cloth.pins]
     low, below = minimise(potential, guess).energy, minimise(potential, crumpled, "lbfgs")
     here = potential.value(crumpled)
-    assert low < below.energy  # several minima: the one reached from the frame itself is not the best
+    # Several minima: the one reached from the frame itself is near, and not the best.
+    assert here - low > 2.0 * (here - below.energy) > 0.0
     found = optimality(scene, np.array([scene.start, scene.start, crumpled]), samples=1).metrics()
     assert found["gap/energy"].value == pytest.approx(here - low, rel=1e-6)
-    assert found["gap/local"].value == pytest.approx(here - below.energy, rel=1e-12)
+    assert found["gap/local"].value == pytest.approx(here - below.energy, rel=1e-9)
     assert found["gap/found_by_simulator"] == 1
     apart = 1e3 * np.sqrt(((crumpled - below.positions) ** 2).sum(1).mean())
-    assert found["step/distance"].value == pytest.approx(apart, rel=1e-12)
+    assert found["step/distance"].value == pytest.approx(apart, rel=1e-9)
 
 
 def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypatch):
