@@ -142,7 +142,9 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
             assert ("penetration/vertices" in values) == (scene.obstacle is not None)
             assert len(against & set(values)) == (0 if method == "simulation" else len(against))
             ladder = method == "simulation" and not on_body
-            assert ({"time_error/total", "time_error/curvature"} <= set(values)) == ladder
+            # Where their order is not one, the difference to dt/8 takes the place of the error.
+            told = {name.replace("/eighth", "") for name in values if name.startswith("time_error/")}
+            assert ({"time_error/total", "time_error/curvature"} <= told) == ladder
             network = method in KINDS
             assert ("cost/train" in values) == (entry.trained is not None)
             assert ("cost/batch" in values) == network

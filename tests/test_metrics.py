@@ -233,6 +233,26 @@ def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():
     )
 
 
+@pytest.mark.parametrize(
+    ("of_halvings", "order"),
+    [
+        (lambda k: 0.028 + 0.0075 * k, 0.0),  # as much with each halving, as the strain of undamped cloth
+        (lambda k: 2.0 ** (-2 * k), 2.0),
+        (lambda k: (-0.5) ** k, None),  # to and fro
+        (lambda k: 4.0, None),
+    ],
+)
+def test_what_shows_no_first_order_has_no_limit(of_halvings, order):
+    names = {"energy/total": "total", "energy/strain": "strain", "curvature/mean": "curvature"}
+    found = time_errors([dict.fromkeys(names, of_halvings(k)) for k in range(4)])
+    expected = dict.fromkeys((f"eighth/{name}" for name in names.values()), of_halvings(0) - of_halvings(3))
+    if order is not None:
+        expected["order"] = order
+    assert found == pytest.approx({f"time_error/{name}": value for name, value in expected.items()}, abs=1e-9)
+    assert {find_metric(name).unit for name in found if name.endswith("curvature")} == {"1/m"}
+    assert find_metric("time_error/eighth/strain").unit == "J"
+
+
 def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
     def row(method: str, gap: float, metric: str = "gap/energy", scene: str = "flag", seed: int = 0) -> Row:
         entry = find_method(method)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 from benchmarks.plan import Motions
@@ -13,6 +14,9 @@ from benchmarks.selection import Request, choose
 from benchmarks.validation.case import Case
 from benchmarks.validation.fitted_order import fitted_order
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
+from benchmarks.validation.time_steps import VISCOSITY, Viscosity, halving_order
+from reference_sim import Cloth, Material, Potential
+from reference_sim.energies import Step
 
 
 @pytest.mark.parametrize("case", KNOWN_ANSWERS, ids=lambda case: case.name)
@@ -82,3 +86,24 @@ def test_order_is_the_slope():
     assert math.isnan(fitted_order([1.0, 0.0], [1, 0.5])) and math.isnan(
         fitted_order([1.0, math.inf], [1, 0.5])
     )
+
+
+@pytest.mark.parametrize("order", [0.5, 1, 2])
+def test_order_by_halving_needs_no_exact_answer(order):
+    limit, error = np.random.default_rng(0).normal(size=(2, 5, 3))
+    found = halving_order(lambda n: limit + error / n**order, (10, 20, 40, 80))
+    assert found == pytest.approx(order)
+
+
+def test_viscous_edges_resist_what_stretches_and_not_what_moves_alike():
+    rest = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    term = Viscosity(Cloth(rest, np.array([[0, 1, 2]]), Material()))
+    term.prepare(Step(previous=rest, velocity=0 * rest, guess=rest, dt=0.1))
+    assert np.abs(term.value_and_gradient(rest + np.array([1.0, 2.0, 3.0]))[1]).max() == 0.0
+    apart = rest.copy()
+    apart[1, 0] += 0.2  # at 2 m/s from both other vertices
+    value, gradient = term.value_and_gradient(apart)
+    assert gradient[:, 0] == pytest.approx([-2 * VISCOSITY, 4 * VISCOSITY, -2 * VISCOSITY])
+    assert value == pytest.approx(2 * VISCOSITY * 0.2**2 / 2 / 0.1)
+    hessian = Potential([term]).hessian(apart).toarray()
+    assert (hessian @ (apart - rest).ravel()).reshape(3, 3) == pytest.approx(gradient)

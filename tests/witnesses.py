@@ -67,6 +67,9 @@ WITNESSES = {
         "free_fall_in_substeps",
         "leaving_order",
         "leaving_point",
+        "membrane_time_step_order",
+        "pressed_time_step_order",
+        "viscous_time_step_order",
     ),
     "lambda and mu swapped": (
         "pendulum",
@@ -103,7 +106,10 @@ WITNESSES = {
     "weight upwards in the force": ("gradient_of_gravity",),
     "inertia over dt in the force": ("hessian_of_inertia",),
     "inertia's energy doubled": ("gradient_of_inertia",),
-    "velocity forgets dt": ("energy_inequality",),
+    "velocity forgets dt": (
+        "energy_inequality",
+        "swing_time_step_order",
+    ),
     "contact stiffness without the area": ("penalty_depth",),
     "friction of two thirds of the force": (
         "friction_spring_path",

@@ -24,6 +24,19 @@ ORDERS = (
     known_answer("leaving_order", "order in dt of where a point leaves a sphere",
         "round_bodies", "leaving_order", expected=1.0, tolerance=0.15,
         reason="backward Euler; the place is extrapolated from the force"),
+    known_answer("membrane_time_step_order", "order in dt of a vibrating membrane, against its exact motion",
+        "time_steps", "membrane_order", expected=1.0, tolerance=0.1,
+        reason="backward Euler; its second order still shows at 1/3840 s"),
+    known_answer("swing_time_step_order", "order in dt of a sheet that swings from its upper edge",
+        "time_steps", "swing_order", expected=1.0, tolerance=0.15,
+        reason="backward Euler; faster vibrations still show at 1/1920 s"),
+    known_answer("pressed_time_step_order", "order in dt of a taut sheet that a ball is pressed into",
+        "time_steps", "pressed_order", expected=1.0, tolerance=0.1,
+        reason="backward Euler; its second order still shows at 1/1200 s"),
+    known_answer("viscous_time_step_order",
+        "order in dt of a sheet held at two corners, wrinkled, with viscous edges",
+        "time_steps", "hanging_sheet_order", options={"viscous": True}, expected=1.0, tolerance=0.1,
+        reason="backward Euler; nothing swings too fast for the steps"),
     *(
         known_answer(f"curvature_{surface}_order", f"order in h of mean curvature on {words}, worst vertex",
             "curvature", f"{surface}_order", expected=2.0, tolerance=0.1,
@@ -62,6 +75,17 @@ IRREGULAR = tuple(
     for where in ("sphere", "cylinder")
 )  # fmt: skip
 
+UNDAMPED = (
+    known_answer("hanging_sheet_time_step_order",
+        "order in dt of the same sheet as it is, without viscosity",
+        "time_steps", "hanging_sheet_order", options={"viscous": False},
+        reason="reported: its vibrations are too fast for the steps, so the first order does not show"),
+    known_answer("chord_time_step_distance",
+        "distance of the sheet on the ball to one whose ball moves linearly between frames of 1/30 s",
+        "time_steps", "chord_distance", unit="m",
+        reason="reported: sub-steps converge to the motion along chords, not to the smooth one"),
+)  # fmt: skip
+
 DEPENDENCE = tuple(
     known_answer(f"{kind}_dependence_{quantity}",
         f"mean {title} of a hanging cloth with {change}, over that without",
@@ -73,4 +97,4 @@ DEPENDENCE = tuple(
     )
 )  # fmt: skip
 
-CASES = (*ORDERS, *VALUES, *IRREGULAR, *DEPENDENCE)
+CASES = (*ORDERS, *VALUES, *IRREGULAR, *UNDAMPED, *DEPENDENCE)
