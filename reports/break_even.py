@@ -14,7 +14,7 @@ import pandas as pd
 from reports.data import Run
 from reports.means import mean_of, value_of
 from reports.numbers import number
-from reports.pareto import TIME, fastest, points_of, solvers
+from reports.pareto import TIME, fastest, points_of, run_time, solvers
 from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
 from reports.styles import leading, style
 from reports.table import Cell, Column, Table, table
@@ -38,7 +38,7 @@ class Cost:
 
 def cost_of(frame: pd.DataFrame, method: str, scenes: Sequence[str]) -> Cost | None:
     """The cost of a method on the scenes given, or None where it was not timed there, or not in full."""
-    time = value_of(frame, method, TIME, scenes)
+    time = value_of(frame, method, run_time(frame[frame["scene"].isin(list(scenes))]), scenes)
     data, setup, train = (
         value_of(frame, method, f"cost/{what}", scenes) for what in ("data", "setup", "train")
     )

@@ -12,7 +12,17 @@ from reports.break_even import NETWORK, compared_scenes, cost_of, crossing, fram
 from reports.data import Run
 from reports.means import mean_of, pair, shared_scenes, value_of
 from reports.numbers import duration, number, with_spread
-from reports.pareto import SMALLER_STEPS, TIME, Point, beaten_by, fastest, indistinct, points_of, truncated
+from reports.pareto import (
+    SMALLER_STEPS,
+    TIME,
+    WHOLE,
+    Point,
+    beaten_by,
+    fastest,
+    indistinct,
+    points_of,
+    truncated,
+)
 
 TOTAL, CURVATURE, DISTANCE = "energy/total", "curvature/error", "distance/rms"
 
@@ -68,7 +78,11 @@ def run_time(run: Run, frame: pd.DataFrame) -> str:
     if own is None or reference is None or not own.value:
         return ""
     text = f"{run.label(NETWORK)} takes {number(own.value)} ms per frame, the simulation "
-    return f"{text}{number(reference.value)} ms: {number(reference.value / own.value, 2)} times{own.fewer}."
+    text += f"{number(reference.value)} ms: {number(reference.value / own.value, 2)} times{own.fewer}."
+    whole = pair(frame, NETWORK, run.reference, WHOLE)
+    if whole[0] is None or whole[1] is None:
+        return text
+    return f"{text} From pose to vertices {number(whole[0].value)} and {number(whole[1].value)} ms."
 
 
 def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
@@ -85,7 +99,9 @@ def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
             text += "nothing as fast as SNUG is nearer"
         else:
             within = " within repeats" if best.time > own.time else ""
-            text += f"{run.label(best.method)} is nearer and no slower{within} ({_both(best)})"
+            apart = own.error - best.error > own.error_spread + best.error_spread
+            near = "nearer" if apart else "as near, within the scatter of seeds and of right simulations,"
+            text += f"{run.label(best.method)} is {near} and no slower{within} ({_both(best)})"
         text += f"; the fastest solver as near is {run.label(solver.method)}, " if solver else ""
         text += f"{number(solver.time)} ms." if solver else "."
     return text.strip()

@@ -41,11 +41,13 @@ class Point:
     fewer: str = ""
 
 
-def points_of(
-    run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str, x: str = TIME
-) -> list[Point]:
-    """Every method that has both numbers in all the scenes, as means over them and the seeds that did all."""
+def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str, x: str = "") -> list[Point]:
+    """Every method that has both numbers in all the scenes, as means over them and the seeds that did all.
+
+    x: another metric than the run time.
+    """
     rows = frame[frame["scene"].isin(list(scenes))]
+    x = x or run_time(rows)
     measured = rows[rows["usable"] & rows["metric"].isin([metric, x])].groupby(["method", "seed"]).size()
     whole = measured.index[measured == len(scenes) * len({metric, x})]
     in_all = rows.set_index(["method", "seed"]).index.isin(whole)

@@ -102,7 +102,7 @@ def metric_against_metric(folder: Path, run: Run, x: str, y: str, scenes: Sequen
 
 def _errors(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """The points of one panel. The reference's own error is zero by construction: it is drawn as a line."""
-    points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric, run_time(rows))
+    points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric)
     # Smaller steps have errors of the garment, but none of the reference's own step.
     left_out = (SMALLER_STEPS,) if metric in OWN_STEP else ()
     reference = run.with_role("reference")

@@ -354,3 +354,17 @@ def test_any_metric_against_any_other(tmp_path, capsys):
     assert build.main([str(tmp_path), "--axes", "cost/frame", "gap/nothing"]) == 2
     assert "no row has the metric 'gap/nothing'" in capsys.readouterr().err
     assert build.main([str(tmp_path), "--axes", "cost/frame", "gap/energy", "--scenes", "moon"]) == 2
+
+
+def test_a_rival_within_the_uncertainty_of_the_reference_is_as_near():
+    rows = [
+        dataclasses.replace(
+            row(SCENES[0], method, metric, value), uncertainty=None if metric == "cost/frame" else 0.3
+        )
+        for method, time, error in (("snug", 1.0, 5.3), ("pbns", 0.5, 5.0), ("newton-1", 12.0, 1.0))
+        for metric, value in (("cost/frame", time), ("curvature/error", error))
+    ]
+    said = plain(run_of(rows))["Error against time"]
+    assert "PBNS is as near, within the scatter of seeds and of right simulations, and no slower" in said
+    sure = [dataclasses.replace(r, uncertainty=0.1 if r.uncertainty else None) for r in rows]
+    assert "PBNS is nearer and no slower" in plain(run_of(sure))["Error against time"]
