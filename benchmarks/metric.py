@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from .results import AS_RIGHT
+from .results import as_right
 
 if TYPE_CHECKING:
     from reference_sim import Trajectory
@@ -162,7 +162,8 @@ class SceneRollOuts(Kept):
     @property
     def as_right(self) -> list[RollOut]:
         """Simulations that could stand in the reference's place."""
-        return [r for r in self.roll_outs if r.entry.family in AS_RIGHT and r.status == "ok"]
+        of = self.roll_outs
+        return [r for r in of if as_right(r.entry.family, r.entry.level) and r.status == "ok"]
 
     @property
     def positions(self) -> list[np.ndarray]:

@@ -28,10 +28,10 @@ class Preset:
     steps: optimiser steps per kind of network, or per training. further: whether the
     ablations and further baselines of a suite take part without being named. settle_frames: frames from the
     T-pose into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along
-    each side. gap_samples: frames of a trajectory at which suite speed solves the step again to know the gap
-    to its minimum. least_seconds [s]: of run time to be measured of each timed cell, whose short run is done
-    again until then. repeats: times that a cell of suite speed is run, those whose first run took at most
-    repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended [s].
+    each side. gap_samples: frames of a trajectory, at least, at which suite speed solves the step
+    again to know the gap to its minimum. least_seconds [s]: of run time to be measured of each timed cell,
+    whose short run is done again until then. repeats: times that a cell of suite speed is run, those whose
+    first run took at most repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended [s].
     """
 
     name: str
@@ -84,7 +84,7 @@ PRESETS = (
         sheet_cells=6,
         sheet_frames=10,
         iteration_budgets=(1, 4),
-        gap_samples=3,
+        gap_samples=10,
         least_seconds=0.1,
         repeats=2,
         repeat_seconds=0.5,
@@ -113,7 +113,7 @@ PRESETS = (
         sheet_cells=14,
         sheet_frames=45,
         iteration_budgets=(1, 2, 4, 8),
-        gap_samples=4,
+        gap_samples=36,
         least_seconds=1.0,
         repeats=3,
         repeat_seconds=1.5,
@@ -138,7 +138,7 @@ PRESETS = (
         sheet_cells=30,
         sheet_frames=90,
         iteration_budgets=(1, 2, 4, 8),
-        gap_samples=20,
+        gap_samples=40,
         least_seconds=1.0,
         repeats=3,
         repeat_seconds=120.0,

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-FORMAT = 2  # of run.json, results.csv and the cache; written into run.json
+FORMAT = 3  # of run.json, results.csv and the cache; written into run.json
 OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
 
@@ -31,9 +31,18 @@ ROLES = (
     "warm-started", "",
 )  # fmt: skip
 
-# Families of simulations that are as right as the reference. Those of another time step are not: they solve
-# another discrete problem, and how far they are from it is the time error.
-AS_RIGHT = ("simulation-perturbed", "simulation-tolerance", "simulation-refrozen")
+REFERENCE_TOLERANCE = 1e-6  # of the reference's minimisations
+
+
+def as_right(family: str, level: float | None) -> bool:
+    """Whether simulations of that family and level could stand in the reference's place.
+
+    From a moved start, with contact planes searched twice, or to a tolerance at least as small. Those of
+    another time step could not: they solve another discrete problem; how far off that is is the time error.
+    """
+    if family == "simulation-tolerance":
+        return level is not None and level <= REFERENCE_TOLERANCE
+    return family in ("simulation-perturbed", "simulation-refrozen")
 
 
 class ResultsError(ValueError):

@@ -13,7 +13,7 @@ from snug.recipes import learns_from_simulation
 from .methods import find_method
 from .metrics import declared, find_metric
 from .plan import Plan, network_of
-from .results import AS_RIGHT, Row
+from .results import REFERENCE_TOLERANCE, Row, as_right
 from .schedule import Schedule
 from .tasks.cell import Cell
 from .tasks.task import Outcome, Task, TaskId
@@ -174,13 +174,13 @@ def with_uncertainty(rows: Sequence[Row]) -> list[Row]:
 
     Not of times, and not of what has an uncertainty of its own.
     """
-    others: dict[tuple[str, str, str], list[float]] = {}
+    others: dict[tuple[str, str], list[float]] = {}
     for row in rows:
-        if row.family in AS_RIGHT and row.status == "ok" and row.value is not None:
-            others.setdefault((row.suite, row.scene, row.metric), []).append(row.value)
+        if as_right(row.family, row.level) and row.status == "ok" and row.value is not None:
+            others.setdefault((row.scene, row.metric), []).append(row.value)
 
     def of(row: Row) -> float | None:
-        there = others.get((row.suite, row.scene, row.metric), [])
+        there = others.get((row.scene, row.metric), [])
         if row.role == "reference" and row.uncertainty is None and not row.metric.startswith("cost/"):
             return max((abs(value - row.value) for value in there if row.value is not None), default=None)
         return row.uncertainty
@@ -217,7 +217,8 @@ def _curves(row: Row) -> tuple[str, ...]:
     """The curves along which it should fall: by its level, or as the reference among its tolerances."""
     if row.role == "reference":
         return ("simulation-tolerance",)
-    return (row.family,) if row.level is not None and row.family != "simulation-dt" else ()
+    other = ("simulation-dt", "simulation-perturbed")  # another problem, another start
+    return (row.family,) if row.level is not None and row.family not in other else ()
 
 
 def rises(gaps: Iterable[Row]) -> dict[str, str]:
@@ -231,9 +232,6 @@ def rises(gaps: Iterable[Row]) -> dict[str, str]:
         if row.value < lowest[1]:
             lowest = row.method, row.value
     return remarks
-
-
-REFERENCE_TOLERANCE = 1e-6
 
 
 def _fineness(row: Row) -> float:

@@ -133,6 +133,8 @@ class Schedule:
     def cell(self, cell: Cell) -> RunCell:
         of_scene = self._of_scene(cell.scene, f"{TASKS}.cell", cell.entry.module)
         inputs = of_scene["inputs"] | {"method": _declared(cell.entry)}
+        if cell.timed:
+            inputs["least"] = self._least(cell)
         if cell.entry.seeded:
             inputs["seed"] = cell.seed
         needs = (self.start(cell.scene).id,) if cell.scene.simulated else ()
@@ -149,7 +151,8 @@ class Schedule:
     def _after(self, kind: Any, cell: Cell, name: str, **fields: Any) -> Task:
         first = self.cell(cell)
         return kind(
-            name=name, label=cell.label, cell=cell, inputs={}, modules=(f"{TASKS}.cell",), needs=(first.id,),
+            name=name, label=cell.label, cell=cell, inputs={"least": first.least},
+            modules=(f"{TASKS}.cell",), needs=(first.id,),
             process=first.process, deadline=first.deadline, least=first.least, **fields,
         )  # fmt: skip
 

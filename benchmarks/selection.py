@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from .validation.case import Case
 
+FEWEST = 3  # frames of a motion: inertia needs two before the one that is judged
 FIRST_GARMENT = GARMENT_SCENES[0].garment
 MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
 
@@ -182,6 +183,8 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
         for motion in load_motions(path) if path != "library" else ():
             if motion.name in files or motion.name in LIBRARY:
                 raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
+            if motion.frames < FEWEST:
+                raise PlanError(f"--motions {path}: {motion.frames} frames; at least {FEWEST} are needed")
             files[motion.name] = motion
     with_library = not paths or "library" in paths
     names = [*sorted(files), *((*TRAIN, *TEST) if with_library else ())]

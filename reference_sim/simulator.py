@@ -63,7 +63,7 @@ def simulate(
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
         refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
-            ended, and the step solved again from there.
+            ended, and the step solved again from there. Such a run cannot be resumed.
         path: write the VTKHDF file there, frame by frame.
         resume: go on after the last whole frame of `path`, where a run with the same arguments left it (more
             frames may be asked for); without such a file start at the beginning. The same bits come out as
@@ -79,12 +79,14 @@ def simulate(
         residual, see `Result`), converged (0/1), energy/<term> [J].
 
     Raises:
-        ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step.
+        ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, refreeze with resume.
         TrajectoryError: `path` cannot be resumed: unreadable, or made by another run.
     """
     for name, count in (("frames", frames), ("substeps", substeps)):
         if count < 1:
             raise ValueError(f"simulate: {name} = {count}: must be at least 1")
+    if refreeze and resume:
+        raise ValueError("simulate: a run with refreeze cannot be resumed: start it again without resume")
     x = _checked(start, cloth.rest_positions, "start")
     v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
     loop = Stepper(cloth, energies, dt, substeps, obstacle, guess, quasi_static, refreeze, options)

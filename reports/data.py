@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.results import AS_RIGHT, COLUMNS, ROLES, Row
+from benchmarks.results import COLUMNS, ROLES, Row, as_right
 
 USABLE = ("ok", "stalled")
 SUITES = ("garments", "speed", "validation", "extremes", "performance")
@@ -103,9 +103,8 @@ class Run:
 
     @property
     def twins(self) -> list[str]:
-        """Simulations as right as the reference, those to another tolerance left out: they are a curve."""
-        families = set(AS_RIGHT) - {"simulation-tolerance"}
-        return [name for name, method in self.methods.items() if method.family in families]
+        """Simulations as right as the reference."""
+        return [name for name, method in self.methods.items() if as_right(method.family, method.level)]
 
     def label(self, method: str) -> str:
         return self.methods[method].label if method in self.methods else method

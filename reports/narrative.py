@@ -136,7 +136,7 @@ def reference(run: Run, frame: pd.DataFrame) -> str:
     steps = [m for m in run.methods.values() if m.family == SMALLER_STEPS and m.level]
     finest = max(steps, key=lambda m: m.level or 0.0, default=None)
     found = [value_of(frame, finest.name, metric) for metric in (CURVATURE, DISTANCE)] if finest else []
-    if finest is None or None in found:
+    if finest is None or not all(value and value > least for value, least in zip(found, apart)):
         return text
     text += f" It is not converged in time: with {finest.level:g} steps a frame it is itself "
     return text + f"{number(found[0])} 1/m and {number(found[1])} mm away."

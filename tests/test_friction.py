@@ -206,3 +206,21 @@ def test_the_first_step_has_the_normal_force_of_the_start():
         contact.prepare(step)
         friction.prepare(step)
         assert friction.forces == pytest.approx(0.3 * 3 * 3.4e6 * scene.cloth.vertex_areas * 1e-6, rel=1e-9)
+
+
+def test_friction_of_a_step_that_is_frozen_again_is_the_same_and_of_another_past_is_refused():
+    scene = on_a_belt()
+    plain = simulated(scene)
+    given = {"dt": scene.dt, "frames": scene.frames, "obstacle": scene.obstacle, "start": scene.start}
+    again = simulate(scene.cloth, scene.energies, refreeze=1, **given)
+    # A slope is one plane: searched again it is the same, and so is the friction on it.
+    assert again.status == "converged" and np.abs(again.positions - plain.positions).max() < 1e-6
+    potential = Potential(own_terms(scene))
+    x = plain.positions
+    prepare(scene, potential, x, 5)
+    step = Step(x[4] + 1e-3, 0 * x[4], x[5], scene.dt, scene.obstacle, 5)
+    potential.prepare(step)
+    with pytest.raises(ValueError, match="does not know its normal force"):
+        potential.value(x[5])
+    with pytest.raises(ValueError, match="refreeze cannot be resumed"):
+        simulate(scene.cloth, scene.energies, refreeze=1, resume=True, path="no.vtkhdf", **given)

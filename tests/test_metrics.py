@@ -266,6 +266,7 @@ def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
     rising = [row("newton-8", 0.2), row("vbd-5", 0.2), row("snug+lbfgs-1", 0.3, seed=1)]
     rising.append(row("simulation-1e-8", 1e-9))
     elsewhere = [row("newton-1", 0.01, "curvature/error"), row("newton-4", 0.01, scene="sheet")]
+    elsewhere += [row("simulation-perturbed-1e-4", 1e-5), row("simulation-perturbed-1e-9", 1e-2)]  # no curve
     found = remarked([*falling[:2], *rising, *elsewhere])
     assert [r.method for r in found if r.reason] == ["newton-8"]
     assert found[2].reason == "the error does not fall here: newton-4, the coarser one, has a gap of 0.1"

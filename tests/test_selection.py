@@ -55,7 +55,8 @@ def test_only_what_has_a_seed_is_repeated_and_the_rest_is_the_same_whatever_the_
 def test_patterns_choose_scenes_methods_and_cases():
     found, cases = chosen(("speed", "validation", "extremes"), scenes=["*sheet*", "free_fall"])
     assert {cell.scene.name for cell in found} == {"hanging_sheet", "sheet_on_sphere", "free_fall"}
-    assert [case.name for case in cases if case.suite == "validation"] == ["free_fall"]
+    known = [case.name for case in cases if case.suite == "validation"]
+    assert known == ["free_fall", "hanging_sheet_time_step_order"]
     assert tuple(case for case in cases if case.suite == "extremes") == MAPS["map_sheet"]
     _, cases = chosen(("validation", "extremes"), methods=["sim*"])
     assert sum(case.suite == "validation" for case in cases) >= 10
@@ -123,12 +124,15 @@ def test_motions_are_divided_as_help_says(tmp_path):
     assert both.train == ("a", "b", "c", *TRAIN) and both.test == TEST
     single = choose_motions([str(Path(clips) / "a.npz")], [], quick)
     assert (single.train, single.test) == (TRAIN, ("a",))
+    (tmp_path / "short").mkdir()
+    with pytest.raises(PlanError, match="2 frames; at least 3 are needed"):
+        choose_motions([clips_folder(tmp_path / "short", "d", frames=2) + "/d.npz"], [], quick)
     with pytest.raises(PlanError, match="taken"):
         choose_motions([clips, clips], [], quick)
 
 
-def clips_folder(folder: Path, *names: str) -> str:
+def clips_folder(folder: Path, *names: str, frames: int = 12) -> str:
     for name in names:
-        poses = np.zeros((12, 52 * 3))
-        np.savez(folder / f"{name}.npz", poses=poses, trans=np.zeros((12, 3)), mocap_framerate=30.0)
+        poses = np.zeros((frames, 52 * 3))
+        np.savez(folder / f"{name}.npz", poses=poses, trans=np.zeros((frames, 3)), mocap_framerate=30.0)
     return str(folder)

@@ -12,7 +12,7 @@ from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import curvature, dynamics, energy, excess, geometry
 from benchmarks.metrics.hem import HemMotion
-from benchmarks.results import AS_RIGHT, Row
+from benchmarks.results import Row, as_right
 from benchmarks.rows import with_uncertainty
 from benchmarks.tasks.metrics import compared, measured
 from reference_sim import Trajectory
@@ -56,8 +56,9 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
 
 
 def test_simulations_of_another_step_are_not_as_right_and_all_others_are():
-    families = {entry.family for entry in METHODS if entry.role == "reference-variant"}
-    assert families == {*AS_RIGHT, "simulation-dt"}
+    variants = [entry for entry in METHODS if entry.role == "reference-variant"]
+    others = {entry.name for entry in variants if not as_right(entry.family, entry.level)}
+    assert others == {f"simulation-{what}" for what in ("1e-2", "1e-4", "dt/2", "dt/4", "dt/8")}
     perturbed = [entry for entry in METHODS if entry.family == "simulation-perturbed"]
     assert len(perturbed) >= 8 and min(e.level for e in perturbed) == 1e-9
     assert max(e.level for e in perturbed) == 1e-4 and not any(e.timed for e in perturbed)

@@ -18,7 +18,7 @@ class PrintedBending(Simulation):
     """The reference with other hinges."""
 
     def prepare(self, scene: BuiltScene) -> None:
-        start = scene.start
+        start = scene.start_state
         energies = tuple(map(_printed, scene.energies))
         super().prepare(dataclasses.replace(scene, energies=energies, settle=lambda: start))
 

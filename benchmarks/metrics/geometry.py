@@ -50,7 +50,8 @@ METRICS = (
     ),
     Metric(
         name="drift/hem", unit="mm", title="Hem drift", table="penetration",
-        definition="how far the hem's mean height above the pelvis has risen from first to last frame",
+        definition="how far the hem's mean height above the pelvis has risen from the first judged frame to "
+        "the last",
     ),
 )  # fmt: skip
 

@@ -9,7 +9,7 @@ found from x_t, the one that lies below the frame. Over the judged frames
     gap        mean of Phi(x_t) - Phi* [J]
     local      mean of Phi(x_t) - Phi(y_t) [J]
     relative   gap / scale,  scale = mean of Phi(x_s) - Phi(x_r) over steps of the reference simulation x_r
-    refrozen   the gap where planes are frozen at x_t instead: what depends on where they are frozen
+    refrozen   the local gap where planes are frozen at x_t instead: what depends on where they are frozen
     distance   mean of the root mean square distance of vertices between x_t and y_t [mm]
     curvature  mean of |H(x_t) - H(y_t)| by the areas of y_t [1/m]
     norm       mean of the largest component of grad Phi(x_t), in mean vertex weights
@@ -18,8 +18,9 @@ x_s is the garment skinned to the frame's pose or, where there is no body, the g
 same for every method of a scene. Each method is judged from its own history, which a chaotic roll-out cannot
 blur: a small gap says that a step was solved, not that the past was right; it does not measure dynamics.
 
-All judged frames are looked at, or of a long roll-out as many, evenly spread, as bring the standard error of
-the gap below PRECISION of it; that error is the uncertainty of its row.
+All judged frames are looked at or, of more than the preset's `gap_samples`, as many, evenly spread, as
+bring the standard error of the gap below PRECISION of it, or below LEAST of the scale; that error is the
+uncertainty of its row. Planes are frozen at the frame in the first `gap_samples` of them.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap d
 FINDERS = ("simulator", "from_frame", "frame")
 ALIKE = 1e-9  # of the scale: minima this near are one
 PRECISION = 0.05  # standard error of the gap, as a share of it
-LEAST = 1e-4  # of the scale: a standard error below it is small enough however small the gap is
+LEAST = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
 MM = 1e3
 
 METRICS = (
@@ -73,7 +74,8 @@ METRICS = (
     ),
     Metric(
         name="gap/refrozen", unit="J", title="Refrozen gap", table="speed", lower_is_better=True,
-        definition="the same with contact planes searched at the frame instead of the step's first guess",
+        definition="how far frames lie above the minimum below them where contact planes are searched at the "
+        "frame instead of the step's first guess",
     ),
     Metric(
         name="step/distance", unit="mm", title="One-step distance", table="speed", lower_is_better=True,
@@ -108,7 +110,8 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
         return found
     gap = found["gap/energy"]
     assert isinstance(gap, Estimate)
-    found["gap/relative"] = Estimate(gap.value / scale, gap.uncertainty / scale) if scale else gap
+    if scale > 0.0:
+        found["gap/relative"] = Estimate(gap.value / scale, gap.uncertainty / scale)
     return found | ({"gap/scale": scale} if roll_out is group.reference else {})
 
 

@@ -95,8 +95,9 @@ def compared(
     values = compare(roll_out, roll_out.reference)
     others = [compare(roll_out, other) for other in roll_out.group.as_right if other is not roll_out]
     return {
-        name: Estimate(value, max(abs(other[name] - value) for other in others)) if others else value
+        name: Estimate(value, max(moved)) if moved else value
         for name, value in values.items()
+        for moved in [[abs(other[name] - value) for other in others if name in other]]
     }
 
 

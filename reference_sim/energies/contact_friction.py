@@ -71,6 +71,8 @@ class ContactFriction(Energy):
             self.forces = self._coulomb(samples, skin, planes.normals)
         elif last and last[0].obstacle is step.obstacle and last[0].frame == step.frame - 1:
             self.forces = self._coulomb(samples, last[1].points, last[1].normals)
+        elif last and _same_step(last[0], step):
+            pass  # frozen again at another guess: the force of the step before stays
         else:  # left over from another run, or a frame that was jumped to
             self.forces = None
         self.anchors, self.normals = samples + planes.points - skin, planes.normals
@@ -123,6 +125,12 @@ class ContactFriction(Energy):
         w = self.weights[elements]
         curvature = 2 * forces[elements] / self.threshold
         return elements, curvature[:, None, None] * w[:, :, None] * w[:, None, :]
+
+
+def _same_step(one: Step, other: Step) -> bool:
+    """Whether both lead from the same positions to the same frame."""
+    same = one.obstacle is other.obstacle and one.frame == other.frame
+    return same and np.array_equal(one.previous, other.previous)
 
 
 @njit(cache=True, inline="always")
