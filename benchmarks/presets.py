@@ -31,7 +31,8 @@ class Preset:
     each side. gap_samples: frames of a trajectory, at least, at which suite speed solves the step
     again to know the gap to its minimum. least_seconds [s]: of run time to be measured of each timed cell,
     whose short run is done again until then. repeats: times that a cell of suite speed is run, those whose
-    first run took at most repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended [s].
+    first run took at most repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended
+    [s].
     """
 
     name: str
