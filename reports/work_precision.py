@@ -150,7 +150,8 @@ def _draw_errors(
         caption += "right as the reference changes."
     if any(bands):
         caption += " Grey: as near as such simulations are to each other; of the gap, what the reference "
-        caption += "leaves where contact planes are searched at the end of its steps."
+        caption += "leaves where contact planes are searched at the end of its steps. A tenth of that is the "
+        caption += "lower edge."
     if lead:
         return save(figure, folder, "error_against_time", caption=brief, kind="lead")
     name = f"error_against_time_{file_name(scene)}"
@@ -179,7 +180,8 @@ def _draw_points(
     axes: Axes, run: Run, points: Sequence[Point], reference: float | None, band: float
 ) -> set[str]:
     """The markers of one panel; returns the methods whose error is too small for it."""
-    least = max((p.error for p in points), default=1.0) * 10.0**-DECADES
+    # What cannot be told from the reference needs no decades of its own.
+    least = max(max((p.error for p in points), default=1.0) * 10.0**-DECADES, band / 10.0)
     edge = _limits(axes, points, reference, least)
     best = front(p for p in points if p.error > least)
     if len(best) > 1:

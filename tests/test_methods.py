@@ -37,6 +37,8 @@ TINY = dataclasses.replace(
 )
 # Further learned methods have tests of their own. On a body the coarsest speaks for each family of solvers.
 SMALL_METHODS = [e for e in METHODS if e not in LEARNED and (e.trained is None or e.trained in KINDS)]
+# One moved start speaks for all.
+SMALL_METHODS = [e for e in SMALL_METHODS if e.family != "simulation-perturbed" or e.level == 1e-9]
 BY_LEVEL = sorted(SMALL_METHODS, key=lambda entry: (entry.family, entry.level or 0.0))
 COARSEST = [next(own) for family, own in itertools.groupby(BY_LEVEL, lambda e: e.family) if family]
 COARSEST += [find_method("simulation-1e-2")]
@@ -169,7 +171,8 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
         # So few frames do not drive two runs apart [mm]; as little is what a distance to the reference means.
         assert 0.0 < twins["simulation-perturbed-1e-9"] < 1e-3
         unsure = {r.method: r.uncertainty for r in errors}
-        assert all(0.0 < u < 10.0 for u in unsure.values()), (name, unsure)
+        assert all(0.0 <= u < 10.0 for u in unsure.values()), (name, unsure)
+        assert unsure["newton-1"] > 0.0
 
 
 def test_the_settled_shirt_is_at_rest_outside_of_the_body(scenes):
