@@ -65,7 +65,7 @@ class Preset:
 PRESETS = (
     Preset(
         name="smoke",
-        description="everything once, tiny: 2 to 3 minutes on 2 cores; its numbers mean nothing",
+        description="everything once, tiny: about 3 minutes on 2 cores; its numbers mean nothing",
         garment_vertices=350,
         train_motions=1,
         test_motions=1,

@@ -28,7 +28,7 @@ PROGRAM = "benchmarks.run"
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 EXAMPLES = """examples:
   python -m benchmarks.run                                    the quick run: every suite's quick subset
-  python -m benchmarks.run --preset smoke                     everything once, tiny, 2 to 3 minutes
+  python -m benchmarks.run --preset smoke                     everything once, tiny, about 3 minutes
   python -m benchmarks.run --suite garments -o reports/runs/mine
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
   python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2
