@@ -123,6 +123,10 @@ class RollOut(Kept):
         """The frames after those of the warm-up."""
         return slice(self.scene.warm_up, None)
 
+    def judged_beside(self, other: np.ndarray) -> slice:
+        """Of these the frames that positions (T',V,3) [m] of another roll-out have too."""
+        return slice(self.scene.warm_up, min(len(self.positions), len(other)))
+
     @property
     def place(self) -> int:
         """Among the roll-outs of the group."""

@@ -55,7 +55,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    frames = slice(roll_out.scene.warm_up, min(len(roll_out.positions), len(reference.positions)))
+    frames = roll_out.judged_beside(reference.positions)
     ours, theirs = roll_out.kept(series_of).part(frames), reference.kept(series_of).part(frames)
     return {
         "curvature/error": float(curvature_error(ours, theirs).mean()),

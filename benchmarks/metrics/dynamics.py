@@ -45,7 +45,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     own = group.quasi_static if roll_out is group.reference else roll_out.quasi_static
     found: dict[str, float] = compare(roll_out, roll_out) if roll_out is group.reference else {}
     if own is not None:
-        frames = slice(roll_out.scene.warm_up, min(len(x), len(own)))
+        frames = roll_out.judged_beside(own)
         found["dynamics/quasi_static_difference"] = rms(x[frames], own[frames])
     return found
 

@@ -33,7 +33,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     if lowest is None or lowest is roll_out:
         return {}
     ours, theirs = energies(roll_out), energies(lowest)
-    frames = slice(roll_out.scene.warm_up, min(len(ours["total"]), len(theirs["total"])))
+    frames = roll_out.judged_beside(lowest.positions)
     above = {name: float((ours[name][frames] - theirs[name][frames]).mean()) for name in ours}
     return {
         "excess/total": above["total"],

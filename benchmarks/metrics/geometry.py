@@ -57,7 +57,7 @@ METRICS = (
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    frames = slice(roll_out.scene.warm_up, min(len(roll_out.positions), len(reference.positions)))
+    frames = roll_out.judged_beside(reference.positions)
     x, y = roll_out.positions[frames], reference.positions[frames]
     return {
         "distance/rms": rms(x, y),

@@ -16,38 +16,22 @@ from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Step, StretchStVK
 from reference_sim.obstacle import Planes
 
-from ..scene import Scene
 from ..scenes import hanging_sheet
 from ..scenes.sheet import sheet, square_sheet
 from .converged import converged
+from .dynamics import HANGING, stretched_membrane
 from .fitted_order import fitted_order
-from .meshes import in_space, right_grid
 from .round_bodies import RoundBody
 
-HANGING = Scene(
-    name="hanging_sheet", description="held at two corners", module="benchmarks.scenes.hanging_sheet"
-)
 VISCOSITY = 0.25  # [N s/m] of an edge: waves faster than about 100 rad/s do not swing
 BALL = 0.1  # [m] radius
 
 
 def membrane_order() -> float:
-    """Order of the lowest mode of a stretched square membrane after a tenth of a second: A cos(omega t).
-
-    With stretch s, spacing h and lumped masses omega^2 = (S/rho_a) (4/h^2) 2 sin^2(pi h/2),
-    S = (lam + mu)(s^2 - 1).
-    """
-    cells, s, amplitude, end = 8, 1.2, 1e-5, 0.1
-    material = Material()
-    points, faces = right_grid(cells, cells, 1.0, 1.0)
-    on_border = (np.abs(points - 0.5) > 0.5 - 1e-9).any(axis=1)
-    cloth = Cloth(in_space(points), faces, material, pins=np.flatnonzero(on_border))
-    mode = np.sin(np.pi * points[:, 0]) * np.sin(np.pi * points[:, 1])
-    start = s * in_space(points)
-    start[:, 2] = amplitude * mode
-    tension = (material.lame_lambda + material.lame_mu) * (s**2 - 1)
-    omega = np.sqrt(8 * tension / material.areal_density) * cells * np.sin(np.pi / (2 * cells))
-    exact = amplitude * np.cos(omega * end) * mode
+    """Order of the lowest mode of a stretched square membrane after a tenth of a second: A cos(omega t)."""
+    amplitude, end = 1e-5, 0.1
+    cloth, start, mode, omega2 = stretched_membrane(amplitude)
+    exact = amplitude * np.cos(np.sqrt(omega2) * end) * mode
     steps = (96, 192, 384)
     ends = [_end(cloth, [StretchStVK(cloth)], start, end, n, tolerance=1e-11) for n in steps]
     return fitted_order([float(np.linalg.norm(x[:, 2] - exact)) for x in ends], [end / n for n in steps])
