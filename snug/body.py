@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snug.formats.smpl_body import read_smpl
-from snug.skeleton import JOINT_NAMES, BodyError
+from snug.skeleton import JOINT_NAMES, BodyError, joint_transforms
 
 BAKED = Path(__file__).parent / "data" / "body.npz"
 _CHUNK = 64  # frames skinned in one matrix product, to bound memory
@@ -106,10 +106,6 @@ class Body:
         self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None
     ) -> NDArray[np.float64]:
         """Rest-to-posed transform of each joint, (T, 24, 3, 4). Arguments and errors as for `vertices`."""
-        import torch
-
-        from snug.skinning import axis_angle_to_matrix, joint_transforms
-
         poses, translations = np.asarray(poses, dtype=float), np.asarray(translations, dtype=float)
         joints = len(self.joint_template)
         if poses.ndim != 3 or poses.shape[1:] != (joints, 3) or translations.shape != (len(poses), 3):
@@ -119,11 +115,7 @@ class Body:
             )
         if not (np.isfinite(poses).all() and np.isfinite(translations).all()):
             raise BodyError("poses or translations hold values that are not finite; check the motion")
-        with torch.no_grad():
-            rotations = axis_angle_to_matrix(torch.from_numpy(poses))
-            rest = torch.from_numpy(self.joints(betas))
-            shifts = torch.from_numpy(translations)
-            return joint_transforms(rotations, rest, self.parents.tolist(), shifts).numpy()
+        return joint_transforms(poses, translations, self.joints(betas), self.parents.tolist())
 
     @cached_property
     def height(self) -> float:

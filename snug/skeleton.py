@@ -7,6 +7,8 @@ arm along +x, metres, the floor at y = 0.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 JOINT_NAMES = (
@@ -62,10 +64,10 @@ def axis_angles(matrices: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(flat).as_rotvec().reshape(np.shape(matrices)[:-1])
 
 
-def global_rotations(poses: np.ndarray) -> np.ndarray:
-    """Rotation of every joint in the world. poses: (T, 24, 3) [rad] -> (T, 24, 3, 3)."""
+def global_rotations(poses: np.ndarray, parents: Sequence[int] = PARENTS) -> np.ndarray:
+    """Rotation of every joint in the world. poses: (T, J, 3) [rad] -> (T, J, 3, 3)."""
     rotations = rotation_matrices(poses)
-    for joint, parent in enumerate(PARENTS):
+    for joint, parent in enumerate(parents):
         if parent >= 0:
             rotations[:, joint] = rotations[:, parent] @ rotations[:, joint]
     return rotations
@@ -76,6 +78,18 @@ def joint_positions(
 ) -> np.ndarray:
     """Forward kinematics: (T, 24, 3) [rad], (T, 3) [m], rest (24, 3) [m] -> (T, 24, 3) [m]."""
     return _positions(global_rotations(poses), np.asarray(translations), rest_joints)
+
+
+def joint_transforms(
+    poses: np.ndarray, translations: np.ndarray, rest_joints: np.ndarray, parents: Sequence[int]
+) -> np.ndarray:
+    """Rest-to-posed transform of each joint, (T, J, 3, 4); see `snug.skinning.joint_transforms`, which is
+    the same in torch. poses (T, J, 3) [rad], translations (T, 3) [m], rest_joints (J, 3) [m].
+    """
+    rotations = global_rotations(poses, parents)
+    shifts = _positions(rotations, translations, rest_joints, parents)
+    shifts -= np.einsum("tjab,jb->tja", rotations, rest_joints)
+    return np.concatenate([rotations, shifts[..., None]], axis=-1)
 
 
 def sole_points(poses: np.ndarray, translations: np.ndarray) -> np.ndarray:
@@ -91,9 +105,14 @@ def sole_points(poses: np.ndarray, translations: np.ndarray) -> np.ndarray:
     return np.stack(points, axis=1)
 
 
-def _positions(rotations: np.ndarray, translations: np.ndarray, rest_joints: np.ndarray) -> np.ndarray:
+def _positions(
+    rotations: np.ndarray,
+    translations: np.ndarray,
+    rest_joints: np.ndarray,
+    parents: Sequence[int] = PARENTS,
+) -> np.ndarray:
     positions = np.empty((*rotations.shape[:2], 3))
-    for joint, parent in enumerate(PARENTS):
+    for joint, parent in enumerate(parents):
         if parent < 0:
             positions[:, joint] = rest_joints[joint] + translations
         else:

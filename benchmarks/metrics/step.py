@@ -38,9 +38,9 @@ def prepare(
     """Freeze the potential for the step that ended at `frame` (1 or later) of positions (T,V,3) [m], at the
     simulator's first guess or at another; gives that guess (V,3) [m].
 
-    The step before, which a term may remember, is prepared first: any frame may be jumped to.
+    Any frame may be jumped to: the step before is prepared first where a term remembers it.
     """
-    if frame > 1:
+    if frame > 1 and any(term.remembers for term in potential.energies):
         potential.prepare(step_to(scene, positions, frame - 1))
     step = step_to(scene, positions, frame, guess=guess)
     potential.prepare(step)

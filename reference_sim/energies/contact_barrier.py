@@ -49,6 +49,7 @@ class ContactBarrier(Energy):
     """
 
     name = "barrier"
+    remembers = True  # where the obstacle stopped
     dynamic = True
 
     def __init__(

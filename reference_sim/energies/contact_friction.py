@@ -43,6 +43,7 @@ class ContactFriction(Energy):
     """
 
     name = "friction"
+    remembers = True
 
     def __init__(self, contact: ContactPenalty, *, coefficient: float = 0.5, speed: float = 0.02) -> None:
         self.cloth = contact.cloth

@@ -45,12 +45,15 @@ class Energy:
         stencils: (N, k) vertex indices of each element.
         dynamic: True where the vertices that the term couples change with x, as the pairs of a contact do.
             Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks.
+        remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
+            judged without preparing the one before it.
     """
 
     name: str
     cloth: Cloth
     stencils: np.ndarray
     dynamic: bool = False
+    remembers: bool = False
 
     def energy(self, x: Tensor) -> Tensor:
         """Energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""
