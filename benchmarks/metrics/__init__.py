@@ -13,6 +13,7 @@ from ..registry import DeclarationError, by_name
 
 MODULES = (
     "energy",
+    "printed_bending",
     "excess",
     "curvature",
     "shape",
