@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.25  # of the cloth's diagonal: from where the scene's cloth is, a first frame lies nearer than that
 BETTER = 0.5  # another unit or axis fits better where its distance is less than so much of the stated one's
+SIZES = 2.0  # times as large, or as small, as the cloth a first frame may be
 LONG = 3.0  # times as long as at rest, edges in the mean: then they join vertices that are no neighbours
 ALIKE = 1e-6  # of a frame rate
 
@@ -79,19 +80,26 @@ def expected_positions(scene: BuiltScene) -> np.ndarray:
 def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: Stated) -> None:
     """Among all units and up axes the stated ones are those with which the first frame fits best."""
     first, size = stored.positions[0], _diagonal(expected)
+    alike = [units for units in METRES if 1 / SIZES < METRES[units] * _diagonal(first) / size < SIZES]
+    if not alike:
+        across = METRES[stated.units] * _diagonal(first)
+        raise RollOutError(
+            f"its first frame is {across:.3g} m across, the scene's cloth {size:.3g} m, in whatever unit of "
+            f"{', '.join(METRES)}: write metres"
+        )
     apart = {
         (units, up): _cloud_distance(to_metres_y_up(first, units=units, up=up), expected)
-        for units in METRES
+        for units in alike
         for up in UP_AXES
     }
-    best = min(apart, key=lambda names: apart[names])
-    here = apart[stated.units, stated.up]
-    if best != (stated.units, stated.up) and apart[best] < BETTER * here and apart[best] < NEAR * size:
-        given = {"units": stated.units, "up": stated.up}
-        remedy = [f"--{name} {value}" for name, value in zip(("units", "up"), best) if given[name] != value]
+    best, given = min(apart, key=lambda names: apart[names]), (stated.units, stated.up)
+    here = apart.get(given, np.inf)
+    if best != given and apart[best] < BETTER * here and (given[0] not in alike or apart[best] < NEAR * size):
+        pairs = zip(("units", "up"), best, given)
+        remedy = [f"--{name} {value}" for name, value, said in pairs if value != said]
         raise RollOutError(
-            f"its first frame lies {here:.3g} m from the scene's cloth; in {best[0]} with {best[1]} up it would be "
-            f"{apart[best]:.2g} m: give {' '.join(remedy)}"
+            f"its first frame fits the scene's cloth in {best[0]} with {best[1]} up, {apart[best]:.2g} m apart, and "
+            f"not in {stated.units} with {stated.up} up: give {' '.join(remedy)}"
         )
     if here > NEAR * size:
         raise RollOutError(
@@ -202,7 +210,8 @@ def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: Stated) -> tuple[
     due = scene.frames
     places = np.arange(due) * own / rate
     places = np.where(np.abs(places - np.round(places)) < 1e-6, np.round(places), places)
-    if there != int(np.ceil(places[-1])) + 1 and not (there > places[-1] and own != rate):
+    spare = there - 1 - places[-1]  # frames of the file behind the scene's last; up to one of the scene's
+    if spare < 0.0 or spare > (0.0 if own == rate else max(own / rate, 1.0)):
         times = (there - 1) / own
         hint = _rate_hint(there, due, rate) if stated.fps is None else ""
         raise RollOutError(
