@@ -86,8 +86,9 @@ class MethodEntry:
     truncated: whether it stops before the minimum on purpose, so that running out of iterations is its end.
     batched: whether it computes many bodies at once. gives_first_frame: whether it computes frame 0 too; a
     simulator is given it. conserving: whether conservation laws are asked of it. timed: whether its costs are
-    asked for where those of the scene are. role, family, level, base, pairing_group: see
-    benchmarks.results.Row.
+    asked for where those of the scene are. declared_ms: [ms] a frame, as its author says, where no clock of
+    ours can measure it. static_known: whether its answer to poses held still is what quasi_static() says. left_out: why it is not run, where somebody wants it so.
+    role, family, level, base, pairing_group: see benchmarks.results.Row.
     """
 
     name: str
@@ -109,6 +110,9 @@ class MethodEntry:
     gives_first_frame: bool = False
     conserving: bool = False
     timed: bool = True
+    declared_ms: float | None = None
+    static_known: bool = True
+    left_out: str = ""
     role: str = "baseline"
     family: str = ""
     level: float | None = None
@@ -128,6 +132,8 @@ class MethodEntry:
 
     def skip(self, scene: Scene) -> str | None:
         """Why this method cannot do that scene, or None."""
+        if self.left_out:
+            return self.left_out
         if self.needs_body and not scene.dressed:
             return f"{self.name} moves a garment with a body's joints; this scene has no body"
         if self.needs_no_obstacle and (scene.dressed or scene.obstacle):

@@ -20,6 +20,7 @@ from .tasks.task import Outcome, Task, TaskId
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
 GAP = "gap/energy"
+DECLARED = "declared by its author, not measured"
 NOT_FALLING = "the error does not fall here"  # how the reason of a gap above that of a coarser method begins
 ROUND_OFF = 1e-6  # [J] a gap below it counts as none: who is called lower there is chance
 
@@ -58,6 +59,8 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
                 costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
                 metrics |= {**costs, **model_costs(cell, schedule, outcomes)}
                 reason = reason or remark
+            elif cell.entry.declared_ms is not None:
+                metrics["cost/frame"] = cell.entry.declared_ms
             reason = reason or not_learned(cell, schedule, outcomes)
     batch = outcomes.get(("batch", cell.name), Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
@@ -88,6 +91,8 @@ def _rows(
     for name, found in metrics.items():
         value, uncertainty = found if isinstance(found, (tuple, list)) else (found, None)
         metric, why, ended = find_metric(name, outside), reason, status
+        if name == "cost/frame" and entry.declared_ms is not None:
+            why = why or DECLARED
         if name == "cost/spread" and value > 100.0 * SPREAD:
             why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
         judged: dict[str, Any] = {}

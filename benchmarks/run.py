@@ -23,6 +23,9 @@ from .presets import PRESETS, find_preset
 from .provenance import usable_cores
 from .registry import DeclarationError
 from .results import ResultsError, RunFolder
+from .roll_out_option import HELP as ROLL_OUT_HELP
+from .roll_out_option import RollOutError
+from .roll_out_option import parse as parse_roll_out
 from .scenes import all_scenes
 from .selection import MEASURED, Request, choose, choose_motions, choose_suites, names_no_motion
 from .timing import one_thread
@@ -42,6 +45,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
   python -m benchmarks.run --body mine.npz --suite garments
+  python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
 
 motions: without --motions the embedded library, which has its own test set. With --motions the files
   replace the library; "library" among the paths keeps it. --test-motions names those to test on, all
@@ -61,7 +65,7 @@ exit status: 0 when every cell ended as ok or as an explained skip (in extremes 
   in the folder, whole, and the same command goes on from there."""
 
 
-class _Parser(argparse.ArgumentParser):
+class Parser(argparse.ArgumentParser):
     """One clear line for a wrong word, in place of the whole usage."""
 
     def error(self, message: str):
@@ -70,7 +74,7 @@ class _Parser(argparse.ArgumentParser):
 
 def make_parser() -> argparse.ArgumentParser:
     """The options of the command."""
-    parser = _Parser(
+    parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Dress a body, simulate the ground truth, train the networks, compare all of them "
         "and write tables, figures and a PDF.",
@@ -100,6 +104,7 @@ def make_parser() -> argparse.ArgumentParser:
         help="an own body, .npz in SMPL's layout, in place of the package's; garments are made for it "
         "(extreme cases of single steps keep the package's)",
     )
+    add("--rollout", action="append", default=[], metavar="NAME=FILE", help=ROLL_OUT_HELP)
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
@@ -130,23 +135,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ValueError as error:  # also the readers' own errors: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    return carry_out(plan, dry_run=options.dry_run)
+
+
+def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> int:
+    """Run the plan, or say what would be run; returns the exit status."""
     from .lock import HeldError, held
 
     try:
-        if options.dry_run:
+        if dry_run:
             from .dry_run import describe
 
             print(describe(plan))
             return 0
-        with held(plan.folder):
-            from .execution import execute
+        from .execution import check_roll_outs, execute
 
+        check_roll_outs(plan)
+        with held(plan.folder):
             return execute(plan)
-    except (HeldError, DeclarationError) as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+    except (HeldError, DeclarationError, RollOutError) as error:
+        print(f"{program}: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
+        print(f"{program}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
         return 130
 
 
@@ -172,6 +183,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     request = Request(
         suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=tuple(scenes),
         methods=tuple(methods), seeds=seeds, own_scenes=tuple(own_scenes), own_methods=tuple(own_methods),
+        roll_outs=tuple(map(parse_roll_out, options.rollout)),
     )  # fmt: skip
     cells, cases, microbenchmarks = choose(request)
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}

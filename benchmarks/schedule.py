@@ -180,8 +180,8 @@ class Schedule:
             quasi_static = self.quasi_static(scene).id
             reads = (*reads, quasi_static)
         if scene.counterpart:
-            same = (c for c in plan.cells if (c.scene.name, c.entry, c.seed) ==
-                    (scene.counterpart, cell.entry, cell.seed))  # fmt: skip
+            same = (c for c in plan.cells if (c.scene.name, c.method, c.seed) ==
+                    (scene.counterpart, cell.method, cell.seed))  # fmt: skip
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, ("cell", counterpart.name))
         modules = [f"benchmarks.metrics.{name}" for name in names_of(scene.metrics)] + list(plan.metrics)
@@ -189,7 +189,13 @@ class Schedule:
         inputs = {
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,
-            "method": [cell.entry.role, cell.entry.family, cell.entry.level, cell.entry.conserving],
+            "method": [
+                cell.entry.role,
+                cell.entry.family,
+                cell.entry.level,
+                cell.entry.conserving,
+                cell.entry.static_known,
+            ],
             "metrics": scene.metrics,
         }
         return MeasureCell(
@@ -277,7 +283,8 @@ class Schedule:
         return planned or find_scene(scene.start_of).at(self.preset)
 
     def _has_reference(self, scene: Scene) -> bool:
-        return any(cell.scene == scene and cell.entry.role == "reference" for cell in self.plan.cells)
+        of_scene = (cell for cell in self.plan.cells if cell.scene == scene)
+        return any(cell.entry.role == "reference" and runs(cell) for cell in of_scene)
 
 
 def _declared(entry: Any) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from .validation.registry import CASES
 if TYPE_CHECKING:
     from snug.motion import Motion
 
+    from .roll_out_option import RollOutOption
     from .validation.case import Case
 
 FEWEST = 3  # frames of a motion: inertia needs two before the one that is judged
@@ -37,7 +38,7 @@ MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what
 class Request:
     """The words of a request. full: whether suites are named; scenes and methods: names or patterns; empty
     means all that the suites list. own_scenes, own_methods: entries that are not the project's, named among
-    these.
+    these. roll_outs: stored ones, which meet each scene that is asked for.
     """
 
     suites: tuple[str, ...]
@@ -49,6 +50,7 @@ class Request:
     seeds: tuple[int, ...] = (0,)
     own_scenes: tuple[Scene, ...] = ()
     own_methods: tuple[MethodEntry, ...] = ()
+    roll_outs: tuple[RollOutOption, ...] = ()
 
     @cached_property
     def declared_scenes(self) -> dict[str, Scene]:
@@ -87,14 +89,44 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[
             key = (scene, method, seed)
             before = found[key].suites if key in found else ()
             found[key] = Cell(declared[scene].at(request.preset), entry, seed, (*before, suite))
+    stored = stored_cells(request.roll_outs, tuple(found.values()))
     cases, microbenchmarks = tuple(_cases(request)), tuple(_microbenchmarks(request))
     if not (found or cases or microbenchmarks):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
     # The reference first: an error against it can be said as soon as another cell is done.
     order = {name: place for place, name in enumerate(methods)}
     places = {name: place for place, name in enumerate(declared)}
-    cells = sorted(found.values(), key=lambda c: (places[c.scene.name], order[c.method], c.seed))
+    last = len(order)
+    cells = sorted(
+        (*found.values(), *stored),
+        key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
+    )
     return tuple(cells), cases, microbenchmarks
+
+
+def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:
+    """The stored roll-outs in the scenes of these cells, and in their suites. Raises PlanError, and RollOutError
+    for a file that cannot be read.
+    """
+    scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
+    suites = {name: tuple(dict.fromkeys(s for c in cells if c.scene.name == name for s in c.suites))
+              for name in scenes}  # fmt: skip
+    taken = {entry.name for entry in METHODS} | {cell.method for cell in cells}
+    found: list[Cell] = []
+    for option in roll_outs:
+        if option.name in taken:
+            raise PlanError(f"--rollout {option.name}: a method has that name; give another")
+        taken.add(option.name)
+        if len(scenes) != 1 and not option.places:
+            raise PlanError(
+                f"--rollout {option.name}={option.path}: is of one scene, and {len(scenes)} are asked for: name it "
+                "with --scenes, or put {scene} into the path"
+            )
+        own = [(scene, entry) for scene in scenes.values() if (entry := option.entry(scene.name))]
+        if not own:
+            raise PlanError(f"--rollout {option.name}={option.path}: no file for {', '.join(scenes)}")
+        found += [Cell(scene, entry, 0, suites[scene.name]) for scene, entry in own]
+    return found
 
 
 def _pairs(request: Request) -> Iterator[tuple[str, str, str]]:

@@ -12,6 +12,7 @@ from ..registry import DeclarationError, by_name, load
 
 MODULES = (
     "energy",
+    "printed_bending",
     "excess",
     "curvature",
     "shape",
