@@ -87,7 +87,8 @@ class MethodEntry:
     batched: whether it computes many bodies at once. gives_first_frame: whether it computes frame 0 too; a
     simulator is given it. conserving: whether conservation laws are asked of it. timed: whether its costs are
     asked for where those of the scene are. declared_ms: [ms] a frame, as its author says, where no clock of
-    ours can measure it. static_known: whether its answer to poses held still is what quasi_static() says. left_out: why it is not run, where somebody wants it so.
+    ours can measure it; what a trajectory says as provenance counts as well. static_known: whether its answer
+    to poses held still is what quasi_static() says. left_out: why it is not run, where somebody wants it so.
     role, family, level, base, pairing_group: see benchmarks.results.Row.
     """
 

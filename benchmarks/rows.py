@@ -59,8 +59,8 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
                 costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
                 metrics |= {**costs, **model_costs(cell, schedule, outcomes)}
                 reason = reason or remark
-            elif cell.entry.declared_ms is not None:
-                metrics["cost/frame"] = cell.entry.declared_ms
+            elif (declared_ms := cell.entry.declared_ms or outcome.result.get("declared_ms")) is not None:
+                metrics["cost/frame"] = declared_ms
             reason = reason or not_learned(cell, schedule, outcomes)
     batch = outcomes.get(("batch", cell.name), Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
@@ -91,7 +91,7 @@ def _rows(
     for name, found in metrics.items():
         value, uncertainty = found if isinstance(found, (tuple, list)) else (found, None)
         metric, why, ended = find_metric(name, outside), reason, status
-        if name == "cost/frame" and entry.declared_ms is not None:
+        if name == "cost/frame" and not entry.timed:
             why = why or DECLARED
         if name == "cost/spread" and value > 100.0 * SPREAD:
             why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
@@ -269,6 +269,9 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     scenes = {scene.name: _fields(scene, *without) for scene in plan.scenes}
     words = ("label", "description", "role", "family", "level", "base", "seeded", "dtype")
     said = {name: {word: getattr(entry, word) for word in words} for name, entry in methods.items()}
+    for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:
+        if name in methods and not methods[name].timed:
+            said[name]["label"] = f"{methods[name].label or name} (declared time)"
     cases = {
         case.name: {
             "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
