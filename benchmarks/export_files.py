@@ -55,6 +55,16 @@ def write_scene(
         shutil.rmtree(part, ignore_errors=True)
 
 
+def write_for_program(folder: Path, scene: BuiltScene) -> None:
+    """The same into a new folder, for a program that reads no README: arrays, meshes and scene.json."""
+    folder.mkdir()
+    _cloth(folder, scene)
+    _obstacle(folder, scene)
+    if scene.dressed is not None:
+        _motion(folder, scene.dressed)
+    (folder / "scene.json").write_text(json.dumps(facts_of(scene), indent=2) + "\n", encoding="utf-8")
+
+
 Listed = list[tuple[str, str]]  # name of a file, what is in it
 
 
@@ -169,12 +179,18 @@ def _reference(part: Path, scene: BuiltScene) -> Listed:
 
 
 def description(plan: Plan, scene: BuiltScene) -> dict[str, Any]:
-    """What scene.json holds: sizes, step, material, terms with their constants. SI units."""
-    declared, material = plan.scenes[0], scene.cloth.material
+    """What scene.json holds."""
+    declared = plan.scenes[0]
+    said = {"description": declared.description, "preset": plan.preset.name}
+    said |= {"garment": declared.garment, "motion": declared.motion, "part": declared.part}
+    return facts_of(scene) | said
+
+
+def facts_of(scene: BuiltScene) -> dict[str, Any]:
+    """Of it what the scene itself knows: sizes, step, material, terms with their constants. SI units."""
+    material = scene.cloth.material
     return {
         "scene": scene.name,
-        "description": declared.description,
-        "preset": plan.preset.name,
         "units": "m, kg, s, rad",
         "up": "y",
         "frames": scene.frames,
@@ -184,9 +200,6 @@ def description(plan: Plan, scene: BuiltScene) -> dict[str, Any]:
         "warm_up_frames": scene.warm_up,
         "vertices": scene.cloth.vertex_count,
         "triangles": len(scene.cloth.faces),
-        "garment": declared.garment,
-        "motion": declared.motion,
-        "part": declared.part,
         "before": 0 if scene.dressed is None or scene.dressed.before is None else scene.dressed.before.frames,
         "gravity": [0.0, -GRAVITY, 0.0],
         "material": {name: getattr(material, name) for name in material.__dataclass_fields__}

@@ -72,7 +72,7 @@ class RollOutOption:
         declared = self.declared_ms is not None
         return MethodEntry(
             name=self.name,
-            label=f"{self.name} (declared time)" if declared else self.name,
+            label=self.name,
             description=f"roll-out of {Path(path).name}" + ", time as its author says" * declared,
             module=MODULE,
             options={"path": path, "digest": digest_of(path), **asdict(self.stated)},

@@ -14,7 +14,9 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
+from . import outside
 from .cache import DEFAULT_ONLY, STATES
+from .methods import METHODS
 from .performance.microbenchmark import SUITE
 from .plan import Motions, OwnBody, Plan, PlanError
 from .presets import PRESETS, find_preset
@@ -24,7 +26,8 @@ from .results import ResultsError, RunFolder
 from .roll_out_option import HELP as ROLL_OUT_HELP
 from .roll_out_option import RollOutError
 from .roll_out_option import parse as parse_roll_out
-from .selection import Request, choose, choose_motions, choose_suites, names_no_motion
+from .scenes import all_scenes
+from .selection import MEASURED, Request, choose, choose_motions, choose_suites, names_no_motion
 from .timing import one_thread
 
 PROGRAM = "benchmarks.run"
@@ -35,6 +38,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run --suite garments -o reports/runs/mine
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
   python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2
+  python -m benchmarks.run --methods ./mine.py,snug,simulation --metrics ./my_metric.py
   python -m benchmarks.run --motions clips/ --test-motions 01_01
   python -m benchmarks.run --suite garments --methods 'simulation,skinning,snug,snug-without-*' \\
       --test-motions brisk_walk,torso_twist,lunge               what each choice of the recipe does
@@ -84,8 +88,13 @@ def make_parser() -> argparse.ArgumentParser:
     add("--suite", action="append", default=[], metavar="NAME",
         help="garments, speed, validation, extremes, performance or all, in full; repeat or separate by "
         "commas (default: the quick subset of each but performance)")  # fmt: skip
-    add("--scenes", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
-    add("--methods", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
+    own = "; a file (mine.py) or an entry point of a package means all that it declares"
+    add(
+        "--scenes", action="append", default=[], metavar="NAME,...", help=f"only these; patterns allowed{own}"
+    )
+    add("--methods", action="append", default=[], metavar="NAME,...", help="only these; the same words")
+    add("--metrics", action="append", default=[], metavar="FILE,...",
+        help="metrics of your own, measured besides all others: files or entry points")  # fmt: skip
     add("--motions", action="append", default=[], metavar="PATH",
         help="motion file or folder (.amc with its .asf, .npz), or the word library; repeatable")  # fmt: skip
     add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
@@ -163,13 +172,18 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     workers = min(WORKERS, usable_cores()) if options.workers is None else options.workers
     if workers < 1:
         raise PlanError(f"--workers {workers}: give a whole number, 1 or more")
-    scenes, methods = tuple(split(options.scenes)), tuple(split(options.methods))
+    known_scenes = {*all_scenes((), ()), *(entry.name for entry in MEASURED)}
+    scenes, own_scenes = outside.resolved(outside.SCENES, split(options.scenes), known_scenes)
+    methods, own_methods = outside.resolved(
+        outside.METHODS, split(options.methods), {entry.name for entry in METHODS}
+    )
     motions = Motions()
-    if options.motions or options.test_motions or not names_no_motion(scenes):
+    if options.motions or options.test_motions or not names_no_motion(scenes, own_scenes):
         motions = choose_motions(options.motions, split(options.test_motions), preset)
     request = Request(
-        suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=scenes,
-        methods=methods, seeds=seeds, roll_outs=tuple(map(parse_roll_out, options.rollout)),
+        suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=tuple(scenes),
+        methods=tuple(methods), seeds=seeds, own_scenes=tuple(own_scenes), own_methods=tuple(own_methods),
+        roll_outs=tuple(map(parse_roll_out, options.rollout)),
     )  # fmt: skip
     cells, cases, microbenchmarks = choose(request)
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
@@ -180,6 +194,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         cells=cells,
         cases=cases,
         microbenchmarks=microbenchmarks,
+        metrics=choose_metrics(split(options.metrics)),
         motions=motions,
         body=choose_body(options.body),
         seeds=seeds,
@@ -190,6 +205,23 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         workers=workers,
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
+
+
+def choose_metrics(words: Sequence[str]) -> tuple[str, ...]:
+    """Modules of metrics that are not the project's. Raises ValueError."""
+    if not words:
+        return ()
+    from .metrics import declared
+
+    names, metrics = outside.resolved(outside.METRICS, words, ())
+    for name in names:
+        if name not in {metric.name for metric in metrics}:
+            raise PlanError(
+                f"--metrics {name}: no such file or entry point; those of the project are measured"
+            )
+    homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
+    declared(homes)  # each name stands once
+    return homes
 
 
 def choose_body(path: str | None) -> OwnBody | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..metric import Estimate, RollOut, SceneRollOuts
 from ..metrics import find_metric, modules, names_of
+from ..registry import load
 from .cell import Cell, built
 from .task import Context, Outcome, Task, TaskId
 
@@ -20,6 +21,7 @@ class MeasureCell(Task):
 
     cells: all of the scene, in the order of their roll-outs; those that `reads` names are compared with.
     quasi_static: the simulator's answer to poses held still; counterpart: the same method in another scene.
+    outside: modules of metrics that are not the project's, measured in every scene.
     """
 
     kind = "metrics"
@@ -30,6 +32,7 @@ class MeasureCell(Task):
     gap_samples: int
     quasi_static: TaskId | None = None
     counterpart: Cell | None = None
+    outside: tuple[str, ...] = ()
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """The energies of each frame, and other curves, are added to the trajectory file."""
@@ -38,7 +41,7 @@ class MeasureCell(Task):
         roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
         if self.counterpart is not None and ("cell", self.counterpart.name) in needed:
             roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
-        metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics)
+        metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)
         _add_curves(self.cell.trajectory(folder), curves, roll_out.trajectory.frames)
         context.tell(self.units)
         return Outcome(status, reason, result=metrics)
@@ -65,22 +68,24 @@ class MeasureCell(Task):
 
 
 def measured(
-    roll_out: RollOut, chosen: Sequence[str] | None = None
+    roll_out: RollOut, chosen: Sequence[str] | None = None, outside: tuple[str, ...] = ()
 ) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
-    """Metrics and curves of a roll-out by all modules that apply, or by those chosen; and status and reason
-    where one of them says that it has failed. Empty where no frame is left after the warm-up.
+    """Metrics and curves of a roll-out by all modules that apply, or by those chosen, and by those outside;
+    and status and reason where one of them says that it has failed. Empty where no frame is left after the
+    warm-up.
     """
     metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}
     ended = ("ok", "")
     judged = len(roll_out.positions) > roll_out.scene.warm_up
-    for module in (modules()[name] for name in names_of(chosen) if judged):
+    chosen_modules = [modules()[name] for name in names_of(chosen)] + [load(home) for home in outside]
+    for module in chosen_modules if judged else ():
         suites = getattr(module, "SUITES", roll_out.suites)
         if any(suite in suites for suite in roll_out.suites):
             values = module.measure(roll_out)
             if hasattr(module, "compare"):
                 values |= compared(roll_out, module.compare)
-            metrics |= {find_metric(name).name: value for name, value in values.items()}
+            metrics |= {find_metric(name, outside).name: value for name, value in values.items()}
             curves |= module.series(roll_out) if hasattr(module, "series") else {}
             ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
     return metrics, curves, ended
