@@ -33,9 +33,9 @@ class Surface:
     """What a file held: positions (V, 3) in the file's own unit and axes, triangles (F, 3).
 
     quads: how many four-cornered faces were cut in two along the diagonal from their first corner.
-    uv: (F, 3, 2) texture coordinates of the faces' corners, several for a vertex on a seam; NaN where a corner
-    has none, None where no corner has any. vertex_data: name -> (V,) or (V, k), what PLY and VTK files say of
-    vertices besides.
+    uv: (F, 3, 2) texture coordinates of the faces' corners, several for a vertex on a seam; NaN where a
+    corner has none, None where no corner has any. vertex_data: name -> (V,) or (V, k), what PLY and VTK files
+    say of vertices besides.
     """
 
     positions: np.ndarray
