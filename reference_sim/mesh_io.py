@@ -73,6 +73,9 @@ def read_mesh(path: str | Path) -> Surface:
         k = int(np.argmax((corners > 4) | (corners < 3)))
         raise MeshError(f"{path}: face {k} has {corners[k]} corners: triangulate the mesh")
     faces = np.array(_halved(polygons), dtype=np.int64)
+    bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
+    if bad.size:
+        raise MeshError(f"{path}: triangle {bad[0]} names a vertex beyond the {len(positions)} there are")
     return Surface(
         positions, faces, int((corners == 4).sum()), _corner_uv(path, parts, faces), parts.vertex_data
     )

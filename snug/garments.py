@@ -64,7 +64,7 @@ class Garment:
     authored_weights: bool = False
 
     def cloth(self, material: Material | None = None) -> Cloth:
-        """The rest state of every energy, for simulator, loss and metrics alike; its own material, or another.
+        """The one rest state of simulator, loss and metrics, with the garment's own material or another.
 
         Raises MeshError for a mesh that cannot be simulated.
         """

@@ -12,7 +12,7 @@ from snug.tailoring import joint
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-MIDDLE = 0.5  # share of a hip joint's distance from the middle, within which an opening is no sleeve and no leg
+MIDDLE = 0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
 
 
 def named_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
