@@ -80,6 +80,17 @@ def add_garment_options(parser: ArgumentParser) -> None:
         "bending_stiffness [J] (default: the cotton of the paper)")  # fmt: skip
 
 
+def demand_a_file(options: Namespace) -> None:
+    """Raises ValueError for an option of `add_garment_options` where no garment is a file."""
+    plain = ArgumentParser()
+    add_garment_options(plain)
+    for name, default in vars(plain.parse_args([])).items():
+        if getattr(options, name) != default:
+            raise ValueError(
+                f"--{name.replace('_', '-')} is for a garment that is a file: add --garment FILE"
+            )
+
+
 def garment_file(path: str, options: Namespace) -> GarmentFile:
     """The file with the options of `add_garment_options`. Raises ValueError for one that means nothing."""
     try:
