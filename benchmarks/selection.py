@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from .validation.case import Case
 
 FEWEST = 3  # frames of a motion: inertia needs two before the one that is judged
-FIRST_GARMENT = GARMENT_SCENES[0].garment
 MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
 
 
@@ -55,7 +54,7 @@ class Request:
     @cached_property
     def declared_scenes(self) -> dict[str, Scene]:
         """Name -> scene, of all that could be asked for. Raises DeclarationError where two have one name."""
-        declared = all_scenes(self.motions.test, self.motions.dynamic_test)
+        declared = all_scenes(self.motions.test, self.motions.dynamic_test, self.motions.worn)
         taken = {entry.name for entry in MEASURED}
         for scene in self.own_scenes:
             if scene.name in taken:
@@ -147,7 +146,7 @@ def _pairs(request: Request) -> Iterator[tuple[str, str, str]]:
         methods = (*suite.methods(extent), *more, *further, *sorted(own_methods))
         for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
             # Networks for a second garment double the training: only for whoever names its scenes.
-            plain = not extent.further and declared[scene].garment not in ("", FIRST_GARMENT)
+            plain = not extent.further and declared[scene].garment not in ("", extent.motions.first_garment)
             for method in methods:
                 if not (named(scene, request.scenes) and named(method, request.methods)):
                     continue
