@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
+from snug.motion_options import add_motion_options, reading_of
+
 from .cache import DEFAULT_ONLY, STATES
 from .performance.microbenchmark import SUITE
 from .plan import Motions, OwnBody, Plan, PlanError
@@ -37,6 +39,7 @@ EXAMPLES = """examples:
       --test-motions brisk_walk,torso_twist,lunge               what each choice of the recipe does
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
+  python -m benchmarks.run --motions mocap.bvh --motion-up z --repair
   python -m benchmarks.run --body mine.npz --suite garments
 
 motions: without --motions the embedded library, which has its own test set. With --motions the files
@@ -83,7 +86,8 @@ def make_parser() -> argparse.ArgumentParser:
     add("--scenes", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
     add("--methods", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
     add("--motions", action="append", default=[], metavar="PATH",
-        help="motion file or folder (.amc with its .asf, .npz), or the word library; repeatable")  # fmt: skip
+        help="motion file (.npz, .bvh, .amc with .asf), folder, or the word library; repeatable")  # fmt: skip
+    add_motion_options(add)
     add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
     add(
         "--body",
@@ -155,7 +159,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     scenes, methods = tuple(split(options.scenes)), tuple(split(options.methods))
     motions = Motions()
     if options.motions or options.test_motions or not names_no_motion(scenes):
-        motions = choose_motions(options.motions, split(options.test_motions), preset)
+        motions = choose_motions(options.motions, split(options.test_motions), preset, reading_of(options))
     request = Request(
         suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=scenes,
         methods=methods, seeds=seeds,

@@ -22,6 +22,7 @@ from .validation.registry import CASES
 
 if TYPE_CHECKING:
     from snug.motion import Motion
+    from snug.motion_options import Reading
 
     from .validation.case import Case
 
@@ -167,20 +168,23 @@ def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in SUITE_NAMES if "all" in chosen or name in chosen)
 
 
-def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Preset) -> Motions:
+def choose_motions(
+    paths: Sequence[str], test_names: Sequence[str], preset: Preset, reading: Reading | None = None
+) -> Motions:
     """Which motions train and which test. Raises PlanError (or the reader's own error) for a bad request.
 
     Without paths: the embedded library with its own division. With paths: the files alone, plus the library
     where "library" is among the paths. test_names moves motions to the test set; without it the test
     motions of the library test, and of files alone the first in order of names. A single file tests, and the
-    library trains. The test motions of the library never train, whichever motions test.
+    library trains. The test motions of the library never train, whichever motions test. reading: what the
+    files do not say.
     """
     from snug.motion_files import load_motions
     from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, LIBRARY, TEST, TRAIN
 
     files: dict[str, Motion] = {}
     for path in paths:
-        for motion in load_motions(path) if path != "library" else ():
+        for motion in load_motions(path, reading=reading) if path != "library" else ():
             if motion.name in files or motion.name in LIBRARY:
                 raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             if motion.frames < FEWEST:
