@@ -13,12 +13,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from .plan import Plan, PlanError
+from .one_scene import plan_of_scene
+from .plan import Plan
 from .results import RunFolder
 from .roll_out_option import RollOutOption, Stated, checked_ms
-from .run import Parser, carry_out
-from .run import make_parser as make_run_parser
-from .run import make_plan as make_run_plan
+from .run import carry_out
+from .run_options import Parser, add_scene_options
 from .selection import stored_cells
 from .tasks.cell import Cell
 from .timing import one_thread
@@ -47,8 +47,8 @@ def make_parser() -> argparse.ArgumentParser:
     """The options of the command."""
     parser = Parser(
         prog=f"python -m {PROGRAM}",
-        description="Energies, gap to the minimum of each step, curvature, depth, conservation and dynamics of a "
-        "roll-out of another program: rows, a report, one line.",
+        description="Energies, gap to the minimum of each step, curvature, depth, conservation, dynamics of "
+        "a roll-out of another program: rows, a report, one line.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -56,9 +56,9 @@ def make_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("roll_out", metavar="ROLLOUT", help="file, folder or pattern")
     add("--scene", required=True, metavar="NAME", help="as in benchmarks.run --list")
-    add("--preset", default="quick", metavar="NAME", help="size of the scene (default quick)")
+    add_scene_options(parser)
     add("--name", default="", metavar="NAME", help="of the method in tables (default: the file's)")
-    add("--units", default="m", metavar="m|cm|mm", help="of the roll-out (default m)")
+    add("--units", default="m", metavar="m|cm|mm|in", help="of the roll-out (default m)")
     add("--up", default="y", metavar="y|z", help="its up axis (default y)")
     add("--fps", type=float, metavar="N", help="its frames per second; other than the scene's are re-timed")
     add("--match-vertices", action="store_true", help="its vertices are the scene's in another order")
@@ -68,9 +68,6 @@ def make_parser() -> argparse.ArgumentParser:
     reference.add_argument("--reference", metavar="FILE",
         help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
     reference.add_argument("--no-reference", action="store_true", help="leave out what needs a reference")
-    add("--motions", action="append", default=[], metavar="PATH", help="as of benchmarks.run")
-    add("--test-motions", action="append", default=[], metavar="NAME,...", help="as of benchmarks.run")
-    add("--body", metavar="FILE", help="as of benchmarks.run")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     return parser
 
@@ -94,14 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     """A run of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
-    asked = ["--preset", options.preset, "--scenes", options.scene, "--methods", "simulation"]
-    for option, values in (("--motions", options.motions), ("--test-motions", options.test_motions)):
-        asked += [word for value in values for word in (option, value)]
-    asked += ["--body", options.body] if options.body else []
-    asked += ["-o", options.out] if options.out else []
-    plan = make_run_plan(make_run_parser().parse_args(asked), asked)
-    if len(plan.scenes) != 1 or plan.cases or plan.microbenchmarks:
-        raise PlanError(f"--scene {options.scene}: name one scene; see python -m benchmarks.run --list")
+    plan = plan_of_scene(options, options.scene, ["simulation"], out=options.out)
     stated = Stated(options.units, options.up, options.fps, options.match_vertices)
     name = options.name or f"{Path(options.roll_out.rstrip('/')).stem.strip('*_-. ') or 'roll-out'}"
     option = RollOutOption(name, options.roll_out, stated, checked_ms(options.declared_ms))

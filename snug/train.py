@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snug.garment_file import demand_a_file, garment_file, is_file_name
+from snug.motion_options import reading_of
 from snug.recipes import find_recipe
 from snug.train_options import check, parse
 
@@ -97,7 +98,9 @@ def _motions(options: argparse.Namespace) -> tuple[list[Any], list[Any]]:
     from snug.motion_files import load_motions
     from snug.motion_library import TRAIN, make_motion
 
-    motions = load_motions(options.motions) if options.motions else [make_motion(name) for name in TRAIN]
+    motions = [make_motion(name) for name in TRAIN]
+    if options.motions:
+        motions = load_motions(options.motions, reading=reading_of(options))
     names = [motion.name for motion in motions]
     for word in ("hold_out", "validation"):
         for name in getattr(options, word):

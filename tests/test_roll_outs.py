@@ -1,4 +1,4 @@
-"""Roll-outs of others: read from whatever the field writes, and judged only where they belong to the scene."""
+"""Roll-outs of others: read from what the field writes, judged only where they belong to the scene."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from tasks_by_hand import small_scene
 
+from benchmarks.mesh_match import same_topology
 from benchmarks.methods import find_method
 from benchmarks.methods.stored_roll_out import Stored
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.mesh_match import same_topology
 from benchmarks.roll_out_files import read_roll_out
 from benchmarks.roll_out_option import RollOutError, RollOutOption, Stated, parse
 from benchmarks.tasks.metrics import measured
@@ -36,13 +36,22 @@ def write(kind: str, folder: Path, positions: np.ndarray = X, faces: np.ndarray 
     elif kind == "npz":
         np.savez(path, positions=positions, faces=faces, fps=30.0)
     elif kind == "pkl":
-        held = {"pred": positions, "cloth_faces": faces, "obstacle": np.zeros((len(positions), 4, 3)), "meta": 1}
+        held = {
+            "pred": positions,
+            "cloth_faces": faces,
+            "obstacle": np.zeros((len(positions), 4, 3)),
+            "meta": 1,
+        }
         path.write_bytes(pickle.dumps(held))
     elif kind == "pc2":
         write_point_cache(path, trajectory)
     elif kind == "pc16":
-        header = SIGNATURE + np.array([1, positions.shape[1]], "<i4").tobytes() + np.array([0, 1], "<f4").tobytes()
-        path.write_bytes(header + np.array([len(positions)], "<i4").tobytes() + positions.astype("<f2").tobytes())
+        header = (
+            SIGNATURE + np.array([1, positions.shape[1]], "<i4").tobytes() + np.array([0, 1], "<f4").tobytes()
+        )
+        path.write_bytes(
+            header + np.array([len(positions)], "<i4").tobytes() + positions.astype("<f2").tobytes()
+        )
     else:
         path = folder / kind
         path.mkdir()
@@ -81,7 +90,13 @@ def direct(positions: np.ndarray) -> dict:
 def test_formats_of_float64_give_the_rows_of_the_positions_to_the_last_digit(kind, tmp_path):
     expected = direct(X)
     assert rows(write(kind, tmp_path)) == expected
-    assert {"energy/strain", "energy/bending", "energy/bending_printed", "gap/energy", "curvature/mean"} <= set(expected)
+    assert {
+        "energy/strain",
+        "energy/bending",
+        "energy/bending_printed",
+        "gap/energy",
+        "curvature/mean",
+    } <= set(expected)
 
 
 def test_formats_of_less_precision_give_the_rows_of_the_rounded_positions(tmp_path):
@@ -119,8 +134,8 @@ WRONG = {
     "a vertex less": (X[:, 1:], None, {}, "has 48 vertices, the cloth of hanging_sheet 49"),
     "a frame less": (X[1:], None, {}, "has 7 frames, .* the scene has 8"),
     "twice the frames": (np.repeat(X, 2, axis=0)[1:], None, {}, "give --fps 60"),
-    "inches": (X / 0.0254, FACES, {}, "write metres"),
-    "elsewhere": (X + [0.0, 1.0, 0.0], FACES, {}, "world coordinates"),
+    "feet": (X / 0.3048, FACES, {}, "write metres"),
+    "elsewhere": (X + np.array([0.0, 1.0, 0.0]), FACES, {}, "world coordinates"),
     "no start": (np.where(TIME == 0.0, np.nan, X), FACES, {}, "is not finite"),
 }
 
@@ -149,7 +164,7 @@ def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):
     fine = np.concatenate([halves, X[-1:]])
     path = str(tmp_path / "mine.npz")
     np.savez(path, positions=fine, fps=60.0)
-    with pytest.raises(RollOutError, match="states 60 .* give --fps 60"):
+    with pytest.raises(RollOutError, match=r"states 60 .* give --fps 60"):
         rows(path)
     assert rows(path, fps=60.0) == direct(X)  # every second frame, as it is
     np.savez(path, positions=X[::2])
@@ -181,7 +196,7 @@ def test_a_symmetric_mesh_is_laid_on_itself_where_it_is_nearest(flip):
     a = (i[:-1, :-1] * 6 + j[:-1, :-1]).ravel()
     faces = np.concatenate([np.stack([a, a + 6, a + 7], 1), np.stack([a, a + 7, a + 1], 1)])
     two = np.concatenate([faces, faces + 36])  # two pieces of the same form
-    both = np.concatenate([points, points + [9.0, 0.0, 0.0]])
+    both = np.concatenate([points, points + np.array([9.0, 0.0, 0.0])])
     order = RANDOM.permutation(72)
     theirs = np.argsort(order)[two][RANDOM.permutation(len(two))]
     found = same_topology(theirs[:, ::-1] if flip else theirs, two, both[order], both)
@@ -249,7 +264,7 @@ def test_an_option_says_everything_of_a_roll_out():
 
 @pytest.mark.parametrize(
     ("text", "hint"),
-    [("mine", "NAME=FILE"), ("=a.npz", "NAME=FILE"), ("a b=a.npz", "letters"), ("m=a.npz,unit=cm", "unknown word"),
+    [("mine", "NAME=FILE"), ("=a.npz", "NAME=FILE"), ("a b=a.npz", "letters"), ("m=a.npz,x", "unknown word"),
      ("m=a.npz,units=inch", "choose from m, cm, mm"), ("m=a.npz,fps=fast", "no number"),
      ("m=a.npz,fps=-1", "positive"), ("m=a.npz,ms=0", "positive")],
 )  # fmt: skip
