@@ -25,6 +25,7 @@ from .timing import one_thread
 
 PROGRAM = "benchmarks.score"
 JUDGED_BY_STEP = "speed"  # the suite in which steps are solved again: gaps and one-step errors
+ANY_SCENE = "hanging_sheet"  # whose place the scene of a file takes
 NO_REFERENCE = "left out by --no-reference: curvature error and histogram, distances, dynamics, relative gap"
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
@@ -32,12 +33,12 @@ EXAMPLES = """examples:
   python -m benchmarks.score mine.pc2 --scene tshirt/kick --units cm --up z --match-vertices
   python -m benchmarks.score frames/ --scene hanging_sheet --fps 60 --declared-ms 2.2
   python -m benchmarks.score 'out/cloth_*.obj' --scene flag --reference simulated.vtkhdf
-  python -m benchmarks.score pred.pkl --scene tshirt/kick --no-reference
+  python -m benchmarks.score pred.pkl --rest-mesh shirt.obj --no-reference      cloth and body of a pickle
 
 ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi_static; .pkl with pred,
-  cloth_faces; .pc2 and .pc16 with their .obj; a folder or a quoted pattern of meshes, one a frame. In world
-  coordinates, the scene's first frame first. Other units, axes, rates and orders of vertices are refused with
-  the option that mends them.
+  cloth_faces, obstacle, obstacle_faces; .pc2 and .pc16 with their .obj; a folder or a quoted pattern of
+  meshes, one a frame. In world coordinates, the scene's first frame first. Other units, axes, rates and
+  orders of vertices are refused with the option that mends them.
 
 exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cannot be read or does not belong
   to the scene: one line says why and nothing is written; 130 interrupted."""
@@ -55,7 +56,11 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("roll_out", metavar="ROLLOUT", help="file, folder or pattern")
-    add("--scene", required=True, metavar="NAME", help="as in benchmarks.run --list")
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--scene", metavar="NAME", help="as in benchmarks.run --list")
+    where.add_argument("--rest-mesh", metavar="FILE",
+        help="no scene of this project: the cloth at rest, in the roll-out's unit, axes and order; the file "
+        "brings its own body (obstacle, obstacle_faces) and starts at rest in its first frame")  # fmt: skip
     add_scene_options(parser)
     add("--name", default="", metavar="NAME", help="of the method in tables (default: the file's)")
     add("--units", default="m", metavar="m|cm|mm|in", help="of the roll-out (default m)")
@@ -91,10 +96,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     """A run of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
-    plan = plan_of_scene(options, options.scene, ["simulation"], out=options.out)
     stated = Stated(options.units, options.up, options.fps, options.match_vertices)
     name = options.name or f"{Path(options.roll_out.rstrip('/')).stem.strip('*_-. ') or 'roll-out'}"
     option = RollOutOption(name, options.roll_out, stated, checked_ms(options.declared_ms))
+    plan = plan_of_scene(options, options.scene or ANY_SCENE, ["simulation"], out=options.out)
+    if options.rest_mesh:
+        plan, option = _of_file(plan, option, options.rest_mesh)
     cells = [_with_steps(_reference(cell, options)) for cell in plan.cells]
     return replace(
         plan,
@@ -102,6 +109,18 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         suites=tuple(dict.fromkeys((*plan.suites, JUDGED_BY_STEP))),
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
+
+
+def _of_file(plan: Plan, option: RollOutOption, rest_mesh: str) -> tuple[Plan, RollOutOption]:
+    """The plan with the scene that the roll-out brings in place of another; what is said of the file has then
+    been said of the scene, but for unit and axis.
+    """
+    from .scenes.from_roll_out import declared
+
+    scene = declared(option, rest_mesh)
+    cells = tuple(replace(cell, scene=scene, suites=(JUDGED_BY_STEP,)) for cell in plan.cells)
+    same_rate = replace(option.stated, fps=None)
+    return replace(plan, cells=cells), replace(option, stated=same_rate)
 
 
 def _reference(cell: Cell, options: argparse.Namespace) -> Cell:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 from dressing import swaying, tube_dress
 from scipy.linalg import expm
-from tasks_by_hand import InProcess, assets_of, dressed_scene
+from tasks_by_hand import InProcess, assets_of, dressed_scene, small_scene
 
 from benchmarks import export, run, score
 from benchmarks.export_files import _write_obj, write_scene
 from benchmarks.methods import find_method
-from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.plan import Motions, Plan, PlanError
 from benchmarks.presets import find_preset
 from benchmarks.results import RunFolder
@@ -115,6 +116,30 @@ def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_chang
     words[-1] = f"mine={tmp_path}/hanging_sheet.npz"
     with pytest.raises(PlanError, match="2 are asked for: name it with"):
         planned()
+
+
+def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
+    scene = small_scene("sheet_on_sphere")
+    obstacle = np.repeat(scene.obstacle.positions, scene.frames, axis=0)
+    made = find_method("newton-4").make(models=Path(), seed=0)
+    made.prepare(scene)
+    trajectory = made.run()
+    held = {"pred": trajectory.positions, "cloth_faces": trajectory.faces}
+    held |= {"obstacle": obstacle, "obstacle_faces": scene.obstacle.faces}
+    (tmp_path / "pred.pkl").write_bytes(pickle.dumps(held))
+    _write_obj(tmp_path / "rest.obj", scene.cloth.rest_positions, scene.cloth.faces, None)
+    words = [str(tmp_path / "pred.pkl"), "--rest-mesh", str(tmp_path / "rest.obj"), "--no-reference"]
+    assert score.main([*words, "--preset", "smoke", "-o", str(tmp_path / "out")]) == 0
+    found = {
+        row.metric: row.value for row in RunFolder(tmp_path / "out").read_rows() if row.role == "external"
+    }
+    group = SceneRollOuts(scene, gap_samples=SMOKE.gap_samples)
+    group.roll_outs.append(RollOut(group, find_method("newton-4"), trajectory, suites=("speed",)))
+    values = measured(group.roll_outs[0])[0]
+    expected = {name: value.value if isinstance(value, Estimate) else value for name, value in values.items()}
+    assert found == expected and found["penetration/vertices"] >= 0.0 and found["energy/collision"] > 0.0
+    assert score.main([words[0], "--rest-mesh", words[0], "-o", str(tmp_path / "no")]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].count("pred.pkl") >= 1 and not (tmp_path / "no").exists()
 
 
 REFUSED = {
