@@ -77,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def plan_of(options: argparse.Namespace) -> Plan:
     """A plan of that scene and its simulation alone. Raises ValueError, one line."""
     # Nobody simulates scenes for networks alone: the network is there to find them, and taken out again.
-    plan = plan_of_scene(options, options.scene, ["simulation", "untrained"])
+    plan = plan_of_scene(options, options.scene, ["simulation", "untrained", "snug"])
     first = plan.cells[0]
     return replace(plan, cells=(replace(first, entry=replace(first.entry, trained=None)),))
 
