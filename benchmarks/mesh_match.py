@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 Index = np.ndarray  # of whole numbers
 
+TRIED = 24  # places of a first triangle; a mesh with as many symmetries as triangles has thousands
 ROUNDS = 12  # of the refinement of colours: what lies so many edges around a vertex tells it from others
 
 
@@ -62,8 +61,8 @@ def _laid_on(
     our_points: np.ndarray,
 ) -> Index | None:  # fmt: skip
     """The order by triangles of that winding, part by part of our mesh; None where there is none."""
-    sides = _third(theirs), _third(ours)
-    if sides[0] is None or sides[1] is None:
+    their_side, our_side, colours = _third(theirs), _third(ours), (their_colours, our_colours)
+    if their_side is None or our_side is None:
         return None
     order = np.full(len(our_points), -1)
     taken: set[int] = set()
@@ -74,9 +73,9 @@ def _laid_on(
             continue
         ways = [
             way
-            for place in _places(seed, theirs, their_colours, our_colours)
+            for place in _places(seed, theirs, *colours, their_points, our_points)
             if place[0] not in taken
-            and (way := _followed(seed, place, sides[0], sides[1], their_colours, our_colours)) is not None
+            and (way := _followed(seed, place, their_side, our_side, *colours)) is not None
         ]
         if not ways:
             return None
@@ -89,11 +88,15 @@ def _laid_on(
     return order
 
 
-def _places(seed: Index, theirs: Index, their_colours: Index, our_colours: Index) -> Iterator[Index]:
-    """Their triangles, turned, whose colours are those of the triangle `seed` of ours."""
-    for turn in range(3):
-        turned = np.roll(theirs, turn, axis=1)
-        yield from turned[(their_colours[turned] == our_colours[seed]).all(axis=1)]
+def _places(
+    seed: Index, theirs: Index, their_colours: Index, our_colours: Index, their_points: np.ndarray,
+    our_points: np.ndarray,
+) -> Index:  # fmt: skip
+    """Their triangles, turned, whose colours are those of the triangle `seed` of ours; the TRIED nearest."""
+    turned = np.concatenate([np.roll(theirs, turn, axis=1) for turn in range(3)])
+    alike = turned[(their_colours[turned] == our_colours[seed]).all(axis=1)]
+    away = ((their_points[alike] - our_points[seed]) ** 2).sum(axis=(1, 2))
+    return alike[np.argsort(away, kind="stable")[:TRIED]]
 
 
 def _followed(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import time
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.roll_out_files import read_roll_out
 from benchmarks.roll_out_option import RollOutError, RollOutOption, Stated, parse
 from benchmarks.tasks.metrics import measured
+from benchmarks.validation.meshes import torus
 from reference_sim import Trajectory
 from reference_sim.point_cache import HEADER, SIGNATURE, read_point_cache, write_point_cache
 
@@ -203,6 +205,15 @@ def test_a_symmetric_mesh_is_laid_on_itself_where_it_is_nearest(flip):
     assert np.array_equal(order[found], np.arange(72))
     theirs[0] = theirs[0, [1, 0, 2]]
     assert same_topology(theirs[:-1], two, both[order], both) is None
+
+
+def test_a_mesh_with_a_thousand_symmetries_is_laid_on_itself_in_a_moment():
+    points, faces, _ = torus(24, 0.3, 0.1)
+    order = RANDOM.permutation(len(points))
+    clock = time.perf_counter()
+    found = same_topology(np.argsort(order)[faces], faces, points[order] + 0.01, points)
+    assert np.array_equal(order[found], np.arange(len(points)))
+    assert time.perf_counter() - clock < 10.0
 
 
 # --- damaged files ---------------------------------------------------------------------------------------
