@@ -125,6 +125,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ValueError as error:  # also the readers' own errors: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    for motion in plan.motions.files.values():
+        print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     from .lock import HeldError, held
 
     try:
@@ -157,9 +159,9 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     if workers < 1:
         raise PlanError(f"--workers {workers}: give a whole number, 1 or more")
     scenes, methods = tuple(split(options.scenes)), tuple(split(options.methods))
-    motions = Motions()
+    motions, reading = Motions(), reading_of(options)
     if options.motions or options.test_motions or not names_no_motion(scenes):
-        motions = choose_motions(options.motions, split(options.test_motions), preset, reading_of(options))
+        motions = choose_motions(options.motions, split(options.test_motions), preset, reading)
     request = Request(
         suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=scenes,
         methods=methods, seeds=seeds,
