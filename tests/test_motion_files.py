@@ -76,6 +76,7 @@ class TestForms:
             ({"poses": KICK.poses[:, :20]}, "72 .SMPL."),
             ({"poses": np.zeros((0, 72)), "trans": np.zeros((0, 3))}, "no frame"),
             ({"poses": np.zeros((200_000, 66)), "trans": np.zeros((200_000, 3))}, "200000 frames"),
+            ({"poses": np.zeros((20_000, 66)), "trans": np.zeros((20_000, 3)), "fps": 10}, "lasts 2000 s"),
             ({"poses": np.degrees(KICK.poses)}, "radians, not degrees"),
             ({"trans": KICK.translations + 1e5}, "metres"),
             ({"trans": KICK.translations.astype(complex)}, "does not hold numbers"),
