@@ -58,6 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> int:
     """Run the plan, or say what would be run; returns the exit status."""
+    for motion in plan.motions.files.values():
+        print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     from .lock import HeldError, held
 
     try:
@@ -95,9 +97,9 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     methods, own_methods = outside.resolved(
         outside.METHODS, split(options.methods), {entry.name for entry in METHODS}
     )
-    motions = Motions()
+    motions, reading = Motions(), reading_of(options)
     if options.motions or options.test_motions or not names_no_motion(scenes, own_scenes):
-        motions = choose_motions(options.motions, split(options.test_motions), preset, reading_of(options))
+        motions = choose_motions(options.motions, split(options.test_motions), preset, reading)
     garment = choose_garment(options)
     if garment:
         motions = replace(motions, worn=(garment.scenes, *motions.worn[1:]))

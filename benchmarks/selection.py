@@ -234,12 +234,11 @@ def choose_motions(
     library trains. The test motions of the library never train, whichever motions test. reading: what the
     files do not say.
     """
-    from snug.motion_files import load_motions
     from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, LIBRARY, TEST, TRAIN
 
     files: dict[str, Motion] = {}
     for path in paths:
-        for motion in load_motions(path, reading=reading) if path != "library" else ():
+        for motion in _motions_in(path, reading) if path != "library" else ():
             if motion.name in files or motion.name in LIBRARY:
                 raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             if motion.frames < FEWEST:
@@ -261,6 +260,12 @@ def choose_motions(
     few, fewer = preset.train_motions, preset.test_motions
     test = test if test_names else test[:fewer]
     return Motions(train[:few], test, files, DYNAMIC_TRAIN[:few], DYNAMIC_TEST[:fewer])
+
+
+def _motions_in(path: str, reading: Reading | None) -> list[Motion]:
+    from snug.motion_files import load_motions  # its readers are slow to load
+
+    return load_motions(path, reading=reading)
 
 
 def names_no_motion(scenes: Sequence[str], own: Sequence[Scene] = ()) -> bool:

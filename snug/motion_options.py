@@ -39,6 +39,11 @@ def add_motion_options(add: Callable[..., Any]) -> None:
 
 
 def reading_of(options: argparse.Namespace) -> Reading:
-    """The words of a command as a Reading."""
+    """The words of a command as a Reading. Raises ValueError for words without a file to read."""
     joint_map = Path(options.joint_map) if options.joint_map else None
-    return Reading(up=options.motion_up, fps=options.motion_fps, joint_map=joint_map, repair=options.repair)
+    reading = Reading(
+        up=options.motion_up, fps=options.motion_fps, joint_map=joint_map, repair=options.repair
+    )
+    if reading != Reading() and not options.motions:
+        raise ValueError("--motion-up, --motion-fps, --joint-map, --repair: say of which files by --motions")
+    return reading

@@ -12,6 +12,7 @@ from snug.motion_options import Reading
 
 LARGEST_TEXT = 64 << 20  # [bytes] of a file of text
 MOST_FRAMES = 100_000  # 14 minutes at 120 frames per second
+LONGEST = 1800.0  # [s] a clip of few frames per second becomes many at 30
 SLOWEST, FASTEST = 5.0, 1000.0  # [1/s] rates of frames that a recording may have
 
 
@@ -20,6 +21,7 @@ class Recording:
     """poses: (T, 24, 3) axis-angle [rad], relative to the parent, as in snug.body; translations: (T, 3) [m].
 
     The root's rotation and path are in the axes of the file. Numbers that the file lacks are NaN.
+    Raises MotionError for a clip of more than LONGEST.
     """
 
     path: Path
@@ -27,6 +29,10 @@ class Recording:
     translations: np.ndarray
     fps: float
     source: str
+
+    def __post_init__(self) -> None:
+        if (seconds := len(self.poses) / self.fps) > LONGEST:
+            raise MotionError(f"{self.path}: lasts {seconds:.0f} s, more than {LONGEST:.0f}; cut the clip")
 
 
 def open_text(path: Path) -> list[str]:

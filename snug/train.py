@@ -53,6 +53,9 @@ def _run(options: argparse.Namespace) -> int:
     motions, held_out = _motions(options)
     stop = _StopRequest()
     group, device = join_group(device)
+    if options.motions and group.writes:
+        for motion in [*motions, *held_out]:
+            print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     try:
         body = Body.from_file(options.body) if options.body else Body.load()
         for template, out in zip(templates, outs):
@@ -98,9 +101,10 @@ def _motions(options: argparse.Namespace) -> tuple[list[Any], list[Any]]:
     from snug.motion_files import load_motions
     from snug.motion_library import TRAIN, make_motion
 
+    reading = reading_of(options)
     motions = [make_motion(name) for name in TRAIN]
     if options.motions:
-        motions = load_motions(options.motions, reading=reading_of(options))
+        motions = load_motions(options.motions, reading=reading)
     names = [motion.name for motion in motions]
     for word in ("hold_out", "validation"):
         for name in getattr(options, word):

@@ -55,6 +55,7 @@ def write_forms(folder: Path, motion, turn=Y_UP) -> list[Path]:
                         "fps": fps},
         "xyzw": {"quaternions_xyzw": quaternions, "trans": trans, "fps": fps},
         "wxyz": {"rotations_quat": quaternions[..., [3, 0, 1, 2]], "trans": trans, "fps": fps},
+        "scalar_first": {"quaternions_wxyz": quaternions[..., [3, 0, 1, 2]], "trans": trans, "fps": fps},
         "matrices": {"rotations": matrices, "trans": trans, "fps": fps},
     }  # fmt: skip
     files = []

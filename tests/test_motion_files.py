@@ -46,13 +46,21 @@ class TestForms:
         expected = place(KICK)
         expected.poses[:, HANDS] *= HAND_DAMPING
         files = write_forms(tmp_path, KICK, turn)
-        assert len(files) == 14
+        assert len(files) == 15
         for file in files:
             (motion,) = load_motions(file, spread_degrees=0.0)
             exact = 1e-9 if file.suffix != ".bvh" else 1e-7
             assert motion.frames == KICK.frames and motion.fps == 30.0
             assert angles(motion.poses, expected.poses).max() < 10 * exact, file.name
             np.testing.assert_allclose(motion.translations, expected.translations, atol=10 * exact)
+
+    @pytest.mark.parametrize(("joints", "hand"), [(24, 0.05), (52, 0.0), (55, 0.0)])
+    def test_hands_are_damped_and_fingers_are_no_hands(self, tmp_path, joints, hand):
+        poses = np.zeros((3, joints, 3))
+        poses[:, 20:, 2] = 0.5
+        path = write(tmp_path / "clip.npz", replace(KICK.cut(0, 3), poses=np.zeros((3, 24, 3))), poses=poses)
+        motion = read_motion(path, Reading())
+        np.testing.assert_allclose(motion.poses[:, [20, 21, 22, 23], 2], [[0.05, 0.05, hand, hand]] * 3)
 
     def test_a_file_of_poses_alone_needs_a_rate_and_stays_in_place(self, tmp_path):
         np.save(tmp_path / "poses.npy", KICK.poses.reshape(-1, 72))
@@ -68,6 +76,7 @@ class TestForms:
             ({"poses": KICK.poses[:, :20]}, "72 .SMPL."),
             ({"poses": np.zeros((0, 72)), "trans": np.zeros((0, 3))}, "no frame"),
             ({"poses": np.zeros((200_000, 66)), "trans": np.zeros((200_000, 3))}, "200000 frames"),
+            ({"poses": np.zeros((20_000, 66)), "trans": np.zeros((20_000, 3)), "fps": 10}, "lasts 2000 s"),
             ({"poses": np.degrees(KICK.poses)}, "radians, not degrees"),
             ({"trans": KICK.translations + 1e5}, "metres"),
             ({"trans": KICK.translations.astype(complex)}, "does not hold numbers"),

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from misbehaving import interrupt_at
 
@@ -106,6 +107,8 @@ def test_the_list_names_every_scene_that_a_suite_has(preset, capsys):
         (["--motions", "empty.amc"], "empty.amc"),
         (["--motions", "broken.npz"], "broken.npz"),
         (["--motions", "folder"], "folder"),
+        (["--motions", "back.npz", "--motion-up", "z"], "on its back or side: it stands along y"),
+        (["--repair"], "say of which files by --motions"),
         (["--test-motions", "wlak"], "did you mean walk"),
         (["--seeds", "one"], "--seeds"),
         (["--seeds", "-1"], "--seeds"),
@@ -124,6 +127,7 @@ def test_the_list_names_every_scene_that_a_suite_has(preset, capsys):
 def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monkeypatch, capsys):
     (tmp_path / "empty.amc").write_text("")
     (tmp_path / "broken.npz").write_bytes(b"PK no zip")
+    np.savez(tmp_path / "back.npz", poses=np.zeros((3, 72)), trans=np.zeros((3, 3)), fps=30)
     (tmp_path / "folder").mkdir()
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "note.txt").write_text("mine")

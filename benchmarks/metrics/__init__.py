@@ -17,6 +17,7 @@ MODULES = (
     "curvature",
     "shape",
     "geometry",
+    "body",
     "optimality",
     "exact",
     "dynamics",
