@@ -86,7 +86,7 @@ class Wearer:
         self.height = body.height
         self.low, self.high = body.template.min(axis=0), body.template.max(axis=0)
         self.skin = Obstacle(body.template, body.faces)
-        self.ends = np.asarray(dominated_by(body, ENDS))[body.faces].all(axis=1)
+        self.ends = np.isin(body.faces, np.flatnonzero(dominated_by(body, ENDS))).all(axis=1)
 
     def fit(self, positions: Array) -> Fit:
         """How positions (V,3) [m] lie on it."""
