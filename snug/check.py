@@ -41,7 +41,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog=f"python -m {PROGRAM}",
         description="Read garments as benchmarks.run and snug.train do, and say in a short table what was "
-        "found: size, place on the body, rest shape, winding, openings, weights, and how to mend what is wrong.",
+        "found: size, place on the body, rest shape, winding, openings, weights, and what mends them.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
