@@ -30,7 +30,7 @@ ENDS = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_an
         "left_foot", "right_foot")  # fmt: skip
 # A wide dress has a cost of .2, a shirt around the knees of .5 and a tenth of that in its place.
 DOUBTFUL, BETTER = 0.3, 0.4
-SAMPLES = 400  # vertices that a shift is sought with
+SAMPLES = 250  # vertices that a shift is sought with
 STEPS = 20
 CLOSE = 0.2  # share of the vertices that are closer than the thickness m: what a garment hangs by
 HUBER, FAR = 0.01, 0.2  # [m] differences from it that count fully, and at most
