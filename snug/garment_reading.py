@@ -106,9 +106,10 @@ def _of_place(reading: Reading, file: GarmentFile, wearer: Wearer, raw: Surface)
     assert reading.surface is not None
     positions = reading.surface.positions
     fit = wearer.fit(positions)
+    problem = wearer.problem(positions, fit)
     reading.distances = fit.distances
     size = " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0))
-    if not fit.problem:
+    if not problem:
         level = "note" if fit.depth > 0 else "ok"
         reading.find("size", f"{size} m with units {file.units}, up {file.up}")
         reading.find("place", f"{fit.below:.1%} of the vertices below the skin, the deepest by "
@@ -122,7 +123,7 @@ def _of_place(reading: Reading, file: GarmentFile, wearer: Wearer, raw: Surface)
         given = [f"{OPTION}{name} {found}" for name, (found, was) in words.items() if found != was]
         given += [f"{OPTION}shift {shift}"] if mend.shift != file.shift else []
         remedy = " ".join(given)
-    reading.find("place", f"does not lie on the body ({size} m, {fit.problem})", remedy, "unusable")
+    reading.find("place", f"does not lie on the body ({size} m, {problem})", remedy, "unusable")
     return False
 
 
