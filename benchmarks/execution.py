@@ -74,7 +74,8 @@ def assets_of(plan: Plan) -> Assets:
     names, files = list(dict.fromkeys(names)), plan.motions.files
     motions = [files[name] for name in names if name in files]
     motions += embedded_motions(name for name in names if name not in files)
-    return open_assets(plan.preset, motions, plan.garments, body=plan.body_file)
+    own = plan.garment.file if plan.garment else None
+    return open_assets(plan.preset, motions, plan.garments, body=plan.body_file, own=own)
 
 
 def check_roll_outs(plan: Plan) -> None:
@@ -118,6 +119,7 @@ class RunLog:
                 for what, names in (("train", plan.motions.train_of), ("test", plan.motions_of))
             },
             "body": [plan.body.path.name, plan.body.digest] if plan.body else "of the package",
+            "garment": [plan.garment.file.path.name, plan.garment.inputs] if plan.garment else "tailored",
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
@@ -169,6 +171,7 @@ class RunLog:
                 "vertices": len(garment.rest_positions),
                 "triangles": len(garment.faces),
                 "parameters": {name: float(value) for name, value in garment.parameters.items()},
+                "material": dataclasses.asdict(garment.material),
             }
             for garment in assets.garments.values()
         }

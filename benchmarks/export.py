@@ -1,4 +1,4 @@
-"""python -m benchmarks.export: a scene as plain files, to be simulated or predicted elsewhere and scored here."""
+"""python -m benchmarks.export: a scene as plain files, to be simulated elsewhere and scored here."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .one_scene import plan_of_scene, words_of_scene
 from .plan import Plan, PlanError
-from .run import Parser, make_parser, make_plan
+from .run_options import Parser, add_scene_options
 from .timing import one_thread
 
 if TYPE_CHECKING:
@@ -42,11 +43,8 @@ def make_export_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("scene", metavar="SCENE", help="as in benchmarks.run --list")
     add("-o", "--out", required=True, metavar="DIR", help="a new or empty folder")
-    add("--preset", default="quick", metavar="NAME", help="size of the scene (default quick)")
     add("--reference", action="store_true", help="simulate the scene, and write the trajectory too")
-    add("--motions", action="append", default=[], metavar="PATH", help="as of benchmarks.run")
-    add("--test-motions", action="append", default=[], metavar="NAME,...", help="as of benchmarks.run")
-    add("--body", metavar="FILE", help="as of benchmarks.run")
+    add_scene_options(parser)
     return parser
 
 
@@ -63,7 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scene, assets = built(plan)
         from .export_files import write_scene
 
-        command = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *_chosen(options)])
+        chosen = ["--scene", options.scene, *words_of_scene(options)]
+        command = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
         write_scene(folder, plan, scene, assets, score=command, reference=options.reference)
     except (ValueError, RuntimeError) as error:
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
@@ -78,24 +77,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def plan_of(options: argparse.Namespace) -> Plan:
     """A plan of that scene and its simulation alone. Raises ValueError, one line."""
     # Nobody simulates scenes for networks alone: the network is there to find them, and taken out again.
-    words = ["--scenes", options.scene, "--methods", "simulation,untrained", *_of_run(options)]
-    plan = make_plan(make_parser().parse_args(words), words)
-    if len(plan.scenes) != 1 or plan.cases or plan.microbenchmarks:
-        raise PlanError(f"{options.scene}: name one scene; see python -m benchmarks.run --list")
+    plan = plan_of_scene(options, options.scene, ["simulation", "untrained"])
     first = plan.cells[0]
     return replace(plan, cells=(replace(first, entry=replace(first.entry, trained=None)),))
-
-
-def _of_run(options: argparse.Namespace) -> list[str]:
-    """The options that the commands share, as words."""
-    words = ["--preset", options.preset]
-    for option, values in (("--motions", options.motions), ("--test-motions", options.test_motions)):
-        words += [word for value in values for word in (option, value)]
-    return [*words, *(["--body", options.body] if options.body else [])]
-
-
-def _chosen(options: argparse.Namespace) -> list[str]:
-    return ["--scene", options.scene, *_of_run(options)]
 
 
 def built(plan: Plan) -> tuple[BuiltScene, Assets | None]:

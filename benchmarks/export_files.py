@@ -77,7 +77,7 @@ def _cloth(part: Path, scene: BuiltScene) -> Listed:
         "start_positions": scene.start, "start_velocities": scene.start_velocity,
         "pins": np.asarray(cloth.pins, dtype=np.int64),
     }  # fmt: skip
-    said = "rest_positions (V,3), faces (F,3), masses (V,) [kg], start_positions and start_velocities (V,3), pins (P,)"
+    said = "rest_positions, start_positions, start_velocities (V,3), faces (F,3), masses (V,) [kg], pins (P,)"
     if cloth.rest_uv is not None:
         arrays["rest_uv"] = cloth.rest_uv
         said += ", rest_uv [m], the flat rest state"
@@ -98,10 +98,12 @@ def _write_obj(path: Path, positions: np.ndarray, faces: np.ndarray, uv: np.ndar
     if uv is None:
         lines += [f"f {a} {b} {c}" for a, b, c in places.tolist()]
     else:
-        texture = places if uv.ndim == 2 else 1 + np.arange(faces.size).reshape(faces.shape)
+        texture = places if uv.ndim == 2 else np.arange(1, faces.size + 1).reshape(-1, 3)
         lines += [f"vt {u!r} {v!r}" for u, v in uv.reshape(-1, 2).tolist()]
-        pairs = zip(places.tolist(), texture.tolist())
-        lines += ["f " + " ".join(f"{p}/{t}" for p, t in zip(*pair)) for pair in pairs]
+        lines += [
+            "f " + " ".join(f"{p}/{t}" for p, t in zip(corners, of_chart))
+            for corners, of_chart in zip(places.tolist(), texture.tolist())
+        ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -112,7 +114,9 @@ def _obstacle(part: Path, scene: BuiltScene) -> Listed:
         return []
     times = np.arange(len(obstacle.positions)) * scene.dt
     write_point_cache(part / "obstacle.pc2", Trajectory(obstacle.positions, obstacle.faces, times))
-    rest = {} if scene.dressed is None else {"rest_positions": scene.dressed.body.shaped(scene.dressed.betas)}
+    rest: dict[str, Any] = {}
+    if scene.dressed is not None:
+        rest["rest_positions"] = scene.dressed.body.shaped(scene.dressed.betas)
     fps = 1.0 / scene.dt
     np.savez(part / "obstacle.npz", positions=obstacle.positions, faces=obstacle.faces, fps=fps, **rest)
     said = "positions (T,B,3) of what the cloth touches, one frame where it stands still, faces"
@@ -146,19 +150,20 @@ def _motion(part: Path, worn: Dressed) -> Listed:
         gender=np.array("neutral"), mocap_framerate=motion.fps,
     )  # fmt: skip
     smoothed = DressedBody(body, garment).weights(DEFAULT.smoothing).double().numpy()
+    loops: dict[str, Any] = {f"loop_{name}": loop for name, loop in garment.loops.items()}
     np.savez(
         part / "skinning.npz", weights=garment.skinning_weights, smoothed_weights=smoothed,
         rest_positions=garment.rest_for(body, worn.betas), joints=joints, parents=body.parents,
         transforms=body.transforms(motion.poses, motion.translations, worn.betas),
-        **{f"loop_{name}": loop for name, loop in garment.loops.items()},
+        **loops,
     )  # fmt: skip
     return [
         ("motion_smpl.npz", "poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up"),
         ("motion_amass.npz", "the same as AMASS writes it: poses (T,156), z up, fingers at rest"),
         (
             "skinning.npz",
-            "weights (V,24) of the garment, smoothed_weights as method 'skinning' takes them, rest_positions (V,3) "
-            "on this body, joints (24,3), parents (24,), transforms (T,24,3,4) from rest to pose, loops",
+            "weights (V,24) of the garment, smoothed_weights as method 'skinning' takes them, rest_positions "
+            "(V,3) on this body, joints (24,3), parents (24,), transforms (T,24,3,4) of the joints, loops",
         ),
     ]
 
@@ -205,6 +210,7 @@ def facts_of(scene: BuiltScene) -> dict[str, Any]:
         "material": {name: getattr(material, name) for name in material.__dataclass_fields__}
         | {"lame_lambda_N_per_m": material.lame_lambda, "lame_mu_N_per_m": material.lame_mu},
         "energies": {term.name: term.parameters() for term in scene.energies},
+        "contact_region_m": None if scene.obstacle is None else scene.obstacle.region,
         "origin_heights": None if scene.origin_heights is None else scene.origin_heights.tolist(),
     }
 
@@ -217,11 +223,11 @@ def readme(scene: BuiltScene, facts: dict[str, Any], files: Listed, score: str) 
     lines = [
         f"Scene {scene.name}, preset {facts['preset']}: {facts['description']}.",
         "",
-        "Units: metres, kilograms, seconds, radians, joules. World coordinates, right-handed, y up, a body faces +z",
-        "in its rest pose. motion_amass.npz alone has z up. Gravity is 9.81 m/s^2 along -y.",
+        "Units: metres, kilograms, seconds, radians, joules. World coordinates, right-handed, y up; a body",
+        "faces +z in its rest pose. motion_amass.npz alone has z up. Gravity is 9.81 m/s^2 along -y.",
         "Order of vertices: that of rest.obj, the same in every file. Triangles wind outwards.",
-        f"Time: {facts['frames']} frames at {rate} a second (dt {facts['dt']:.6g} s); frame 0 is the start, which is",
-        f"given: start_positions, start_velocities. The first {warm} frames are simulated and not judged.",
+        f"Time: {facts['frames']} frames at {rate} a second (dt {facts['dt']:.6g} s); frame 0 is the start:",
+        f"start_positions and start_velocities. The first {warm} frames are simulated and not judged.",
         "npz files hold float64, and pc2 and obj beside it float32; rest.obj has all digits.",
         "",
         "Files:",
@@ -231,15 +237,16 @@ def readme(scene: BuiltScene, facts: dict[str, Any], files: Listed, score: str) 
     ]
     if facts["before"]:
         lines += [
-            f"The motion is a part: {facts['before']} frames came before it, and the start carries their velocities.",
+            f"The motion is a part: {facts['before']} frames came before it; the start has their velocities.",
             "",
         ]
     if scene.dressed is not None:
         lines += [
-            "A vertex of the body at rest goes to sum_j w_j (R_j p + t_j), (R_j, t_j) = transforms. The motion is already",
-            "placed on the floor with its arms clear of the torso: read again by --motions it would be placed anew.",
+            "A vertex p at rest goes to sum_j w_j (R_j p + t_j), (R_j, t_j) = transforms. The motion is",
+            "placed on the floor with its arms clear of the torso: --motions would place it anew.",
             "The zero of gravity's energy in a frame is origin_heights, the height of the pelvis.",
-            "Contact: each sample of the cloth touches only faces of the body near its own place at rest (region).",
+            "Contact: a sample of the cloth touches only faces of the body near its own place at rest:",
+            f"those whose centroid at rest lies within {facts['contact_region_m']} m of the sample's.",
             "",
         ]
     lines += [
@@ -247,6 +254,6 @@ def readme(scene: BuiltScene, facts: dict[str, Any], files: Listed, score: str) 
         f"  numpy.savez('mine.npz', positions=positions, fps={rate})",
         "and have them scored:",
         f"  {score}",
-        "quasi_static=(T,V,3), the answer to each pose held still, adds the method's own dynamics to the rows.",
+        "quasi_static=(T,V,3), the answer to each pose held still, adds the method's own dynamics.",
     ]
     return "\n".join(lines) + "\n"

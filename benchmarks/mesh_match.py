@@ -47,7 +47,7 @@ def same_topology(
     if theirs.shape != ours.shape or len(their_points) != len(our_points):
         return None
     colours = _colours(theirs, len(their_points)), _colours(ours, len(our_points))
-    if not np.array_equal(*map(np.sort, colours)):
+    if not np.array_equal(np.sort(colours[0]), np.sort(colours[1])):
         return None
     found = [
         order

@@ -61,7 +61,9 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
     """Read a file, a folder or a pattern of files. Raises RollOutError, one line, for whatever is wrong."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES and not (Path(path).is_dir() or "*" in str(path)):
-        raise RollOutError(f"{path}: unknown kind of roll-out: give one of {', '.join(SUFFIXES)}, or a folder")
+        raise RollOutError(
+            f"{path}: unknown kind of roll-out: give one of {', '.join(SUFFIXES)}, or a folder"
+        )
     reader = _READERS.get(suffix, _meshes)
     try:
         return _checked(reader(str(path)))

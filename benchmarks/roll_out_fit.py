@@ -1,4 +1,4 @@
-"""Does a stored roll-out belong to the scene? Unit, axes, order of vertices, frame rate and place are compared.
+"""Does a stored roll-out belong to the scene? Unit, axes, order of vertices, frame rate, place are compared.
 
 What does not fit is refused with the remedy and never guessed: a roll-out in centimetres would otherwise get
 numbers, and nobody would see that they mean nothing.
@@ -23,21 +23,20 @@ if TYPE_CHECKING:
 
 NEAR = 0.25  # of the cloth's diagonal: from where the scene's cloth is, a first frame lies nearer than that
 BETTER = 0.5  # another unit or axis fits better where its distance is less than so much of the stated one's
+SIZES = 2.0  # times as large, or as small, as the cloth a first frame may be
 LONG = 3.0  # times as long as at rest, edges in the mean: then they join vertices that are no neighbours
 ALIKE = 1e-6  # of a frame rate
 
 
-def fitted(
-    stored: StoredRollOut, scene: BuiltScene, stated: Stated = Stated()
-) -> tuple[StoredRollOut, tuple[str, ...]]:
-    """The roll-out in metres, y up, in the order of the scene's vertices, a frame for each of the scene's; and
-    what was done to it, in words. Raises RollOutError with the remedy, without the file's name.
+def fitted(stored: StoredRollOut, scene: BuiltScene, stated: Stated) -> tuple[StoredRollOut, tuple[str, ...]]:
+    """The roll-out in metres, y up, in the order of the scene's vertices, a frame for each of the scene's;
+    and what was done to it, in words. Raises RollOutError with the remedy, without the file's name.
     """
     count, cloth = stored.positions.shape[1], scene.cloth
     if count != cloth.vertex_count:
         raise RollOutError(
-            f"has {count} vertices, the cloth of {scene.name} {cloth.vertex_count}: write one position for each "
-            "vertex of the scene's mesh, of the same preset; corners that are split at seams are one vertex"
+            f"has {count} vertices, the cloth of {scene.name} {cloth.vertex_count}: write one position for "
+            "each vertex of the scene's mesh, of the same preset; corners split at seams are one vertex"
         )
     if not np.isfinite(stored.positions[0]).all():
         raise RollOutError("its first frame, the scene's start, is not finite")
@@ -79,19 +78,26 @@ def expected_positions(scene: BuiltScene) -> np.ndarray:
 def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: Stated) -> None:
     """Among all units and up axes the stated ones are those with which the first frame fits best."""
     first, size = stored.positions[0], _diagonal(expected)
+    alike = [units for units in METRES if 1 / SIZES < METRES[units] * _diagonal(first) / size < SIZES]
+    if not alike:
+        across = METRES[stated.units] * _diagonal(first)
+        raise RollOutError(
+            f"its first frame is {across:.3g} m across, the scene's cloth {size:.3g} m, in whatever unit of "
+            f"{', '.join(METRES)}: write metres"
+        )
     apart = {
         (units, up): _cloud_distance(to_metres_y_up(first, units=units, up=up), expected)
-        for units in METRES
+        for units in alike
         for up in UP_AXES
     }
-    best = min(apart, key=lambda names: apart[names])
-    here = apart[stated.units, stated.up]
-    if best != (stated.units, stated.up) and apart[best] < BETTER * here and apart[best] < NEAR * size:
-        given = {"units": stated.units, "up": stated.up}
-        remedy = [f"--{name} {value}" for name, value in zip(("units", "up"), best) if given[name] != value]
+    best, given = min(apart, key=lambda names: apart[names]), (stated.units, stated.up)
+    here = apart.get(given, np.inf)
+    if best != given and apart[best] < BETTER * here and (given[0] not in alike or apart[best] < NEAR * size):
+        pairs = zip(("units", "up"), best, given)
+        remedy = [f"--{name} {value}" for name, value, said in pairs if value != said]
         raise RollOutError(
-            f"its first frame lies {here:.3g} m from the scene's cloth; in {best[0]} with {best[1]} up it would be "
-            f"{apart[best]:.2g} m: give {' '.join(remedy)}"
+            f"its first frame fits the scene's cloth in {best[0]}, {best[1]} up, {apart[best]:.2g} m off, "
+            f"and not in {stated.units}, {stated.up} up: give {' '.join(remedy)}"
         )
     if here > NEAR * size:
         raise RollOutError(
@@ -113,7 +119,7 @@ def _check_place(positions: np.ndarray, expected: np.ndarray) -> None:
     if 2 * len(far) > frames:
         frame = far[0]
         raise RollOutError(
-            f"from frame {frame} on its centre lies {away[frame]:.2g} m from where the body carries the garment: "
+            f"from frame {frame} on its centre lies {away[frame]:.2g} m from where the body carries it: "
             "another motion, another frame rate (--fps), or coordinates that are not the world's"
         )
 
@@ -137,7 +143,7 @@ def _diagonal(points: np.ndarray) -> float:
 def _order(
     stored: StoredRollOut, scene: BuiltScene, expected: np.ndarray, stated: Stated
 ) -> tuple[np.ndarray | None, str]:
-    """Which vertex of the file is each of the scene's, (V,), and how it was found; None where it is as it is."""
+    """Which vertex of the file is each of the scene's, (V,), and how it was found; None: the same."""
     ours, first = scene.cloth.faces, stored.positions[0]
     remedy = "; give --match-vertices" if not stated.match_vertices else ""
     if stored.faces is not None:
@@ -145,14 +151,14 @@ def _order(
             return None, ""
         if not stated.match_vertices:
             raise RollOutError(
-                f"its {len(stored.faces)} triangles join other vertices than the {len(ours)} of the scene's mesh: "
+                f"its {len(stored.faces)} triangles join other vertices than the scene's {len(ours)}: "
                 f"vertices are missing or reordered{remedy}"
             )
         order = same_topology(stored.faces, ours, first, expected)
         if order is None:
             raise RollOutError(
-                f"its {len(stored.faces)} triangles are another mesh than the scene's {len(ours)}, in whatever order: "
-                "no vertex can be matched; export the scene's mesh and use that"
+                f"its {len(stored.faces)} triangles are another mesh than the scene's {len(ours)}, whatever "
+                "the order: no vertex can be matched; export the scene's mesh and use that"
             )
         return order, "vertices matched by topology"
     shuffled = _stretch(first, scene) > LONG
@@ -166,8 +172,8 @@ def _order(
     order = nearest_order(first, scene.start, reach=0.5 * float(np.median(_lengths(scene.start, scene))))
     if order is None:
         raise RollOutError(
-            "has no triangles, and its first frame is not the scene's start to within half an edge: vertices cannot "
-            "be matched one to one; add its triangles (faces of the npz, the .obj beside a point cache)"
+            "has no triangles, and its first frame is not the scene's start to within half an edge: vertices "
+            "cannot be matched one to one; add its triangles (faces of an npz, .obj beside a point cache)"
         )
     return order, "vertices matched by nearest position in the first frame"
 
@@ -196,17 +202,18 @@ def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: Stated) -> tuple[
     said, there = stored.fps, len(stored.positions)
     if stated.fps is None and said is not None and abs(said - rate) > ALIKE * rate:
         raise RollOutError(
-            f"states {said:g} frames a second, the scene has {rate:g}: give --fps {said:g}, and it is re-timed"
+            f"states {said:g} frames a second, the scene has {rate:g}: give --fps {said:g} to re-time it"
         )
     own = rate if stated.fps is None else stated.fps
     due = scene.frames
     places = np.arange(due) * own / rate
     places = np.where(np.abs(places - np.round(places)) < 1e-6, np.round(places), places)
-    if there != int(np.ceil(places[-1])) + 1 and not (there > places[-1] and own != rate):
+    spare = there - 1 - places[-1]  # frames of the file behind the scene's last; up to one of the scene's
+    if spare < 0.0 or spare > (0.0 if own == rate else max(own / rate, 1.0)):
         times = (there - 1) / own
         hint = _rate_hint(there, due, rate) if stated.fps is None else ""
         raise RollOutError(
-            f"has {there} frames, {times:.3g} s at {own:g} a second; the scene has {due}, the start included, "
+            f"has {there} frames, {times:.3g} s at {own:g} a second; the scene has {due} with its start, "
             f"{(due - 1) / rate:.3g} s{hint}"
         )
     if own == rate:

@@ -24,7 +24,7 @@ class RollOutError(ValueError):
 
 @dataclass(frozen=True)
 class Stated:
-    """What the user says of a roll-out: unit, up axis, frames per second, whether vertices are to be matched."""
+    """What the user says of a roll-out: unit, up axis, frames per second, whether to match vertices."""
 
     units: str = "m"
     up: str = "y"
@@ -60,8 +60,8 @@ class RollOutOption:
         return self.path.replace(PLACE, scene.replace("/", "-"))
 
     def entry(self, scene: str) -> MethodEntry | None:
-        """The method of that scene, None where there is no file for it. Raises RollOutError for one that cannot
-        be read.
+        """The method of that scene, None where it has no file. Raises RollOutError for one that cannot be
+        read.
         """
         from .roll_out_files import read_roll_out
 

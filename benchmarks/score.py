@@ -13,18 +13,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from .plan import Plan, PlanError
+from .one_scene import plan_of_scene
+from .plan import Plan
 from .results import RunFolder
 from .roll_out_option import RollOutOption, Stated, checked_ms
-from .run import Parser, carry_out
-from .run import make_parser as make_run_parser
-from .run import make_plan as make_run_plan
+from .run import carry_out
+from .run_options import Parser, add_scene_options
 from .selection import stored_cells
 from .tasks.cell import Cell
 from .timing import one_thread
 
 PROGRAM = "benchmarks.score"
 JUDGED_BY_STEP = "speed"  # the suite in which steps are solved again: gaps and one-step errors
+ANY_SCENE = "hanging_sheet"  # whose place the scene of a file takes
 NO_REFERENCE = "left out by --no-reference: curvature error and histogram, distances, dynamics, relative gap"
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
@@ -32,12 +33,12 @@ EXAMPLES = """examples:
   python -m benchmarks.score mine.pc2 --scene tshirt/kick --units cm --up z --match-vertices
   python -m benchmarks.score frames/ --scene hanging_sheet --fps 60 --declared-ms 2.2
   python -m benchmarks.score 'out/cloth_*.obj' --scene flag --reference simulated.vtkhdf
-  python -m benchmarks.score pred.pkl --scene tshirt/kick --no-reference
+  python -m benchmarks.score pred.pkl --rest-mesh shirt.obj --no-reference      cloth and body of a pickle
 
 ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi_static; .pkl with pred,
-  cloth_faces; .pc2 and .pc16 with their .obj; a folder or a quoted pattern of meshes, one a frame. In world
-  coordinates, the scene's first frame first. Other units, axes, rates and orders of vertices are refused with
-  the option that mends them.
+  cloth_faces, obstacle, obstacle_faces; .pc2 and .pc16 with their .obj; a folder or a quoted pattern of
+  meshes, one a frame. In world coordinates, the scene's first frame first. Other units, axes, rates and
+  orders of vertices are refused with the option that mends them.
 
 exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cannot be read or does not belong
   to the scene: one line says why and nothing is written; 130 interrupted."""
@@ -47,18 +48,22 @@ def make_parser() -> argparse.ArgumentParser:
     """The options of the command."""
     parser = Parser(
         prog=f"python -m {PROGRAM}",
-        description="Energies, gap to the minimum of each step, curvature, depth, conservation and dynamics of a "
-        "roll-out of another program: rows, a report, one line.",
+        description="Energies, gap to the minimum of each step, curvature, depth, conservation, dynamics of "
+        "a roll-out of another program: rows, a report, one line.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument
     add("roll_out", metavar="ROLLOUT", help="file, folder or pattern")
-    add("--scene", required=True, metavar="NAME", help="as in benchmarks.run --list")
-    add("--preset", default="quick", metavar="NAME", help="size of the scene (default quick)")
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--scene", metavar="NAME", help="as in benchmarks.run --list")
+    where.add_argument("--rest-mesh", metavar="FILE",
+        help="no scene of this project: the cloth at rest, in the roll-out's unit, axes and order; the file "
+        "brings its own body (obstacle, obstacle_faces) and starts at rest in its first frame")  # fmt: skip
+    add_scene_options(parser)
     add("--name", default="", metavar="NAME", help="of the method in tables (default: the file's)")
-    add("--units", default="m", metavar="m|cm|mm", help="of the roll-out (default m)")
+    add("--units", default="m", metavar="m|cm|mm|in", help="of the roll-out (default m)")
     add("--up", default="y", metavar="y|z", help="its up axis (default y)")
     add("--fps", type=float, metavar="N", help="its frames per second; other than the scene's are re-timed")
     add("--match-vertices", action="store_true", help="its vertices are the scene's in another order")
@@ -68,9 +73,6 @@ def make_parser() -> argparse.ArgumentParser:
     reference.add_argument("--reference", metavar="FILE",
         help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
     reference.add_argument("--no-reference", action="store_true", help="leave out what needs a reference")
-    add("--motions", action="append", default=[], metavar="PATH", help="as of benchmarks.run")
-    add("--test-motions", action="append", default=[], metavar="NAME,...", help="as of benchmarks.run")
-    add("--body", metavar="FILE", help="as of benchmarks.run")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     return parser
 
@@ -94,17 +96,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     """A run of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
-    asked = ["--preset", options.preset, "--scenes", options.scene, "--methods", "simulation"]
-    for option, values in (("--motions", options.motions), ("--test-motions", options.test_motions)):
-        asked += [word for value in values for word in (option, value)]
-    asked += ["--body", options.body] if options.body else []
-    asked += ["-o", options.out] if options.out else []
-    plan = make_run_plan(make_run_parser().parse_args(asked), asked)
-    if len(plan.scenes) != 1 or plan.cases or plan.microbenchmarks:
-        raise PlanError(f"--scene {options.scene}: name one scene; see python -m benchmarks.run --list")
     stated = Stated(options.units, options.up, options.fps, options.match_vertices)
     name = options.name or f"{Path(options.roll_out.rstrip('/')).stem.strip('*_-. ') or 'roll-out'}"
     option = RollOutOption(name, options.roll_out, stated, checked_ms(options.declared_ms))
+    plan = plan_of_scene(options, options.scene or ANY_SCENE, ["simulation"], out=options.out)
+    if options.rest_mesh:
+        plan, option = _of_file(plan, option, options.rest_mesh)
     cells = [_with_steps(_reference(cell, options)) for cell in plan.cells]
     return replace(
         plan,
@@ -112,6 +109,18 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         suites=tuple(dict.fromkeys((*plan.suites, JUDGED_BY_STEP))),
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
+
+
+def _of_file(plan: Plan, option: RollOutOption, rest_mesh: str) -> tuple[Plan, RollOutOption]:
+    """The plan with the scene that the roll-out brings in place of another; what is said of the file has then
+    been said of the scene, but for unit and axis.
+    """
+    from .scenes.from_roll_out import declared
+
+    scene = declared(option, rest_mesh)
+    cells = tuple(replace(cell, scene=scene, suites=(JUDGED_BY_STEP,)) for cell in plan.cells)
+    same_rate = replace(option.stated, fps=None)
+    return replace(plan, cells=cells), replace(option, stated=same_rate)
 
 
 def _reference(cell: Cell, options: argparse.Namespace) -> Cell:

@@ -25,12 +25,12 @@ from .validation.registry import CASES
 
 if TYPE_CHECKING:
     from snug.motion import Motion
+    from snug.motion_options import Reading
 
     from .roll_out_option import RollOutOption
     from .validation.case import Case
 
 FEWEST = 3  # frames of a motion: inertia needs two before the one that is judged
-FIRST_GARMENT = GARMENT_SCENES[0].garment
 MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
 
 
@@ -55,7 +55,7 @@ class Request:
     @cached_property
     def declared_scenes(self) -> dict[str, Scene]:
         """Name -> scene, of all that could be asked for. Raises DeclarationError where two have one name."""
-        declared = all_scenes(self.motions.test, self.motions.dynamic_test)
+        declared = all_scenes(self.motions.test, self.motions.dynamic_test, self.motions.worn)
         taken = {entry.name for entry in MEASURED}
         for scene in self.own_scenes:
             if scene.name in taken:
@@ -105,8 +105,8 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[
 
 
 def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:
-    """The stored roll-outs in the scenes of these cells, and in their suites. Raises PlanError, and RollOutError
-    for a file that cannot be read.
+    """The stored roll-outs in the scenes of these cells, and in their suites. Raises PlanError, and
+    RollOutError for a file that cannot be read.
     """
     scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
     suites = {name: tuple(dict.fromkeys(s for c in cells if c.scene.name == name for s in c.suites))
@@ -119,8 +119,8 @@ def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> l
         taken.add(option.name)
         if len(scenes) != 1 and not option.places:
             raise PlanError(
-                f"--rollout {option.name}={option.path}: is of one scene, and {len(scenes)} are asked for: name it "
-                "with --scenes, or put {scene} into the path"
+                f"--rollout {option.name}={option.path}: is of one scene, and {len(scenes)} are asked for: "
+                "name it with --scenes, or put {scene} into the path"
             )
         own = [(scene, entry) for scene in scenes.values() if (entry := option.entry(scene.name))]
         if not own:
@@ -147,7 +147,7 @@ def _pairs(request: Request) -> Iterator[tuple[str, str, str]]:
         methods = (*suite.methods(extent), *more, *further, *sorted(own_methods))
         for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
             # Networks for a second garment double the training: only for whoever names its scenes.
-            plain = not extent.further and declared[scene].garment not in ("", FIRST_GARMENT)
+            plain = not extent.further and declared[scene].garment not in ("", extent.motions.first_garment)
             for method in methods:
                 if not (named(scene, request.scenes) and named(method, request.methods)):
                     continue
@@ -223,20 +223,23 @@ def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in SUITE_NAMES if "all" in chosen or name in chosen)
 
 
-def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Preset) -> Motions:
+def choose_motions(
+    paths: Sequence[str], test_names: Sequence[str], preset: Preset, reading: Reading | None = None
+) -> Motions:
     """Which motions train and which test. Raises PlanError (or the reader's own error) for a bad request.
 
     Without paths: the embedded library with its own division. With paths: the files alone, plus the library
     where "library" is among the paths. test_names moves motions to the test set; without it the test
     motions of the library test, and of files alone the first in order of names. A single file tests, and the
-    library trains. The test motions of the library never train, whichever motions test.
+    library trains. The test motions of the library never train, whichever motions test. reading: what the
+    files do not say.
     """
     from snug.motion_files import load_motions
     from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, LIBRARY, TEST, TRAIN
 
     files: dict[str, Motion] = {}
     for path in paths:
-        for motion in load_motions(path) if path != "library" else ():
+        for motion in load_motions(path, reading=reading) if path != "library" else ():
             if motion.name in files or motion.name in LIBRARY:
                 raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             if motion.frames < FEWEST:

@@ -50,7 +50,11 @@ class Stored(Method):
             times=np.arange(len(positions)) * self.scene.dt,
             status="ok" if finite else "diverged",
             reason="" if finite else f"{self.path}: holds a position that is not finite",
-            provenance={"method": "stored roll-out", "file": Path(self.path).name, "changes": list(self.done)},
+            provenance={
+                "method": "stored roll-out",
+                "file": Path(self.path).name,
+                "changes": list(self.done),
+            },
             frame_fields={"converged": claims},
         )
 

@@ -1,4 +1,4 @@
-"""The bending of the same hinges as the SNUG paper prints them, beside the scaled ones that its code computes.
+"""The bending of the same hinges as the SNUG paper prints them, beside the scaled ones of its code.
 
 Papers of the field give one or the other under the same name. It is no part of the total.
 """
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 METRICS = (
     Metric(
         name="energy/bending_printed", unit="J", title="Bending, as printed", lower_is_better=True,
-        definition="energy of the same hinges without their scale, k/2 theta^2 as the SNUG paper prints it; no "
-        "part of the total; mean over frames",
+        definition="energy of the same hinges without their scale, k/2 theta^2 as the SNUG paper prints it; "
+        "no part of the total; mean over frames",
     ),
 )  # fmt: skip
 
