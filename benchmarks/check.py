@@ -83,16 +83,15 @@ def read(words: Sequence[str]) -> dict[str, list[Any]]:
     """Word of a kind -> what these files and entry points declare. Raises DeclarationError."""
     declared: dict[str, list[Any]] = {kind.word: [] for kind in outside.KINDS}
     for word in words:
-        homes = {
-            kind: door.value for kind in outside.KINDS for door in [outside.packages(kind).get(word)] if door
-        }
+        homes = {kind: home for kind in outside.KINDS if (home := outside.home_of(kind, word)) is not None}
         if not homes:
-            home = outside.file_of(word)
-            module = outside.imported(home)
-            homes = {kind: home for kind in outside.KINDS if hasattr(module, kind.tuple_name)}
-            if not homes:
-                names = ", ".join(kind.tuple_name for kind in outside.KINDS)
-                raise DeclarationError(f"{word}: declares none of {names}")
+            raise DeclarationError(f"{word}: no such entry point; a file ends with .py")
+        if word.endswith(".py"):
+            module = outside.imported(next(iter(homes.values())))
+            homes = {kind: home for kind, home in homes.items() if hasattr(module, kind.tuple_name)}
+        if not homes:
+            names = ", ".join(kind.tuple_name for kind in outside.KINDS)
+            raise DeclarationError(f"{word}: declares none of {names}")
         for kind, home in homes.items():
             declared[kind.word] += outside.entries_of(kind, home)
     return declared

@@ -58,22 +58,17 @@ def resolved(kind: Kind, words: Sequence[str], known: Container[str]) -> tuple[l
     """The words of an option, with the names that a file or an entry point declares in the place of either;
     and its entries. known: names inside. Raises DeclarationError.
     """
-    doors = packages(kind) if words else {}
     names: list[str] = []
     found: dict[str, list[Any]] = {}
     for word in words:
-        if word in doors and word in known:
-            raise DeclarationError(
-                f"--{kind.word} {word}: is a name of the project, and an entry point of {_who(doors[word])}: "
-                "rename the entry point"
-            )
-        if word in doors:
-            home = doors[word].value
-        elif word.endswith(".py"):
-            home = file_of(word)
-        else:
+        home = home_of(kind, word)
+        if home is None:
             names.append(word)
             continue
+        if word in known:
+            raise DeclarationError(
+                f"--{kind.word} {word}: is a name of the project, and the entry point of {home}: rename that"
+            )
         found[home] = entries_of(kind, home)
         names += [entry.name for entry in found[home]]
     entries = [entry for entries in found.values() for entry in entries]
@@ -99,22 +94,25 @@ def _check_networks(entries: Sequence[MethodEntry]) -> None:
             )
 
 
-def packages(kind: Kind) -> dict[str, metadata.EntryPoint]:
-    """Name -> entry point, of the packages that are installed; none is loaded. Raises DeclarationError."""
-    found: dict[str, metadata.EntryPoint] = {}
-    for door in metadata.entry_points(group=kind.group):
-        if door.name in found and door.value != found[door.name].value:
-            raise DeclarationError(
-                f"entry point {door.name} of {kind.group} is declared by {_who(found[door.name])} and by "
-                f"{_who(door)}: rename one"
-            )
-        if ":" in door.value:
-            raise DeclarationError(
-                f"entry point {door.name} of {_who(door)}: {door.value}: name the module that has "
-                f"{kind.tuple_name}, without what follows the colon"
-            )
-        found[door.name] = door
-    return found
+def home_of(kind: Kind, word: str) -> str | None:
+    """The file, or the module of an installed package, that a word means; None where it means neither.
+
+    Nothing is loaded. Raises DeclarationError.
+    """
+    if word.endswith(".py"):
+        return file_of(word)
+    doors = list(metadata.entry_points(group=kind.group, name=word))
+    if not doors:
+        return None
+    if len({door.value for door in doors}) > 1:
+        who = " and by ".join(sorted(_who(door) for door in doors))
+        raise DeclarationError(f"entry point {word} of {kind.group} is declared by {who}: rename one")
+    if ":" in doors[0].value:
+        raise DeclarationError(
+            f"entry point {word} of {_who(doors[0])} is {doors[0].value}: name the module that has "
+            f"{kind.tuple_name}, without a colon"
+        )
+    return doors[0].value
 
 
 def _who(door: metadata.EntryPoint) -> str:
@@ -122,8 +120,9 @@ def _who(door: metadata.EntryPoint) -> str:
 
 
 def described(kind: Kind) -> list[tuple[str, str]]:
-    """(name, words) of each entry point, for a list."""
-    return [(name, f"{_who(door)}, module {door.value}") for name, door in sorted(packages(kind).items())]
+    """(name, words) of each entry point, for a list; none is loaded."""
+    doors = metadata.entry_points(group=kind.group)
+    return sorted((door.name, f"{_who(door)}, module {door.value}") for door in doors)
 
 
 def file_of(word: str) -> str:

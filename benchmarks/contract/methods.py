@@ -207,11 +207,13 @@ def _shapes(found: Findings, trajectory: Any, scene: BuiltScene, what: str = "")
             f"{what}gives frame_seconds {np.shape(trajectory.frame_seconds)}: one number a frame is due",
         )
         bad = np.flatnonzero(~np.isfinite(x).all(axis=(1, 2)))
-        found.demand(
-            not len(bad) or trajectory.status == "diverged",
-            f"{what}has a position that is not finite in frame {bad[:1]}: say status='diverged', and why",
-        )
-    return fine
+        if len(bad) and found.demand(
+            trajectory.status == "diverged" and bool(trajectory.reason),
+            f"{what}has a position that is not finite in frame {bad[0]}: say status='diverged', and why",
+        ):
+            found.notes.append(f"{what}ends as diverged: {trajectory.reason}")
+        return not len(bad)
+    return False
 
 
 def _remedied(complaint: str) -> str:

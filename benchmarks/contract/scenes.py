@@ -55,6 +55,8 @@ class CheckScene(Task):
         for energy in own:
             with found.call(f"energy {energy.name}"):
                 _check_derivatives(found, energy, scene)
+        if found.wrong:
+            return
         with found.call("its simulation"):
             simulation = find_method("simulation").make(models=context.folder.models, seed=0)
             simulation.prepare(scene)

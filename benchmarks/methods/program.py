@@ -61,30 +61,28 @@ class Program(Stored):
     seed: int = 0
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Export the scene into a folder that goes with this object."""
+        """Nothing yet: all that is said of its time is what it says itself."""
         self.scene = scene
-        self.folder = tempfile.TemporaryDirectory(prefix="program-")
-        write_for_program(Path(self.folder.name) / "scene", scene)
 
     def run(self) -> Trajectory:
-        """What the program writes.
+        """What the program writes, in a folder that is gone afterwards.
 
         Raises RuntimeError where it fails, WorkerDied where it takes too long, and RollOutError where what it
         has written does not belong to the scene.
         """
-        folder = Path(self.folder.name)
-        out, said = folder / "out.npz", folder / "said.txt"
-        out.unlink(missing_ok=True)
-        places = {"{scene}": str(folder / "scene"), "{out}": str(out), "{seed}": str(self.seed)}
-        self._execute([_filled(word, places) for word in shlex.split(self.command)], said)
-        if not out.is_file():
-            raise RuntimeError(f"the program has ended well and has not written {{out}}{_said(said)}")
-        self.path = str(out)
-        super().prepare(self.scene)
-        trajectory = super().run()
-        declared = read_arrays(out, ("seconds_per_frame",)).get("seconds_per_frame")
+        with tempfile.TemporaryDirectory(prefix="program-") as folder:
+            exported, out, said = (Path(folder) / name for name in ("scene", "out.npz", "said.txt"))
+            write_for_program(exported, self.scene)
+            places = {"{scene}": str(exported), "{out}": str(out), "{seed}": str(self.seed)}
+            self._execute([_filled(word, places) for word in shlex.split(self.command)], said)
+            if not out.is_file():
+                raise RuntimeError(f"the program has ended well and has not written {{out}}{_said(said)}")
+            self.path = str(out)
+            super().prepare(self.scene)
+            declared = read_arrays(out, ("seconds_per_frame",)).get("seconds_per_frame")
         told = {} if declared is None else {"declared_ms": _milliseconds(declared)}
-        return replace(trajectory, provenance={"method": "program", "changes": list(self.done), **told})
+        provenance = {"method": "program", "changes": list(self.done), **told}
+        return replace(super().run(), provenance=provenance)
 
     def _execute(self, words: list[str], said: Path) -> None:
         environment = {name: value for name, value in os.environ.items() if name not in OURS}
