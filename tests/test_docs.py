@@ -50,7 +50,8 @@ def user(tmp_path_factory) -> Path:
 
 def run(folder: Path, line: str) -> None:
     path = os.pathsep.join([str(ROOT), str(folder / "site")])
-    environment = os.environ | {"PYTHONPATH": path, "MPLBACKEND": "Agg"}
+    found = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    environment = os.environ | {"PYTHONPATH": path, "PATH": found, "MPLBACKEND": "Agg"}
     words = ["bash", "-ec", line]
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
@@ -61,8 +62,7 @@ def commands(folder: Path, title: str, out: Path | None = None) -> None:
     for _, language, content in blocks(SECTIONS[title]):
         if language == "sh":
             install = "python -m pip install -q --no-deps --no-build-isolation --target site ."
-            line = content.replace("pip install .", install).replace("python ", f"{sys.executable} ")
-            run(folder, line.replace("DIR", str(out)))
+            run(folder, content.replace("pip install .", install).replace("DIR", str(out)))
 
 
 def rows_of(folder: Path) -> list[dict[str, str]]:

@@ -11,9 +11,10 @@ import pytest
 from tasks_by_hand import InProcess
 from test_source import forget
 
-from benchmarks import check, metrics, outside, run
+from benchmarks import check, metric, metrics, outside, run
 from benchmarks.contract.methods import CheckMethod
 from benchmarks.method import Method, MethodEntry
+from benchmarks.methods import METHODS
 from benchmarks.methods.program import program
 from benchmarks.plan import Motions, Plan
 from benchmarks.presets import find_preset
@@ -23,6 +24,7 @@ from benchmarks.scenes import SCENES, of_garment
 from benchmarks.schedule import Schedule
 from benchmarks.source import code_of
 from benchmarks.tasks.cell import Cell
+from benchmarks.tasks.metrics import measured
 from benchmarks.tasks.task import Context
 from reference_sim import Trajectory
 from snug.recipe import DEFAULT, RecipeError
@@ -108,6 +110,7 @@ np.savez(sys.argv[2], positions=cloth["start_positions"] + up, seconds_per_frame
 PROGRAM_FILE = """
 import sys
 from pathlib import Path
+from benchmarks.methods import METHODS
 from benchmarks.methods.program import program
 
 SCRIPT = Path(__file__).with_name("theirs_run.py")
@@ -304,9 +307,9 @@ def test_a_file_that_cannot_be_meant_is_one_line(text, words, tmp_path, monkeypa
 )
 def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    metric = METRIC_FILE.replace("height/highest", "energy/total")
-    (tmp_path / "twice.py").write_text(metric)
-    (tmp_path / "bare.py").write_text(metric.replace("energy/total", "mine/x").replace('unit="m"', 'unit=""'))
+    text = METRIC_FILE.replace("height/highest", "energy/total")
+    (tmp_path / "twice.py").write_text(text)
+    (tmp_path / "bare.py").write_text(text.replace("energy/total", "mine/x").replace('unit="m"', 'unit=""'))
     (tmp_path / "taken.py").write_text(SCENE_FILE.replace('"lift", d', '"membrane/uniaxial", d'))
     (tmp_path / "random.py").write_text("METHODS = ()\n")
     for module, name in (("one", "packed"), ("two", "packed"), ("other", "snug")):
@@ -354,7 +357,7 @@ def test_modules_beside_a_file_and_in_its_package_count_and_those_installed_do_n
 def test_an_energy_of_a_file_can_be_trained_on_once_it_is_loaded(tmp_path):
     with pytest.raises(RecipeError, match=r"unknown energy 'levity'.*import the file of your own"):
         dataclasses.replace(DEFAULT, terms=("levity",))
-    (tmp_path / "levity.py").write_text(SCENE_FILE.replace('name = "lift"', 'name = "levity"'))
+    (tmp_path / "levity.py").write_text(SCENE_FILE + "class Levity(Lift):\n    name = 'levity'\n")
     outside.imported(str(tmp_path / "levity.py"))
     assert dataclasses.replace(DEFAULT, terms=("strain", "levity")).terms[1] == "levity"
 
@@ -374,11 +377,22 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
     )  # fmt: skip
     (task,) = (task for task in Schedule(plan).tasks() if task.kind == "network")
     assert (task.chosen, task.home, task.steps) == (Training("snug", recipe), home, TINY.steps["snug"])
-    assert home in task.modules
+    assert home in task.modules and home in Schedule(plan).cell(cell).modules
     other = dataclasses.replace(entry, name="b", training=Training("snug", DEFAULT))
     for wrong in ([entry, other], [dataclasses.replace(entry, trained="snug")]):
         with pytest.raises(DeclarationError, match="another training is called"):
             outside._check_networks(wrong)
+
+
+def test_a_metric_that_raises_is_named_with_its_file(tmp_path):
+    home = tmp_path / "split.py"
+    home.write_text(METRIC_FILE.replace("float(", "1 / 0 + float("))
+    scene = SCENE["free_fall"].at(TINY).build()
+    trajectory = Trajectory(scene.exact, scene.cloth.faces, np.arange(scene.frames) * scene.dt)
+    group = metric.SceneRollOuts(scene)
+    group.roll_outs.append(metric.RollOut(group, METHODS[0], trajectory, suites=("speed",)))
+    with pytest.raises(RuntimeError, match=r"split\.py: ZeroDivisionError: division by zero"):
+        measured(group.roll_outs[0], (), (str(home),))
 
 
 # --- programs ----------------------------------------------------------------------------------------------

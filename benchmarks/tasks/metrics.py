@@ -12,7 +12,7 @@ from ..metric import Estimate, RollOut, SceneRollOuts
 from ..metrics import find_metric, modules, names_of
 from ..registry import load
 from .cell import Cell, built
-from .task import Context, Outcome, Task, TaskId
+from .task import Context, Outcome, Task, TaskId, one_line
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,16 +78,21 @@ def measured(
     curves: dict[str, np.ndarray] = {}
     ended = ("ok", "")
     judged = len(roll_out.positions) > roll_out.scene.warm_up
-    chosen_modules = [modules()[name] for name in names_of(chosen)] + [load(home) for home in outside]
-    for module in chosen_modules if judged else ():
-        suites = getattr(module, "SUITES", roll_out.suites)
-        if any(suite in suites for suite in roll_out.suites):
-            values = module.measure(roll_out)
-            if hasattr(module, "compare"):
-                values |= compared(roll_out, module.compare)
-            metrics |= {find_metric(name, outside).name: value for name, value in values.items()}
-            curves |= module.series(roll_out) if hasattr(module, "series") else {}
-            ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
+    for name in (*names_of(chosen), *outside) if judged else ():
+        try:
+            module = load(name) if name in outside else modules()[name]
+            suites = getattr(module, "SUITES", roll_out.suites)
+            if any(suite in suites for suite in roll_out.suites):
+                values = module.measure(roll_out)
+                if hasattr(module, "compare"):
+                    values |= compared(roll_out, module.compare)
+                metrics |= {find_metric(metric, outside).name: value for metric, value in values.items()}
+                curves |= module.series(roll_out) if hasattr(module, "series") else {}
+                ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
+        except Exception as error:
+            if name in outside:
+                raise RuntimeError(f"{name}: {one_line(error)}") from error
+            raise
     return metrics, curves, ended
 
 
