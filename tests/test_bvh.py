@@ -91,6 +91,9 @@ LeftArm 16, LeftForeArm 17, LeftHand 18, RightShoulder 12, RightArm 20, RightFor
 BIOVISION = """Hips -1, LeftHip 0, LeftKnee 1, LeftAnkle 2, RightHip 0, RightKnee 4, RightAnkle 5, Chest 0,
 Neck 7, Head 8, LeftCollar 7, LeftShoulder 10, LeftElbow 11, LeftWrist 12, RightCollar 7, RightShoulder 14,
 RightElbow 15, RightWrist 16"""
+UPPER = """Hips -1, Spine 0, Chest 1, UpperChest 2, Neck 3, Head 4, LeftShoulder 3, LeftUpperArm 6,
+LeftLowerArm 7, LeftHand 8, RightShoulder 3, RightUpperArm 10, RightLowerArm 11, RightHand 12, LeftHip 0,
+LeftKnee 14, LeftFoot 15, LeftToe 16, RightHip 0, RightKnee 18, RightFoot 19, RightToe 20"""
 MIXAMORIG = ", ".join(f"mixamorig:{MIXAMO[name]} {PARENTS[k]}" for k, name in enumerate(JOINT_NAMES))
 
 
@@ -112,6 +115,10 @@ def test_common_skeletons_are_known_without_a_map():
     found = known(BIOVISION)
     assert found["spine1"] == "Chest" and "spine2" not in found and "spine3" not in found
     assert found["left_shoulder"] == "LeftShoulder" and found["left_collar"] == "LeftCollar"
+    found = known(UPPER)  # arms after bones, legs after joints
+    assert (found["left_collar"], found["left_shoulder"]) == ("LeftShoulder", "LeftUpperArm")
+    assert (found["right_ankle"], found["right_foot"]) == ("RightFoot", "RightToe")
+    assert [found[f"spine{k}"] for k in (1, 2, 3)] == ["Spine", "Chest", "UpperChest"]
 
 
 def test_a_map_names_joints_that_no_guess_finds(tmp_path):
