@@ -8,7 +8,7 @@ from motion_forms import MIXAMO, bvh
 from scipy.spatial.transform import Rotation
 
 from snug.formats.bvh import read_clip
-from snug.formats.joint_names import _side, find_joints
+from snug.formats.joint_names import NEEDED, _side, find_joints
 from snug.motion import MotionError
 from snug.motion_files import read_motion
 from snug.motion_library import make_motion
@@ -98,7 +98,7 @@ MIXAMORIG = ", ".join(f"mixamorig:{MIXAMO[name]} {PARENTS[k]}" for k, name in en
 
 
 def known(skeleton):
-    names, parents = zip(*(joint.split() for joint in skeleton.split(",")), strict=True)
+    names, parents = zip(*(joint.strip().rsplit(" ", 1) for joint in skeleton.split(",")), strict=True)
     found = find_joints(Path("a.bvh"), names, [int(parent) for parent in parents], None)
     return {ours: names[index] for ours, index in found.items()}
 
@@ -119,6 +119,27 @@ def test_common_skeletons_are_known_without_a_map():
     assert (found["left_collar"], found["left_shoulder"]) == ("LeftShoulder", "LeftUpperArm")
     assert (found["right_ankle"], found["right_foot"]) == ("RightFoot", "RightToe")
     assert [found[f"spine{k}"] for k in (1, 2, 3)] == ["Spine", "Chest", "UpperChest"]
+
+
+@pytest.mark.parametrize(
+    ("names", "sides"),
+    [
+        ("pelvis, thigh_{0}, calf_{0}, foot_{0}, upperarm_{0}, lowerarm_{0}, hand_{0}, head", "lr"),
+        ("Bip01 Pelvis, Bip01 {0} Thigh, Bip01 {0} Calf, Bip01 {0} Foot, Bip01 {0} UpperArm, "
+         "Bip01 {0} Forearm, Bip01 {0} Hand, Bip01 Head", "LR"),
+        ("hip, {0}Thigh, {0}Shin, {0}Foot, {0}Shldr, {0}ForeArm, {0}Hand, head", "lr"),
+    ],
+    ids=["Unreal", "3ds Max", "Daz"],
+)  # fmt: skip
+def test_skeletons_of_other_programs_are_known(names, sides):
+    root, *limbs, head = names.split(", ")
+    left, right = ([limb.format(side) for limb in limbs] for side in sides)
+    parents = [0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11]
+    joints = [*left, *right]
+    found = known(", ".join([f"{root} -1", *(f"{j} {p}" for j, p in zip(joints, parents)), f"{head} 0"]))
+    for side, theirs in (("left", left), ("right", right)):
+        assert [found[f"{side}_{joint}"] for joint in NEEDED] == theirs
+    assert (found["pelvis"], found["head"]) == (root, head)
 
 
 def test_a_map_names_joints_that_no_guess_finds(tmp_path):
