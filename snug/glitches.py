@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,19 +22,7 @@ MOST = 0.25  # share of frames that may be wrong in a file that is mended
 LARGEST_ANGLE = 4.0 * np.pi  # [rad] of all joints but the root, whose turns may have been added up
 LARGEST_TURN = 1e3  # [rad] of the root
 FARTHEST = 1e4  # [m]
-NAMED = 5  # glitches in a message; the others are counted
-
-
-@dataclass(frozen=True)
-class _Glitch:
-    """Frames first to last, counted from 0."""
-
-    what: str
-    first: int
-    last: int
-
-    def __str__(self) -> str:
-        return f"{self.what} in frames {self.first}-{self.last}"
+NAMED = 4  # joints, and glitches of each, in a message; the others are counted
 
 
 def without_glitches(recording: Recording, *, repair: bool) -> Recording:
@@ -47,19 +35,20 @@ def without_glitches(recording: Recording, *, repair: bool) -> Recording:
     poses, path = (np.where(np.isfinite(x), x, np.nan) for x in (recording.poses, recording.translations))
     _check_units(recording.path, poses, path)
     tracks = [(name, poses[:, joint], True) for joint, name in enumerate(JOINT_NAMES)]
-    found: list[_Glitch] = []
+    found: dict[str, list[str]] = {}
     wrong, stays = np.zeros(len(poses), dtype=bool), ""
     for name, track, turns in [*tracks, ("the root's path", path, False)]:
         missing = ~np.isfinite(track).all(axis=1)
         if missing.all():
             raise MotionError(f"{recording.path}: {name} is not finite in any frame; export it again")
-        found += [_Glitch(f"{name} is not finite", first, last) for first, last in _runs(missing)]
+        for first, last in _runs(missing):
+            found.setdefault(f"{name} is not finite", []).append(f"{first}-{last}")
         _bridge(track, missing, turns)
         jumps = _jumps(track, turns, recording.fps)
         wrong |= missing
         wrong[jumps] = True
         for first, last in _spans_around(jumps, recording.fps, len(track)):
-            found.append(_Glitch(f"{name} jumps", first, last))
+            found.setdefault(f"{name} jumps", []).append(f"{first}-{last}")
             around = np.zeros(len(track), dtype=bool)
             around[first : last + 1] = True
             if not around.all():
@@ -68,7 +57,7 @@ def without_glitches(recording: Recording, *, repair: bool) -> Recording:
             stays = stays or f"{name} jumps after frame {frame}"
     if not found:
         return recording
-    named = ", ".join(map(str, found[:NAMED])) + f" and {len(found) - NAMED} more" * (len(found) > NAMED)
+    named = _short([f"{what} in frames {_short(spans)}" for what, spans in found.items()])
     share = f"glitches in {100 * wrong.mean():.0f} % of the frames"
     if wrong.mean() > MOST:
         raise MotionError(f"{recording.path}: {share} ({named}); check frame rate and units, export it again")
@@ -77,6 +66,10 @@ def without_glitches(recording: Recording, *, repair: bool) -> Recording:
     if stays:
         raise MotionError(f"{recording.path}: {stays} and stays where it is then; cut the clip there")
     return replace(recording, poses=poses, translations=path, source=f"{recording.source}; repaired: {named}")
+
+
+def _short(items: list[str]) -> str:
+    return ", ".join(items[:NAMED]) + f" and {len(items) - NAMED} more" * (len(items) > NAMED)
 
 
 def _check_units(file: Path, poses: np.ndarray, path: np.ndarray) -> None:

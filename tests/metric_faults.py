@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from faults import Fault
 
-OPTIMALITY, STEP, ENERGY, CURVATURE, GEOMETRY, HEM, DYNAMICS, EXCESS, CONSERVATION = (
+OPTIMALITY, STEP, ENERGY, CURVATURE, GEOMETRY, BODY, HEM, DYNAMICS, EXCESS, CONSERVATION = (
     f"benchmarks/metrics/{name}.py"
     for name in (
-        "optimality", "step", "energy", "curvature", "geometry", "hem", "dynamics", "excess", "conservation",
+        "optimality", "step", "energy", "curvature", "geometry", "body", "hem", "dynamics", "excess",
+        "conservation",
     )
 )  # fmt: skip
 FRICTION = "reference_sim/energies/contact_friction.py"
@@ -45,6 +46,8 @@ METRIC_FAULTS = {
               "scene.origin_heights[0] - term.origin_height"),
         Fault("inertia of half the velocity", ENERGY, "velocity=(previous - before) / scene.dt",
               "velocity=(previous - before) / (2 * scene.dt)"),
+        Fault("inside by the skin itself", BODY, "x + OFF * vertex_normals", "x - OFF * vertex_normals"),
+        Fault("inside at rest too", BODY, "& ~at_rest", ""),
         Fault("depth outside too", GEOMETRY, "share=(depth > 0.0).mean(1)", "share=(depth >= 0.0).mean(1)"),
         Fault("histogram of equal weights", CURVATURE, "area / area.sum(), -area_ref / area_ref.sum()",
               "area / area.sum(), -np.full(len(area_ref), 1 / len(area_ref))"),

@@ -8,7 +8,7 @@ from motion_forms import MIXAMO, bvh
 from scipy.spatial.transform import Rotation
 
 from snug.formats.bvh import read_clip
-from snug.formats.joint_names import _side, find_joints
+from snug.formats.joint_names import NEEDED, _side, find_joints
 from snug.motion import MotionError
 from snug.motion_files import read_motion
 from snug.motion_library import make_motion
@@ -91,11 +91,14 @@ LeftArm 16, LeftForeArm 17, LeftHand 18, RightShoulder 12, RightArm 20, RightFor
 BIOVISION = """Hips -1, LeftHip 0, LeftKnee 1, LeftAnkle 2, RightHip 0, RightKnee 4, RightAnkle 5, Chest 0,
 Neck 7, Head 8, LeftCollar 7, LeftShoulder 10, LeftElbow 11, LeftWrist 12, RightCollar 7, RightShoulder 14,
 RightElbow 15, RightWrist 16"""
+UPPER = """Hips -1, Spine 0, Chest 1, UpperChest 2, Neck 3, Head 4, LeftShoulder 3, LeftUpperArm 6,
+LeftLowerArm 7, LeftHand 8, RightShoulder 3, RightUpperArm 10, RightLowerArm 11, RightHand 12, LeftHip 0,
+LeftKnee 14, LeftFoot 15, LeftToe 16, RightHip 0, RightKnee 18, RightFoot 19, RightToe 20"""
 MIXAMORIG = ", ".join(f"mixamorig:{MIXAMO[name]} {PARENTS[k]}" for k, name in enumerate(JOINT_NAMES))
 
 
 def known(skeleton):
-    names, parents = zip(*(joint.split() for joint in skeleton.split(",")), strict=True)
+    names, parents = zip(*(joint.strip().rsplit(" ", 1) for joint in skeleton.split(",")), strict=True)
     found = find_joints(Path("a.bvh"), names, [int(parent) for parent in parents], None)
     return {ours: names[index] for ours, index in found.items()}
 
@@ -112,6 +115,31 @@ def test_common_skeletons_are_known_without_a_map():
     found = known(BIOVISION)
     assert found["spine1"] == "Chest" and "spine2" not in found and "spine3" not in found
     assert found["left_shoulder"] == "LeftShoulder" and found["left_collar"] == "LeftCollar"
+    found = known(UPPER)  # arms after bones, legs after joints
+    assert (found["left_collar"], found["left_shoulder"]) == ("LeftShoulder", "LeftUpperArm")
+    assert (found["right_ankle"], found["right_foot"]) == ("RightFoot", "RightToe")
+    assert [found[f"spine{k}"] for k in (1, 2, 3)] == ["Spine", "Chest", "UpperChest"]
+
+
+@pytest.mark.parametrize(
+    ("names", "sides"),
+    [
+        ("pelvis, thigh_{0}, calf_{0}, foot_{0}, upperarm_{0}, lowerarm_{0}, hand_{0}, head", "lr"),
+        ("Bip01 Pelvis, Bip01 {0} Thigh, Bip01 {0} Calf, Bip01 {0} Foot, Bip01 {0} UpperArm, "
+         "Bip01 {0} Forearm, Bip01 {0} Hand, Bip01 Head", "LR"),
+        ("hip, {0}Thigh, {0}Shin, {0}Foot, {0}Shldr, {0}ForeArm, {0}Hand, head", "lr"),
+    ],
+    ids=["Unreal", "3ds Max", "Daz"],
+)  # fmt: skip
+def test_skeletons_of_other_programs_are_known(names, sides):
+    root, *limbs, head = names.split(", ")
+    left, right = ([limb.format(side) for limb in limbs] for side in sides)
+    parents = [0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11]
+    joints = [*left, *right]
+    found = known(", ".join([f"{root} -1", *(f"{j} {p}" for j, p in zip(joints, parents)), f"{head} 0"]))
+    for side, theirs in (("left", left), ("right", right)):
+        assert [found[f"{side}_{joint}"] for joint in NEEDED] == theirs
+    assert (found["pelvis"], found["head"]) == (root, head)
 
 
 def test_a_map_names_joints_that_no_guess_finds(tmp_path):

@@ -19,19 +19,16 @@ from snug.skeleton import JOINT_NAMES
 # Joints of a side, from the trunk outwards; those of NEEDED a skeleton must have.
 LIMBS = (("hip", "knee", "ankle", "foot"), ("collar", "shoulder", "elbow", "wrist", "hand"))
 NEEDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-# How common skeletons call them: by joints (our own names, Biovision), by bones (Mixamo, CMU's clips as BVH,
-# MotionBuilder), and as 3ds Max, Unreal and Daz do. The first that fits best is taken.
+# What common skeletons call them: after joints (ours, Biovision), or after bones (Mixamo, CMU's clips as BVH,
+# Unity, Unreal, 3ds Max, Daz). Arms and legs are each named in the style that fits best.
 STYLES: tuple[dict[str, tuple[str, ...]], ...] = (
-    {joint: (joint,) for limb in LIMBS for joint in limb} | {"foot": ("foot", "toe", "toes")},
+    {joint: (joint,) for limb in LIMBS for joint in limb}
+    | {"ankle": ("ankle", "foot"), "foot": ("toe", "toes", "foot"), "wrist": ("wrist", "hand")},
     {
-        "hip": ("upleg",), "knee": ("leg", "lowleg"), "ankle": ("foot",), "foot": ("toebase", "toe", "toes"),
-        "collar": ("shoulder",), "shoulder": ("arm", "uparm"), "elbow": ("forearm", "lowarm"),
-        "wrist": ("hand",),
-    },
-    {
-        "hip": ("thigh",), "knee": ("shin", "calf"), "ankle": ("foot",), "foot": ("toe", "toe0", "ball"),
-        "collar": ("clavicle", "collar"), "shoulder": ("upperarm", "shldr"), "elbow": ("forearm", "lowerarm"),
-        "wrist": ("hand",),
+        "hip": ("upleg", "upperleg", "thigh"), "knee": ("leg", "lowleg", "lowerleg", "shin", "calf"),
+        "ankle": ("foot",), "foot": ("toebase", "toe", "toes", "toe0", "ball"),
+        "collar": ("shoulder", "collar", "clavicle"), "shoulder": ("arm", "uparm", "upperarm", "shldr"),
+        "elbow": ("forearm", "lowarm", "lowerarm"), "wrist": ("hand",), "hand": (),
     },
 )  # fmt: skip
 SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
@@ -94,21 +91,36 @@ def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, str
 
 
 def _limbs(names: Sequence[str]) -> dict[str, int]:
-    """The joints of arms and legs in the style that names most of those needed."""
+    """The joints of legs and arms, each in the style that names most of those needed."""
     sided: dict[tuple[str, str], int] = {}
     for index, name in enumerate(names):
         side, base = _side(name)
         if side:
             sided.setdefault((side, base), index)
-    guesses = []
-    for style in STYLES:
-        guess = {}
-        for side in ("left", "right"):
-            for joint, bases in style.items():
-                places = [sided[side, base] for base in bases if (side, base) in sided]
-                guess.update({f"{side}_{joint}": places[0]} if places else {})
-        guesses.append(guess)
-    return max(guesses, key=lambda guess: sum(ours.partition("_")[2] in NEEDED for ours in guess))
+    found: dict[str, int] = {}
+    for limb in LIMBS:
+        guesses = [_limb(limb, style, sided) for style in STYLES]
+        best = max(guesses, key=_needed)
+        found.update(best)
+    return found
+
+
+def _needed(guess: Mapping[str, int]) -> int:
+    """How many of the joints that a skeleton must have are named."""
+    return sum(ours.partition("_")[2] in NEEDED for ours in guess)
+
+
+def _limb(
+    limb: Sequence[str], style: Mapping[str, Sequence[str]], sided: Mapping[tuple[str, str], int]
+) -> dict[str, int]:
+    """The joints of both limbs of a kind, named in one style; none stands for two of ours."""
+    guess: dict[str, int] = {}
+    for side in ("left", "right"):
+        for joint in limb:
+            places = [sided[side, base] for base in style[joint] if (side, base) in sided]
+            if places and places[0] not in guess.values():
+                guess[f"{side}_{joint}"] = places[0]
+    return guess
 
 
 def _side(name: str) -> tuple[str, str]:
