@@ -163,18 +163,20 @@ ARRAY = pickle.dumps(np.arange(6.0).reshape(2, 3), 4)
         raw(b"]q\x00h\x00a"),  # a list that holds itself
         ARRAY[:-40],
         ARRAY.replace(b"K\x02K\x03", b"K\x02K\x04"),
+        ARRAY.replace(b"K\x02K\x03", b"K\x02K\x02"),
         ARRAY.replace(b"K\x02K\x03", b"K\xffK\xff"),
         pickle.dumps(np.array([{}], dtype=object)),
         pickle.dumps(np.zeros(2, dtype=[("a", "f4")])),
         b"", b"\x80", b"PK\x03\x04", b"\x93NUMPY\x01\x00",
     ],
-    ids=range(20),
+    ids=range(21),
 )  # fmt: skip
 def test_sizes_and_broken_files_are_refused(tmp_path, content):
     path = written(tmp_path / "a.pkl", content)
     with pytest.raises(PlainPickleError) as caught:
         read_plain_pickle(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value) and len(str(caught.value)) < 500
+    assert "MemoryError" not in str(caught.value)  # refused before anything of that size is asked for
 
 
 def test_mutated_files_are_read_or_refused(tmp_path):
