@@ -71,7 +71,7 @@ def open_assets(
     length.
     """
     from snug.body import Body
-    from snug.garments import find_template
+    from snug.garment_kinds import find_template
 
     from .clips import clip
 

@@ -32,7 +32,7 @@ def _run(options: argparse.Namespace) -> int:
 
     from snug.body import Body
     from snug.device import find_device
-    from snug.garments import TSHIRT, find_template
+    from snug.garment_kinds import TSHIRT, find_template
     from snug.parallel import join_group, leave_group
     from snug.training_run import Interrupted
 

@@ -6,14 +6,8 @@ import pytest
 from meshes import edge_counts, girth
 
 from snug.body import Body
-from snug.garments import (
-    GARMENT_TEMPLATES,
-    GarmentError,
-    find_template,
-    smooth_weights,
-    tailor_tshirt,
-    tailor_tunic,
-)
+from snug.garment_kinds import GARMENT_TEMPLATES, find_template, tailor_tshirt, tailor_tunic
+from snug.garments import GarmentError, smooth_weights
 
 WAIST = "spine1"
 
