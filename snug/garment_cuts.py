@@ -88,17 +88,25 @@ def neck_cut(body: Body, clearance: float) -> CutPlane:
     return replace(cut, point=(0.0, neck[1] + lift, neck[2]))
 
 
-def armhole_cut(body: Body, strap: float, ease: float, clearance: float, hem: float) -> CutPlane:
-    """A plane from the edge of the strap to under the arm, leaning outwards so far that the flanks stay."""
+def armhole_cut(
+    body: Body, neck: CutPlane, *, strap: float, ease: float, clearance: float, hem: float, flare: float
+) -> CutPlane:
+    """A plane from a strap's width [m] beside the neck to under the arm, leaning outwards so far that the
+    flanks stay, with what build_surface adds to them.
+    """
     shoulder, skin = joint(body, "left_shoulder"), body.template
     arm = skin[dominated_by(body, ("left_shoulder",))]
     under = arm[arm[:, 0] < shoulder[0] + ARMPIT_ROOM, 1].min(initial=shoulder[1]) - ARMPIT_ROOM
-    flank = skin[dominated_by(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
-    edge = strap * shoulder[0]
-    over = skin[dominated_by(body, SHIRT_BONES) & (np.abs(skin[:, 0] - edge) < ARMPIT_ROOM)]
+    shirt = skin[dominated_by(body, SHIRT_BONES)]
+    edge = strap + shirt[neck.beyond(shirt) > -clearance, 0].max(initial=0.0)
+    over = shirt[np.abs(shirt[:, 0] - edge) < ARMPIT_ROOM]
     top = over[:, 1].max(initial=shoulder[1]) + clearance
-    far = np.abs(flank[:, 0]) + clearance + ease / (2 * np.pi) + FLANK_ROOM - edge
-    lean = (far / (top - flank[:, 1])).max(initial=0.2)
+    flank = skin[dominated_by(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
+    flank = flank[np.argsort(-flank[:, 1])]
+    wide = np.append(np.maximum.accumulate(np.abs(flank[:, 0])), np.abs(flank[:, 0]).max(initial=edge))
+    down = top - np.append(flank[:, 1], hem)
+    grown = clearance + ease / (2 * np.pi) + flare * down / down[-1] + FLANK_ROOM
+    lean = ((wide + grown - edge) / down).max()
     return CutPlane("left_armhole", (1.0, lean, 0.0), (edge, top, 0.0), twin="right_armhole")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from snug.body import Body
 from snug.garment_cuts import SEAM_CUT, CutPlane, armhole_cut, level_cut, neck_cut
 from snug.garments import SHIRT_BONES, Garment, GarmentError, sewn
-from snug.tailoring import joint
+from snug.tailoring import joint, legs_part
 
 TSHIRT = "tshirt"  # the garment that a command takes where none is named
 
@@ -58,21 +58,6 @@ def tailor_tunic(
     return _shirt("tunic", body, vertices, cut)
 
 
-def tailor_dress(
-    body: Body,
-    *,
-    vertices: int = 1000,
-    ease: float = 0.06,
-    clearance: float = 0.015,
-    sleeve: float = 0.55,
-    length: float = 0.32,
-    flare: float = 0.1,
-) -> Garment:
-    """A dress: a tunic to above the knee, whose lower part follows both thighs. See tailor_tunic."""
-    cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length, "flare": flare}
-    return _shirt("dress", body, vertices, cut, smoothing=SKIRT_SMOOTHING)
-
-
 def tailor_long_sleeves(
     body: Body,
     *,
@@ -93,19 +78,30 @@ def tailor_tank_top(
     vertices: int = 1000,
     ease: float = 0.06,
     clearance: float = 0.015,
-    strap: float = 0.8,
+    strap: float = 0.06,
     length: float = 0.09,
 ) -> Garment:
-    """A shirt without sleeves. strap: outer edge of its straps, as a share of the way from the middle to the
-    shoulder joint. The rest: see tailor_tshirt.
+    """A shirt without sleeves. strap: width of its straps [m]. The rest: see tailor_tshirt."""
+    cut = {"ease": ease, "clearance": clearance, "strap": strap, "length": length}
+    return _sleeveless("tank_top", body, vertices, cut)
+
+
+def tailor_dress(
+    body: Body,
+    *,
+    vertices: int = 1000,
+    ease: float = 0.06,
+    clearance: float = 0.015,
+    strap: float = 0.06,
+    length: float = 0.32,
+    flare: float = 0.1,
+) -> Garment:
+    """A dress without sleeves, to above the knee, whose lower part follows both thighs.
+
+    flare: how much further [m] the hem stands off than the waist, all around. The rest: see tailor_tank_top.
     """
-    name, cut = "tank_top", {"ease": ease, "clearance": clearance, "strap": strap, "length": length}
-    _demand_in_range(name, {"vertices": vertices, **cut})
-    hem = joint(body, "left_hip")[1] - length
-    neck = neck_cut(body, clearance)
-    cuts = [SEAM_CUT, level_cut("hem", hem, down=True), armhole_cut(body, strap, ease, clearance, hem), neck]
-    surface = {"hem": hem, "top": neck.point[1] + 0.04, "ease": ease}
-    return sewn(name, body, vertices, cut, surface, cuts, SHIRT_BONES)
+    cut = {"ease": ease, "clearance": clearance, "strap": strap, "length": length, "flare": flare}
+    return _sleeveless("dress", body, vertices, cut, SKIRT_SMOOTHING)
 
 
 def tailor_skirt(
@@ -145,7 +141,7 @@ def tailor_trousers(
     """Trousers, mirror-symmetric, of `vertices` vertices within 1 %, whose waistband the body carries.
 
     ease: girth [m] at hips and legs beyond trousers that lie at `clearance` [m]. rise: waistband above the
-    hip joints [m]. length: share of the leg, from hip joint to ankle. Errors: see tailor_tshirt.
+    hip joints [m]. length: inseam, as a share of that from crotch to ankle. Errors: see tailor_tshirt.
     """
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length}
     return _trousers("trousers", body, vertices, cut)
@@ -158,7 +154,7 @@ def tailor_shorts(
     ease: float = 0.06,
     clearance: float = 0.006,
     rise: float = 0.17,
-    length: float = 0.35,
+    length: float = 0.25,
 ) -> Garment:
     """Shorts: trousers that end above the knee. See tailor_trousers."""
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length}
@@ -204,10 +200,10 @@ RANGES = {
     "length": (-0.05, 0.25, " m"),
     "skirt length": (0.1, 0.35, " m"),  # above, its hem would come to where its flare begins
     "dress length": (0.2, 0.6, " m"),
-    "trousers length": (0.6, 0.95, " of the leg"),
-    "shorts length": (0.2, 0.5, " of the leg"),
+    "trousers length": (0.6, 0.95, " of the inner leg"),
+    "shorts length": (0.15, 0.5, " of the inner leg"),
     "long_sleeves sleeve": (0.55, 0.95, " of the arm"),
-    "strap": (0.7, 0.95, " of the way to the shoulder"),
+    "strap": (0.04, 0.08, " m"),
     "flare": (0.0, 0.15, " m"),
 }
 
@@ -223,7 +219,7 @@ def _demand_in_range(name: str, parameters: Mapping[str, float]) -> None:
 
 def _shirt(
     name: str, body: Body, vertices: int, cut: Mapping[str, float], *, end: str = "left_elbow",
-    bones: Sequence[str] = SHIRT_BONES, smoothing: int = 0,
+    bones: Sequence[str] = SHIRT_BONES,
 ) -> Garment:  # fmt: skip
     """A garment with two sleeves, a neck and a hem; its sleeves end on the way from the shoulder to `end`."""
     _demand_in_range(name, {"vertices": vertices, **cut})
@@ -235,14 +231,29 @@ def _shirt(
     cuts = [SEAM_CUT, level_cut("hem", hem, down=True), sleeve, neck]
     surface = {"hem": hem, "cuff": cuff, "top": neck.point[1] + 0.04, "ease": cut["ease"],
                "flare": cut.get("flare", 0.0)}  # fmt: skip
-    return sewn(name, body, vertices, cut, surface, cuts, bones, smoothing)
+    return sewn(name, body, vertices, cut, surface, cuts, bones)
+
+
+def _sleeveless(
+    name: str, body: Body, vertices: int, cut: Mapping[str, float], smoothing: int = 0
+) -> Garment:
+    """A garment with two armholes, a neck and a hem."""
+    _demand_in_range(name, {"vertices": vertices, **cut})
+    hem = joint(body, "left_hip")[1] - cut["length"]
+    neck = neck_cut(body, cut["clearance"])
+    fit = {"ease": cut["ease"], "flare": cut.get("flare", 0.0), "hem": hem}
+    armhole = armhole_cut(body, neck, strap=cut["strap"], clearance=cut["clearance"], **fit)
+    cuts = [SEAM_CUT, level_cut("hem", hem, down=True), armhole, neck]
+    surface = {**fit, "top": neck.point[1] + 0.04}
+    return sewn(name, body, vertices, cut, surface, cuts, SHIRT_BONES, smoothing)
 
 
 def _trousers(name: str, body: Body, vertices: int, cut: Mapping[str, float]) -> Garment:
     """A garment with a waist and two legs."""
     _demand_in_range(name, {"vertices": vertices, **cut})
-    hip, ankle = joint(body, "left_hip")[1], joint(body, "left_ankle")[1]
-    hem, top = hip - cut["length"] * (hip - ankle), hip + cut["rise"]
+    crotch = legs_part(body, cut["clearance"] + cut["ease"] / (2 * np.pi))
+    hem = crotch - cut["length"] * (crotch - joint(body, "left_ankle")[1])
+    top = joint(body, "left_hip")[1] + cut["rise"]
     leg = replace(level_cut("left_leg", hem, down=True), twin="right_leg")
     surface = {"hem": hem, "top": top, "ease": cut["ease"], "waistband": True, "legs": True}
     cuts = [SEAM_CUT, leg, level_cut("waist", top)]

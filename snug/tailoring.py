@@ -32,6 +32,8 @@ SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the t
 DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
 CROTCH_FILLET = 0.03  # [m] the same between torso and leg
+SEAT = 0.06  # [m] by which their seat is narrower at the crotch
+TAPER = 0.4  # how steeply trousers may narrow from the seat to the thighs
 MOST_CELLS = 4e6  # of the grid: a person takes a tenth
 TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
 # What a shirt may borrow weights from: never hands, head or shins, even where they come near.
@@ -127,9 +129,12 @@ def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
 
 def _torso(
     body: Body, edges: Index, points: Array, nodes: Sequence[Array], levels: tuple[float, float, float],
-    ease: float, flare: float, clearance: float, normals: Array,
+    ease: float, flare: float, clearance: float, normals: Array, narrowing: float,
 ) -> Array:  # fmt: skip
-    """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m]."""
+    """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m].
+
+    narrowing: how much [m/m] they may come nearer again on the way down.
+    """
     x, y, z = nodes
     support = _filled(_section_support(points, edges, y, 1, normals))
     mirrored = (DIRECTIONS // 2 - np.arange(DIRECTIONS)) % DIRECTIONS
@@ -138,7 +143,8 @@ def _torso(
     )  # a body that is not quite symmetric: both of its sides
     hang, waist, hem = levels
     below = np.flatnonzero(y <= hang)
-    support[below] = np.maximum.accumulate(support[below][::-1], axis=0)[::-1]
+    fall = narrowing * y[below, None]
+    support[below] = np.maximum.accumulate((support[below] - fall)[::-1], axis=0)[::-1] + fall
     smooth = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
     support[below] = np.maximum(smooth, support)[below]
     growth = clearance + ease / (2 * np.pi) * _ramp(y, hang, waist)
@@ -181,11 +187,24 @@ def _leg(
     return np.maximum(field, (y - hip)[None, :, None])
 
 
-def _crotch(body: Body, points: Array) -> float:
-    """Height [m] of the skin between the legs."""
-    middle = dominated_by(body, ("pelvis", "left_hip", "right_hip")) & (np.abs(points[:, 0]) < 0.02)
-    between = points[middle & (points[:, 1] < joint(body, "pelvis")[1]), 1]
-    return float(between.min()) if len(between) else float(joint(body, "left_hip")[1] - 0.1)
+def legs_part(body: Body, room: float) -> float:
+    """Height [m] below which trousers have two legs: `room` [m] between the left thigh's skin and x = 0."""
+    points = np.asarray(body.template, dtype=np.float64)
+    edges = _edges(body, LEG_BONES)
+    levels = np.arange(joint(body, "left_knee")[1], joint(body, "left_hip")[1], 0.5 * SPACING)
+    inner = _filled(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
+    near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
+    return float(levels[near[0]] if len(near) else levels[-1])
+
+
+def _edges(body: Body, bones: Sequence[str]) -> Index:
+    """Edges (E,2) of the body between vertices that follow `bones`. Errors: ValueError for none."""
+    faces = np.asarray(body.faces, dtype=np.int64)
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    found = edges[dominated_by(body, bones)[edges].all(axis=1)]
+    if not len(found):
+        raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")
+    return found
 
 
 def build_surface(
@@ -202,12 +221,8 @@ def build_surface(
 
     points = np.asarray(body.template, dtype=np.float64)
     faces = np.asarray(body.faces, dtype=np.int64)
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    torso = dominated_by(body, TORSO_BONES)
-    arm, leg = dominated_by(body, ARM_BONES), dominated_by(body, LEG_BONES)
-    torso_edges, arm_edges, leg_edges = (edges[part[edges].all(axis=1)] for part in (torso, arm, leg))
-    if not (len(torso_edges) and len(arm_edges) and len(leg_edges)):
-        raise ValueError("the body has no torso, arm or leg by its skinning weights")
+    torso_edges, arm_edges, leg_edges = (_edges(body, b) for b in (TORSO_BONES, ARM_BONES, LEG_BONES))
+    torso, arm, leg = (dominated_by(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
     hang = top if waistband else points[dominated_by(body, ARM_BONES[:1]), 1].min()
     levels = hang, joint(body, "pelvis" if waistband else "spine1")[1], hem
     margin = 0.04
@@ -229,12 +244,12 @@ def build_surface(
     # promised about clearance is enforced on the finished mesh.
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
-    hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals)
+    hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals, TAPER * legs)
     if cuff is not None:
         sleeve = _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals)
         hanging = _smooth_minimum(hanging, sleeve, ARMPIT_FILLET)
     if legs:
-        crotch = _crotch(body, points) - clearance
+        crotch = legs_part(body, clearance + ease / (2 * np.pi))
         tube = _leg(body, leg_edges, points, nodes, crotch, ease, clearance, normals)
         hanging = _smooth_minimum(
             np.maximum(hanging, (crotch - nodes[1])[None, :, None]), tube, CROTCH_FILLET
