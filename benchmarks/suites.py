@@ -46,12 +46,12 @@ class Suite:
 
 
 def _whole_motions(extent: Extent) -> list[str]:
-    """A T-shirt in each test motion; other garments where scenes are named, or at preset paper."""
+    """A T-shirt in each test motion; at preset paper also what swings; others where they are named."""
     shirt, *others = GARMENT_SCENES
     names = [shirt.scene(name).name for name in extent.motions.test]
     names += [there_and_back(name).name for name in extent.motions.test[:1]]
     if extent.further:
-        names += [o.scene(name).name for o in others for name in extent.motions.dynamic_test]
+        names += [o.scene(name).name for o in others if o.dynamic for name in extent.motions.dynamic_test]
     return names
 
 

@@ -1,12 +1,20 @@
 """Bodies that are not the package's, made by code from it: other mesh, layout, pose and shape."""
 
 import dataclasses
+import functools
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import igl
 import numpy as np
 
+from benchmarks.assets import Assets, embedded_motions
+from benchmarks.scenes import of_garment
+from reference_sim import Trajectory, simulate
 from snug.body import Body
+from snug.garments import Garment
 from snug.skeleton import JOINT, PARENTS
 
 SMPL_FACES = 13776  # 6890 vertices
@@ -115,3 +123,39 @@ def plain_arrays(body: Body) -> dict[str, np.ndarray]:
         "parents": body.parents,
         "rest_pose": np.zeros((24, 3)),
     }
+
+
+def read_again(arrays: dict[str, np.ndarray]) -> Body:
+    """As a user's file gives it."""
+    with tempfile.TemporaryDirectory() as folder:
+        np.savez(Path(folder) / "body.npz", **arrays)
+        return Body.from_file(Path(folder) / "body.npz")
+
+
+@functools.cache
+def _another() -> Body:
+    return other_mesh(Body.load())
+
+
+BODIES: Mapping[str, Callable[[], Body]] = {
+    "package": Body.load,
+    "other_mesh": lambda: read_again(with_hands(smpl_arrays(_another()), face=True)),
+    "a_pose": lambda: read_again(plain_arrays(lowered(_another(), 40.0))),
+    "heavy": lambda: reshaped(Body.load(), beta_1=2.5),
+    "slim": lambda: reshaped(Body.load(), beta_1=-2.5),
+    "third_shape": lambda: reshaped(Body.load(), beta_2=2.5),
+    "child": lambda: reshaped(Body.load(), (0.7, 0.63, 0.7)),
+}
+
+
+def simulate_walk(garment: Garment, body: Body, frames: int = 30) -> Trajectory:
+    """The garment, settled on the body, in the first frames of a walk."""
+    motion = embedded_motions(["walk"])[0].cut(0, frames)
+    assets = Assets(body, {garment.name: garment}, {motion.name: motion}, {})
+    scene = dataclasses.replace(
+        of_garment(garment.name).scene("walk"), sizes=(), options={"settle_frames": 30, "warm_up_frames": 0}
+    ).build(assets)
+    return simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
+        start=scene.start, velocity=scene.start_velocity, pin_positions=scene.pin_positions,
+    )  # fmt: skip
