@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from snug.body import Body
+    from snug.garment_file import GarmentFile
     from snug.garments import Garment
     from snug.motion import Motion
 
@@ -66,9 +67,10 @@ def open_assets(
     garments: Iterable[str],
     *,
     body: Path | None = None,
+    own: GarmentFile | None = None,
 ) -> Assets:
-    """Load the body, or that of a file, tailor these garments and no other; motions are cut to the preset's
-    length.
+    """Load the body, or that of a file, tailor these garments and no other, or read the user's own; motions
+    are cut to the preset's length.
     """
     from snug.body import Body
     from snug.garment_kinds import find_template
@@ -77,7 +79,10 @@ def open_assets(
 
     wearer = Body.from_file(body) if body else Body.load()
     tailored = {
-        name: find_template(name).tailor(wearer, vertices=preset.garment_vertices) for name in garments
+        name: own.read(wearer)
+        if own and name == own.name
+        else find_template(name).tailor(wearer, vertices=preset.garment_vertices)
+        for name in garments
     }
     whole = [motion.cut(0, preset.frames) for motion in motions]
     clips = {motion.name: clip(wearer, motion, preset.clip_frames, preset.warm_up_frames) for motion in whole}

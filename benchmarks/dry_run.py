@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from .cache import STATES, Cache, Found
 from .plan import Plan, runs
 from .results import RunFolder
@@ -37,7 +39,7 @@ def _head(plan: Plan) -> list[str]:
         f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
         f"{plan.workers} workers, cells alone",
         *([f"body {plan.body.path}"] if plan.body else []),
-        *(f"{garment} of about {plan.preset.garment_vertices} vertices" for garment in plan.garments),
+        *map(partial(_size, plan), plan.garments),
     ]
     for garment in dict.fromkeys(network.garment for network in plan.networks):
         how = "simulated for networks that learn from it" if garment in plan.simulated else "not simulated"
@@ -45,6 +47,12 @@ def _head(plan: Plan) -> list[str]:
     counts = f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"
     more = f", {len(plan.microbenchmarks)} microbenchmarks" * bool(plan.microbenchmarks)
     return [*lines, counts + more]
+
+
+def _size(plan: Plan, garment: str) -> str:
+    if plan.garment and garment == plan.garment.file.name:
+        return f"{garment} of {plan.garment.file.path}"
+    return f"{garment} of about {plan.preset.garment_vertices} vertices"
 
 
 def _verdict(found: Found, outcome: Outcome | None) -> str:

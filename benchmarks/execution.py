@@ -92,6 +92,7 @@ class RunLog:
                 for what, names in (("train", plan.motions.train_of), ("test", plan.motions_of))
             },
             "body": [plan.body.path.name, plan.body.digest] if plan.body else "of the package",
+            "garment": [plan.garment.file.path.name, plan.garment.inputs] if plan.garment else "tailored",
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
@@ -146,12 +147,14 @@ class RunLog:
         with self.stage("body, garments and motions"):
             motions = [files[name] for name in names if name in files]
             motions += embedded_motions(name for name in names if name not in files)
-            assets = open_assets(plan.preset, motions, plan.garments, body=plan.body_file)
+            own = plan.garment.file if plan.garment else None
+            assets = open_assets(plan.preset, motions, plan.garments, body=plan.body_file, own=own)
         self.config["garments"] = {
             garment.name: {
                 "vertices": len(garment.rest_positions),
                 "triangles": len(garment.faces),
                 "parameters": {name: float(value) for name, value in garment.parameters.items()},
+                "material": dataclasses.asdict(garment.material),
             }
             for garment in assets.garments.values()
         }

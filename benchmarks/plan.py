@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from snug.recipes import learns_from_simulation
 
 from .presets import Preset
 from .scene import Scene
-from .scenes import of_garment
+from .scenes import GARMENT_SCENES, GarmentScenes, of_garment
 from .tasks.cell import Cell
 
 if TYPE_CHECKING:
+    from snug.garment_file import GarmentFile
     from snug.motion import Motion
 
     from .performance.microbenchmark import Microbenchmark
@@ -46,10 +47,33 @@ class OwnBody:
 
 
 @dataclass(frozen=True)
+class OwnGarment:
+    """A user's garment: its file, how to take it, and digests of all that it is read from when the run was
+    planned.
+    """
+
+    file: GarmentFile
+    digests: tuple[str, ...]
+
+    @property
+    def scenes(self) -> GarmentScenes:
+        """What takes the place of the T-shirt's."""
+        return GarmentScenes(self.file.name, f"a garment of {self.file.path.name}")
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """What decides it: contents and options, and not where the files lie."""
+        file = self.file
+        how = [file.units, file.up, list(file.shift), file.rest, file.uv_scale]
+        return {"files": list(self.digests), "how": how}
+
+
+@dataclass(frozen=True)
 class Motions:
     """Names of the motions of a run, training apart from test, and those that came from files.
 
-    dynamic_train, dynamic_test: the same for garments whose motions stop within a frame.
+    dynamic_train, dynamic_test: the same for garments whose motions stop within a frame. worn: the garments
+    that do them; the first is that of a run where none is named.
     """
 
     train: tuple[str, ...] = ()
@@ -57,22 +81,28 @@ class Motions:
     files: dict[str, Motion] = field(default_factory=dict)
     dynamic_train: tuple[str, ...] = ()
     dynamic_test: tuple[str, ...] = ()
+    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
+
+    @property
+    def first_garment(self) -> str:
+        """The name of the first one."""
+        return self.worn[0].garment
 
     def train_of(self, garment: str) -> tuple[str, ...]:
         """Names of the motions that networks of a garment train on."""
-        return self.dynamic_train if of_garment(garment).dynamic else self.train
+        return self.dynamic_train if of_garment(garment, self.worn).dynamic else self.train
 
     def test_of(self, garment: str) -> tuple[str, ...]:
         """Names of a garment's test motions."""
-        return self.dynamic_test if of_garment(garment).dynamic else self.test
+        return self.dynamic_test if of_garment(garment, self.worn).dynamic else self.test
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
     """Everything to be done.
 
-    body: an own one; None: the package's. only: states of what the folder holds in which a task is done
-    again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
+    body, garment: own ones; None: the package's. only: states of what the folder holds in which a task is
+    done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
     """
 
     preset: Preset
@@ -82,6 +112,7 @@ class Plan:
     microbenchmarks: tuple[Microbenchmark, ...] = ()
     motions: Motions = Motions()
     body: OwnBody | None = None
+    garment: OwnGarment | None = None
     seeds: tuple[int, ...]
     device: str
     folder: Path

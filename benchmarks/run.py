@@ -8,19 +8,24 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
+from snug.garment_file import add_garment_options, demand_a_file, garment_file
+
 from .cache import DEFAULT_ONLY, STATES
 from .performance.microbenchmark import SUITE
-from .plan import Motions, OwnBody, Plan, PlanError
+from .plan import Motions, OwnBody, OwnGarment, Plan, PlanError
 from .presets import PRESETS, find_preset
 from .provenance import usable_cores
 from .registry import DeclarationError
 from .results import ResultsError, RunFolder
+from .scenes import GARMENT_SCENES, all_scenes
 from .selection import Request, choose, choose_motions, choose_suites, names_no_motion
 from .timing import one_thread
 
@@ -38,6 +43,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
   python -m benchmarks.run --body mine.npz --suite garments
+  python -m benchmarks.run --garment shirt.obj --garment-units cm --body mine.npz --suite garments
 
 motions: without --motions the embedded library, which has its own test set. With --motions the files
   replace the library; "library" among the paths keeps it. --test-motions names those to test on, all
@@ -91,6 +97,9 @@ def make_parser() -> argparse.ArgumentParser:
         help="an own body, .npz in SMPL's layout, in place of the package's; garments are made for it "
         "(extreme cases of single steps keep the package's)",
     )
+    add("--garment", metavar="FILE",
+        help="an own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; its scenes are "
+        "<name of the file>/<motion>. What will work says python -m snug.check FILE")  # fmt: skip
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
@@ -103,6 +112,7 @@ def make_parser() -> argparse.ArgumentParser:
         "cores there are); cells that are timed run alone")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
     add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
+    add_garment_options(parser)
     return parser
 
 
@@ -156,6 +166,9 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     motions = Motions()
     if options.motions or options.test_motions or not names_no_motion(scenes):
         motions = choose_motions(options.motions, split(options.test_motions), preset)
+    garment = choose_garment(options)
+    if garment:
+        motions = replace(motions, worn=(garment.scenes, *motions.worn[1:]))
     request = Request(
         suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=scenes,
         methods=methods, seeds=seeds,
@@ -171,6 +184,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         microbenchmarks=microbenchmarks,
         motions=motions,
         body=choose_body(options.body),
+        garment=garment,
         seeds=seeds,
         device=options.device,
         folder=folder,
@@ -191,6 +205,30 @@ def choose_body(path: str | None) -> OwnBody | None:
 
     Body.from_file(path)
     return OwnBody(Path(path), digest_of_file(Path(path)))
+
+
+def choose_garment(options: argparse.Namespace) -> OwnGarment | None:
+    """An own garment, once it has been read on the body. Raises PlanError for a name that is taken, and
+    snug.garments.GarmentError for a file that holds none for this body.
+    """
+    if options.garment is None:
+        demand_a_file(options)
+        return None
+    file = garment_file(options.garment, options)
+    taken = {scene.split("/")[0] for scene in all_scenes((), ())} | {
+        scenes.garment for scenes in GARMENT_SCENES
+    }
+    if file.name in taken or not re.fullmatch(r"[\w.+-]+", file.name):
+        raise PlanError(
+            f"--garment {file.path}: '{file.name}' cannot name its scenes: give the file another name, of "
+            "letters, digits and '_'"
+        )
+    from snug.body import Body
+
+    from .source import digest_of_file
+
+    file.read(Body.from_file(options.body) if options.body else Body.load())
+    return OwnGarment(file, tuple(map(digest_of_file, file.files)))
 
 
 def split(values: Sequence[str]) -> list[str]:

@@ -24,7 +24,7 @@ from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
 from .registry import DeclarationError
 from .scene import Scene
-from .scenes import GARMENT_SCENES, find_scene, of_garment
+from .scenes import find_scene, of_garment
 from .source import digest, digest_of_file, find_module
 from .tasks.case import RunCase
 from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
@@ -68,7 +68,7 @@ class Schedule:
         yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and self._has_reference(s))
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
         for network in dict.fromkeys(network_of(c) for c in plan.cells if SUITE in c.suites):
-            if network and network.garment == GARMENT_SCENES[0].garment and network.name in TRAININGS:
+            if network and network.garment == plan.motions.first_garment and network.name in TRAININGS:
                 yield self.windows(network)
         yield from map(self.case, plan.cases)
         yield from map(self.microbenchmark, plan.microbenchmarks)
@@ -83,7 +83,7 @@ class Schedule:
         )  # fmt: skip
 
     def data(self, motion: str, garment: str) -> SimulateMotion:
-        scene = of_garment(garment).scene(motion).at(self.preset)
+        scene = of_garment(garment, self.plan.motions.worn).scene(motion).at(self.preset)
         return SimulateMotion(
             name=flat(scene.name), label=scene.name, scene=scene,
             units=self.preset.settle_frames + self.preset.frames,
@@ -254,9 +254,14 @@ class Schedule:
     def _of_body(self, garment: str) -> dict[str, Any]:
         """What the assets are made from."""
         sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
-        files = {name: _content(Path(name), garment) for name in of_garment(garment).files}
-        own = {"body": self.plan.body.digest} if self.plan.body else {}
-        return {"assets": sizes} | own | ({"files": files} if files else {})
+        declared, own = of_garment(garment, self.plan.motions.worn), dict[str, Any]()
+        if declared.files:
+            own["files"] = {name: _content(Path(name), garment) for name in declared.files}
+        if self.plan.body:
+            own["body"] = self.plan.body.digest
+        if self.plan.garment and garment == self.plan.garment.file.name:
+            own["own garment"] = self.plan.garment.inputs
+        return {"assets": sizes} | own
 
     def _motion(self, name: str) -> str:
         """Of a file its content; an embedded one is made by code, looked at by itself."""
@@ -267,7 +272,7 @@ class Schedule:
         return self.plan.motions.train_of(garment)
 
     def _settled_in(self, scene: Scene) -> Scene:
-        return find_scene(scene.start_of).at(self.preset)
+        return find_scene(scene.start_of, self.plan.motions.first_garment).at(self.preset)
 
     def _has_reference(self, scene: Scene) -> bool:
         return any(cell.scene == scene and cell.entry.role == "reference" for cell in self.plan.cells)

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from .validation.case import Case
 
 FEWEST = 3  # frames of a motion: inertia needs two before the one that is judged
-FIRST_GARMENT = GARMENT_SCENES[0].garment
 MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
 
 
@@ -53,7 +52,7 @@ class Request:
 
 def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Microbenchmark, ...]]:
     """What the request names. Raises PlanError for a word that names nothing."""
-    declared = all_scenes(request.motions.test, request.motions.dynamic_test)
+    declared = all_scenes(request.motions.test, request.motions.dynamic_test, request.motions.worn)
     _check_words("scene", request.scenes, [*declared, *(entry.name for entry in MEASURED)])
     _check_words("method", request.methods, [entry.name for entry in METHODS])
     found: dict[tuple[str, str, int], Cell] = {}
@@ -91,7 +90,7 @@ def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, 
         methods = (*suite.methods(extent), *more, *further, *sorted(own_methods))
         for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
             # Networks for a second garment double the training: only for whoever names its scenes.
-            plain = not extent.further and declared[scene].garment not in ("", FIRST_GARMENT)
+            plain = not extent.further and declared[scene].garment not in ("", extent.motions.first_garment)
             for method in methods:
                 if not (named(scene, request.scenes) and named(method, request.methods)):
                     continue

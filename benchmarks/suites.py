@@ -46,10 +46,10 @@ class Suite:
 
 
 def _whole_motions(extent: Extent) -> list[str]:
-    """A T-shirt in each test motion; at preset paper also what swings; others where they are named."""
-    shirt, *others = GARMENT_SCENES
-    names = [shirt.scene(name).name for name in extent.motions.test]
-    names += [there_and_back(name).name for name in extent.motions.test[:1]]
+    """The first garment in each test motion; at preset paper also what swings; others where named."""
+    first, *others = extent.motions.worn
+    names = [first.scene(name).name for name in extent.motions.test]
+    names += [there_and_back(name, first.garment).name for name in extent.motions.test[:1]]
     if extent.further:
         names += [o.scene(name).name for o in others if o.dynamic for name in extent.motions.dynamic_test]
     return names
@@ -87,10 +87,11 @@ def _clips(extent: Extent) -> list[str]:
     """
     motions = extent.motions
     lively = [name for name in motions.test if name in LIVELY] or list(motions.test[:2])
+    first = motions.first_garment
     if not extent.full:
-        return [SMALL[0], *(f"tshirt/{name}@clip" for name in lively[:1])]
+        return [SMALL[0], *(f"{first}/{name}@clip" for name in lively[:1])]
     turning = [name for name in motions.dynamic_test if name in TURNING]
-    shirts = [f"tshirt/{name}@clip" for name in (*lively, *turning)]
+    shirts = [f"{first}/{name}@clip" for name in (*lively, *turning)]
     skirts = [f"skirt/{name}@clip" for name in turning]
     return [*SMALL, *(EXACT if extent.further else ()), *shirts, *skirts]
 
@@ -112,9 +113,12 @@ def _solvers(extent: Extent) -> list[str]:
 
 
 def _dependence(extent: Extent) -> list[str]:
-    """Meshes and steps of the preset; drapes of up to 16,000 vertices where scenes are named, or at paper."""
-    drapes = DRAPES if extent.further else ()
-    return [scene.name for scene in (*meshes_and_steps(extent.preset.dependence), *drapes)]
+    """Meshes and steps of the preset, of the T-shirt alone; drapes of up to 16,000 vertices where scenes are
+    named, or at paper.
+    """
+    tailored = extent.motions.first_garment == GARMENT_SCENES[0].garment
+    meshes = meshes_and_steps(extent.preset.dependence) if tailored else []
+    return [scene.name for scene in (*meshes, *(DRAPES if extent.further else ()))]
 
 
 # --- out of distribution ------------------------------------------------------------------------------------

@@ -23,8 +23,9 @@ class Cloth:
         faces: (F, 3) vertex indices, consistently wound.
         material: see `Material`.
         pins: indices of vertices that never move by themselves.
-        rest_uv: (V, 2) [m], optional flat rest state; it then replaces rest_positions for areas, masses and
-            strain, so that one rest state serves every term. rest_positions stays the starting shape.
+        rest_uv: (V, 2) [m], or (F, 3, 2) of the faces' corners, where a vertex on a seam has several:
+            optional flat rest state; it then replaces rest_positions for areas, masses, strain and hinges, so
+            that one rest state serves every term. rest_positions stays the starting shape.
 
     Raises:
         MeshError: wrong shapes, NaN, zero-area face, coincident or unused vertices, non-manifold edge,
@@ -53,8 +54,11 @@ class Cloth:
         uv = self.rest_uv
         if uv is not None:
             uv = np.array(uv, dtype=np.float64, order="C")
-            if uv.shape != (len(positions), 2) or not np.isfinite(uv).all():
-                raise MeshError(f"rest_uv has shape {uv.shape}: expected finite ({len(positions)}, 2)")
+            if uv.shape not in ((len(positions), 2), (len(faces), 3, 2)) or not np.isfinite(uv).all():
+                raise MeshError(
+                    f"rest_uv has shape {uv.shape}: expected finite ({len(positions)}, 2) or "
+                    f"({len(faces)}, 3, 2)"
+                )
         for name, value in (("rest_positions", positions), ("faces", faces), ("pins", pins), ("rest_uv", uv)):
             object.__setattr__(self, name, value)
         self._check_elements()
@@ -77,12 +81,18 @@ class Cloth:
         return free
 
     @cached_property
+    def rest_corners(self) -> np.ndarray:
+        """(F, 3, 3), or (F, 3, 2) of a flat rest state: where the faces' corners are at rest [m]."""
+        if self.rest_uv is None:
+            return self.rest_positions[self.faces]
+        return self.rest_uv[self.faces] if self.rest_uv.ndim == 2 else self.rest_uv
+
+    @cached_property
     def _frames(self) -> np.ndarray:
         """(F, 2, 2) matrices Dm = [X1 - X0, X2 - X0] in a local orthonormal frame of the face [m]."""
-        if self.rest_uv is not None:
-            corner = self.rest_uv[self.faces]
+        corner = self.rest_corners
+        if corner.shape[2] == 2:
             return np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=-1)
-        corner = self.rest_positions[self.faces]
         first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
         length = np.linalg.norm(first, axis=1)
         along = np.einsum("fi,fi->f", first, second) / np.maximum(length, 1e-300)
@@ -154,9 +164,13 @@ class Cloth:
 
     @cached_property
     def edge_lengths(self) -> np.ndarray:
-        """(E,) rest lengths [m]."""
-        points = self.rest_positions if self.rest_uv is None else self.rest_uv
-        return np.linalg.norm(points[self.edges[:, 1]] - points[self.edges[:, 0]], axis=1)
+        """(E,) rest lengths [m]; of an edge whose two faces differ, as on a seam, their mean."""
+        corner, following = self.rest_corners, np.roll(self.faces, -1, axis=1)
+        sides = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).ravel()
+        ends = np.minimum(self.faces, following), np.maximum(self.faces, following)
+        scale = np.array([self.vertex_count, 1])
+        places = np.searchsorted(self.edges @ scale, (np.stack(ends, axis=-1) @ scale).ravel())
+        return np.bincount(places, sides) / np.bincount(places)
 
     @cached_property
     def _inner(self) -> np.ndarray:

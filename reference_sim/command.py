@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,6 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: Namespace) -> int:
     _check_paths(options)
+    if options.uv_scale and options.rest != "uv":
+        raise InputError(f"--uv-scale {options.uv_scale:g} is for a rest shape from UV: add --rest uv")
     if text := contradiction(options):
         raise InputError(text)
     cloth = _read_cloth(options)
@@ -111,12 +113,24 @@ def _check_paths(options: Namespace) -> None:
 
 def _read_cloth(options: Namespace) -> Cloth:
     from .cloth import Cloth, MeshError
-    from .mesh_io import read_mesh, to_metres_y_up
+    from .mesh_io import METRES, read_mesh, to_metres_y_up
+    from .uv_chart import join_seams, rest_chart
 
-    values = {parameter.name: getattr(options, parameter.name) for parameter in fields(Material)}
-    material = Material(**values)
+    material = Material.from_file(options.material) if options.material else Material()
+    given = {parameter.name: getattr(options, parameter.name) for parameter in fields(Material)}
+    material = replace(material, **{name: value for name, value in given.items() if value is not None})
     surface = read_mesh(options.garment)
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
+    chart = None
+    if options.rest == "uv":
+        surface, kept = join_seams(replace(surface, positions=positions))
+        if len(kept) < len(positions):
+            _say(f"note: {options.garment}: {len(positions) - len(kept)} doubled vertices joined along seams")
+        positions = surface.positions
+        try:
+            chart = rest_chart(surface, options.uv_scale or METRES[options.units])
+        except MeshError as error:
+            raise InputError(f"{options.garment}: {error}") from None
     if surface.quads:
         _say(f"note: {options.garment}: {surface.quads} quads cut into triangles")
     if options.up == "z":
@@ -128,7 +142,7 @@ def _read_cloth(options: Namespace) -> Cloth:
     if len(pins) == len(positions):
         raise InputError(f"--pins {options.pins!r} holds every vertex of {options.garment}: choose fewer")
     try:
-        return Cloth(positions, surface.faces, material, pins=pins)
+        return Cloth(positions, surface.faces, material, pins=pins, rest_uv=chart)
     except MeshError as error:
         raise InputError(f"{options.garment}: {error}") from None
 

@@ -25,6 +25,7 @@ EXAMPLES = """examples:
   python -m reference_sim.simulate shirt.ply --units cm --up z --obstacle 'walk/body_*.ply' \\
       --obstacle-rest tpose.ply --pc2 shirt_walk.pc2 -o shirt_walk.vtkhdf
   python -m reference_sim.simulate shirt.obj --obstacle walk/ -o out.vtkhdf --resume     # after a kill
+  python -m reference_sim.simulate shirt.obj --rest uv --material silk.toml -o shirt.vtkhdf
   python -m reference_sim.simulate skirt.obj --pins top --self-contact --friction 0.3 -o skirt.vtkhdf
 
 The output is in metres with y up, whatever the input was in. ParaView opens the .vtkhdf as it is; Blender
@@ -58,8 +59,18 @@ def make_parser() -> argparse.ArgumentParser:
     known.add_argument("--overwrite", action="store_true", help="replace OUT.vtkhdf if it exists")
 
     meshes = parser.add_argument_group("meshes")
-    meshes.add_argument("--units", choices=("m", "cm", "mm"), default="m", help="of all meshes (default m)")
+    units = ("m", "cm", "mm", "in")
+    meshes.add_argument("--units", choices=units, default="m", help="of all meshes (default m)")
     meshes.add_argument("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
+    meshes.add_argument(
+        "--rest",
+        choices=("mesh", "uv"),
+        default="mesh",
+        help="what has no strain: the garment's mesh itself (default), or its UV chart, the sewing pattern",
+    )
+    meshes.add_argument(
+        "--uv-scale", type=_positive, metavar="M", help="metres per unit of the chart (default: as --units)"
+    )
     meshes.add_argument(
         "--obstacle",
         metavar="MESHES",
@@ -80,12 +91,17 @@ def make_parser() -> argparse.ArgumentParser:
     )
 
     material = parser.add_argument_group("material (default: the cotton of the SNUG paper)")
+    material.add_argument(
+        "--material",
+        type=Path,
+        metavar="FILE",
+        help=".toml or .json of the values below; those given below come first",
+    )
     for parameter in fields(Material):
         unit, meaning = UNITS_OF_MATERIAL[parameter.name]
         material.add_argument(
             "--" + parameter.name.replace("_", "-"),
             type=_number,
-            default=parameter.default,
             metavar=unit,
             help=f"{meaning} (default {parameter.default:g})",
         )

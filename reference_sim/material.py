@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
 
 GRAVITY = 9.81  # [m/s^2], downwards along -y
+LARGEST_FILE = 1 << 20  # [bytes]
+_LAME = ("lame_lambda", "lame_mu", "thickness", "areal_density", "bending_stiffness")
+
+
+class MaterialError(ValueError):
+    """A file that holds no material; the message names file and field."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,32 @@ class Material:
             raise ValueError(
                 f"Material.bending_stiffness = {self.bending_stiffness!r}: must be finite, at least 0 [J]"
             )
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Material:
+        """The material of a .toml or .json file: one table of this class's fields, or all of `from_lame`'s.
+
+        Fields that are left out keep their defaults.
+
+        Raises:
+            MaterialError: no such file, not understood, an unknown field, or a value out of its range; the
+                message names file and field.
+        """
+        path = Path(path)
+        values = _table(path)
+        lame = "lame_lambda" in values or "lame_mu" in values
+        known = _LAME if lame else tuple(field.name for field in fields(cls))
+        for name, value in values.items():
+            if name not in known:
+                raise MaterialError(f"{path}: unknown field {name!r}: use {', '.join(known)}")
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise MaterialError(f"{path}: {name} = {value!r} is no number: give it in SI units")
+        if lame and (missing := [name for name in known if name not in values]):
+            raise MaterialError(f"{path}: lame_lambda and lame_mu also need {', '.join(missing)}")
+        try:
+            return cls.from_lame(**values) if lame else cls(**values)
+        except (ValueError, ZeroDivisionError) as error:
+            raise MaterialError(f"{path}: {error}") from None
 
     @classmethod
     def from_lame(
@@ -113,3 +147,23 @@ class Material:
                 stacklevel=2,
             )
         return stretch
+
+
+def _table(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise MaterialError(f"{path}: no such file")
+    if path.suffix.lower() not in (".toml", ".json"):
+        raise MaterialError(f"{path}: unknown kind of file: a material is a .toml or a .json")
+    if path.stat().st_size > LARGEST_FILE:
+        raise MaterialError(f"{path}: is too large for a material, which is a few numbers")
+    import json
+    import tomllib
+
+    read = tomllib.loads if path.suffix.lower() == ".toml" else json.loads
+    try:
+        values = read(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:  # the errors of both readers, and of text that is none
+        raise MaterialError(f"{path}: not understood: {' '.join(str(error).split())}") from None
+    if not isinstance(values, dict):
+        raise MaterialError(f"{path}: expected names and numbers, as young_modulus = 70e3")
+    return values

@@ -9,7 +9,8 @@ import contextlib
 import glob
 import io
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,11 @@ if TYPE_CHECKING:
 
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
 TRAJECTORY_SUFFIXES = (".vtkhdf", ".hdf")
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
+# What programs call the texture coordinates of a vertex: two numbers, or one array of both.
+UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+UV_ARRAYS = ("UV", "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +33,16 @@ class Surface:
     """What a file held: positions (V, 3) in the file's own unit and axes, triangles (F, 3).
 
     quads: how many four-cornered faces were cut in two along the diagonal from their first corner.
+    uv: (F, 3, 2) texture coordinates of the faces' corners, several for a vertex on a seam; NaN where a
+    corner has none, None where no corner has any. vertex_data: name -> (V,) or (V, k), what PLY and VTK files
+    say of vertices besides.
     """
 
     positions: np.ndarray
     faces: np.ndarray
     quads: int = 0
+    uv: np.ndarray | None = None
+    vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 def read_mesh(path: str | Path) -> Surface:
@@ -50,8 +59,8 @@ def read_mesh(path: str | Path) -> Surface:
         raise MeshError(f"{path}: no such file")
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
-    points, polygons = _read_obj(path) if path.suffix.lower() == ".obj" else _read_with_meshio(path)
-    positions = np.asarray(points, dtype=np.float64)
+    parts = _read_obj(path) if path.suffix.lower() == ".obj" else _read_with_meshio(path)
+    positions, polygons = np.asarray(parts.points, dtype=np.float64), parts.polygons
     if not polygons:
         raise MeshError(f"{path}: no triangles in it: export the surface as triangles")
     if positions.ndim != 2 or positions.shape[1] != 3:
@@ -63,20 +72,77 @@ def read_mesh(path: str | Path) -> Surface:
     if corners.max() > 4 or corners.min() < 3:
         k = int(np.argmax((corners > 4) | (corners < 3)))
         raise MeshError(f"{path}: face {k} has {corners[k]} corners: triangulate the mesh")
-    if corners.max() == 4:
-        polygons = [
-            half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]
-        ]
-    return Surface(positions, np.array(polygons, dtype=np.int64), int((corners == 4).sum()))
+    faces = np.array(_halved(polygons), dtype=np.int64)
+    bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
+    if bad.size:
+        raise MeshError(f"{path}: triangle {bad[0]} names a vertex beyond the {len(positions)} there are")
+    return Surface(
+        positions, faces, int((corners == 4).sum()), _corner_uv(path, parts, faces), parts.vertex_data
+    )
 
 
-def _read_obj(path: Path) -> tuple[list[list[float]], list[list[int]]]:
-    """Vertices and polygons of an OBJ file.
+@dataclass(frozen=True)
+class _Parts:
+    """What a file holds, before its polygons become triangles. uv_polygons: places in uv (N, 2), parallel to
+    polygons, -1 for a corner without; empty where the UV are those of the vertices.
+    """
+
+    points: Any
+    polygons: list[Any]
+    uv: Any = ()
+    uv_polygons: tuple[Any, ...] | list[Any] = ()
+    vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+def _halved(polygons: Any) -> list[Any]:
+    """Triangles of triangles and quads."""
+    return [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
+
+
+def _corner_uv(path: Path, parts: _Parts, faces: np.ndarray) -> np.ndarray | None:
+    """Texture coordinates (F, 3, 2) of the faces' corners, NaN where there are none."""
+    import numpy as np
+
+    places = faces
+    if parts.uv_polygons:
+        uv, places = np.asarray(parts.uv, dtype=np.float64), np.array(_halved(parts.uv_polygons), np.int64)
+    else:
+        found = _uv_of_vertices(parts.vertex_data)
+        if found is None:
+            return None
+        uv = found
+    if (places < 0).all():
+        return None
+    bad = np.flatnonzero((places >= len(uv)).any(axis=1) | (places < -1).any(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"{path}: triangle {bad[0]} names a texture coordinate beyond the {len(uv)} there are: export it "
+            "again"
+        )
+    return np.where(places[..., None] < 0, np.nan, uv[places])
+
+
+def _uv_of_vertices(data: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    import numpy as np
+
+    for u, v in UV_NAMES:
+        if u in data and v in data:
+            return np.stack([data[u], data[v]], axis=1).astype(np.float64)
+    for name in UV_ARRAYS:
+        if name in data and data[name].ndim == 2 and data[name].shape[1] >= 2:
+            return data[name][:, :2].astype(np.float64)
+    return None
+
+
+def _read_obj(path: Path) -> _Parts:
+    """Vertices, polygons and texture coordinates of an OBJ file.
 
     meshio refuses a file with more texture coordinates than vertices, which every garment with seams has.
     """
     points: list[list[float]] = []
     polygons: list[list[int]] = []
+    uv: list[list[float]] = []
+    uv_polygons: list[list[int]] = []
     with open(path, encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, start=1):
             words = line.split()
@@ -84,15 +150,25 @@ def _read_obj(path: Path) -> tuple[list[list[float]], list[list[int]]]:
                 if words and words[0] == "v":
                     x, y, z = words[1:4]  # colours may follow
                     points.append([float(x), float(y), float(z)])
+                elif words and words[0] == "vt":
+                    uv.append([float(words[1]), float(words[2]) if len(words) > 2 else 0.0])
                 elif words and words[0] == "f":
-                    named = [int(word.split("/")[0]) for word in words[1:]]
-                    polygons.append([n - 1 if n > 0 else len(points) + n for n in named])
-            except ValueError:
+                    corners = [word.split("/") for word in words[1:]]
+                    polygons.append([_counted(int(c[0]), len(points)) for c in corners])
+                    uv_polygons.append(
+                        [_counted(int(c[1]), len(uv)) if len(c) > 1 and c[1] else -1 for c in corners]
+                    )
+            except (ValueError, IndexError):
                 raise MeshError(f"{path}: line {number} is not understood: {line.strip()[:60]!r}") from None
-    return points, polygons
+    return _Parts(points, polygons, uv, uv_polygons)
 
 
-def _read_with_meshio(path: Path) -> tuple[Any, list[Any]]:
+def _counted(number: int, count: int) -> int:
+    """From 0 on: OBJ counts from 1, and backwards from the last one below 0."""
+    return number - 1 if number > 0 else count + number
+
+
+def _read_with_meshio(path: Path) -> _Parts:
     """Points and polygons through meshio; legacy and XML PolyData, which it cannot read, through VTK."""
     import meshio
     import numpy as np
@@ -107,17 +183,19 @@ def _read_with_meshio(path: Path) -> tuple[Any, list[Any]]:
         ):
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:
-        if path.suffix.lower() in (".vtk", ".vtp") and (surface := _read_with_vtk(path)):
-            return surface
+        if path.suffix.lower() in (".vtk", ".vtp") and (parts := _read_with_vtk(path)):
+            return parts
         message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
         reason = " ".join(message.split()) or type(error).__name__
         raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY") from None
     kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
-    return mesh.points, [polygon for block in kinds for polygon in block.data]
+    data = {name: np.asarray(values) for name, values in mesh.point_data.items()}
+    return _Parts(mesh.points, [polygon for block in kinds for polygon in block.data], vertex_data=data)
 
 
-def _read_with_vtk(path: Path) -> tuple[Any, list[Any]] | None:
+def _read_with_vtk(path: Path) -> _Parts | None:
     """Points and triangles of a file of PolyData, or None if it holds none."""
+    import numpy as np
     import pyvista
 
     try:
@@ -128,7 +206,10 @@ def _read_with_vtk(path: Path) -> tuple[Any, list[Any]] | None:
         return None
     if not surface.is_all_triangles:
         raise MeshError(f"{path}: has faces that are no triangles: triangulate the mesh")
-    return surface.points, list(surface.faces.reshape(-1, 4)[:, 1:])
+    data = {name: np.asarray(surface.point_data[name]) for name in surface.point_data}
+    if surface.active_texture_coordinates is not None:
+        data[UV_ARRAYS[0]] = np.asarray(surface.active_texture_coordinates)
+    return _Parts(surface.points, list(surface.faces.reshape(-1, 4)[:, 1:]), vertex_data=data)
 
 
 def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:

@@ -13,7 +13,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.cloth import Cloth
 from reference_sim.material import Material
 from snug.motion_inputs import motion_rates
 from snug.recipe import Recipe
@@ -25,20 +24,22 @@ FEATURE_SETS = ("motion", "pose", "pose_shape", "rates")
 class DressedBody:
     """What is fixed when a garment is put on a body; every motion is given to its methods.
 
-    body: snug.body.Body; garment: snug.garments.Garment. The rest state of all energies is the garment's
-    template, for every body shape: the same shirt on a larger body is a stretched shirt.
+    body: snug.body.Body; garment: snug.garments.Garment; material: in place of the garment's own. The rest
+    state of all energies is the garment's, for every body shape: the same shirt on a larger body is a
+    stretched shirt.
     """
 
     def __init__(self, body: Any, garment: Any, *, material: Material | None = None) -> None:
         self.body, self.garment = body, garment
-        self.cloth = Cloth(garment.rest_positions, garment.faces, material or Material(), pins=garment.pins)
+        self.cloth = garment.cloth(material)
         self.vertices = len(garment.rest_positions)
         self.parents = [int(parent) for parent in body.parents]
         self._weights: dict[int, Tensor] = {}
         self._rest_directions: Tensor | None = None
 
     def weights(self, smoothing: int) -> Tensor:
-        """Skinning weights (V, 24), borrowed from the nearest body vertex and averaged over neighbours.
+        """Skinning weights (V, 24), borrowed from the body and averaged over neighbours; as they are where
+        somebody made them for this garment.
 
         smoothing: sweeps on a garment of 1000 vertices. A sweep reaches as far as an edge is long, so other
         garments get sweeps in proportion to their vertices and are smoothed over the same length: with 20
@@ -47,7 +48,7 @@ class DressedBody:
         """
         if smoothing not in self._weights:
             own = weights = np.asarray(self.garment.skinning_weights)
-            if smoothing:
+            if smoothing and not self.garment.authored_weights:
                 from snug.garments import smooth_weights
 
                 sweeps = max(1, round(smoothing * self.vertices / 1000))

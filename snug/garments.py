@@ -1,6 +1,7 @@
 """Garments tailored to a body: triangles, and per vertex the body vertex and skinning weights it borrows.
 
-The T-pose shape of a garment is its rest shape: areas, Dm^-1, masses and hinges all come from it.
+The T-pose shape of a garment is its rest shape, unless it has a UV chart: areas, Dm^-1, masses and hinges all
+come from one of the two.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
+from reference_sim.cloth import Cloth
+from reference_sim.material import Material
 from snug.body import Body
 from snug.garment_cuts import SEAM, CutPlane
 from snug.garment_mesh import mesh_garment
@@ -35,10 +38,13 @@ class Garment:
 
     rest_positions: (V,3) [m]. faces: (F,3), outward. body_vertices: (V,) nearest body vertex among those it
     may follow. skinning_weights: (V,24), that vertex's own, smoothed where it hangs between the legs; rows
-    sum to one. loops: name ("neck", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "hem",
-    "waist", "left_leg", "right_leg") -> boundary vertices in order along the faces' winding, from the
-    front-most vertex on. pins: (P,), ascending, what the body carries: a waistband, since contact without
-    friction does not hold it. parameters: what it was tailored with.
+    sum to one. authored_weights: whether somebody made those weights for this garment, so that no recipe
+    smooths them. rest_uv: (F,3,2) [m] of the faces' corners, the flat rest state of a garment that has one;
+    else rest_positions is its rest shape too.
+    loops: name ("neck", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "hem", "waist",
+    "left_leg", "right_leg") -> boundary vertices in order along the faces' winding, from the front-most
+    vertex on. pins: (P,), ascending, what the body carries: a waistband, since contact without friction does
+    not hold it. parameters: what it was tailored with.
     """
 
     name: str
@@ -49,6 +55,18 @@ class Garment:
     loops: Mapping[str, Index] = field(default_factory=dict)
     pins: Index = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     parameters: Mapping[str, float] = field(default_factory=dict)
+    material: Material = field(default_factory=Material)
+    rest_uv: Array | None = None
+    authored_weights: bool = False
+
+    def cloth(self, material: Material | None = None) -> Cloth:
+        """The one rest state of simulator, loss and metrics, with the garment's own material or another.
+
+        Raises MeshError for a mesh that cannot be simulated.
+        """
+        return Cloth(
+            self.rest_positions, self.faces, material or self.material, pins=self.pins, rest_uv=self.rest_uv
+        )
 
     @property
     def hem(self) -> Index:
@@ -57,13 +75,18 @@ class Garment:
             return self.loops["hem"]
         return np.concatenate([self.loops["left_leg"], self.loops["right_leg"]])
 
-    def body_transported(self, body: Body, poses: Array, translations: Array) -> Array:
-        """Where the pins are (T,P,3) [m] on the body in poses (T,24,3) [rad] at translations (T,3) [m]."""
+    def body_transported(
+        self, body: Body, poses: Array, translations: Array, betas: ArrayLike | None = None
+    ) -> Array:
+        """Where the pins are (T,P,3) [m] on the body of that shape in poses (T,24,3) [rad] at translations
+        (T,3) [m].
+        """
         if not len(self.pins):
             return np.empty((len(poses), 0, 3))  # and torch, which poses the joints, is not loaded
-        transforms = body.transforms(poses, translations)
+        transforms = body.transforms(poses, translations, betas)
         blended = np.einsum("pj,tjab->tpab", self.skinning_weights[self.pins], transforms)
-        turned = np.einsum("tpab,pb->tpa", blended[..., :3], self.rest_positions[self.pins])
+        rest = self.rest_for(body, betas)[self.pins]
+        turned = np.einsum("tpab,pb->tpa", blended[..., :3], rest)
         return turned + blended[..., 3]
 
     def rest_for(self, body: Body, betas: ArrayLike | None) -> Array:

@@ -10,10 +10,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from snug.garment_file import demand_a_file, garment_file, is_file_name
 from snug.recipes import find_recipe
 from snug.train_options import check, parse
 
 if TYPE_CHECKING:
+    from snug.body import Body
+    from snug.garment_kinds import GarmentTemplate
+    from snug.garments import Garment
     from snug.parallel import Group
     from snug.trained_model import TrainedModel
 
@@ -37,7 +41,12 @@ def _run(options: argparse.Namespace) -> int:
     from snug.training_run import Interrupted
 
     check(options)
-    templates = [find_template(name) for name in dict.fromkeys(options.garment or [TSHIRT])]
+    if not any(map(is_file_name, options.garment)):
+        demand_a_file(options)
+    templates = [
+        _of_file(word, options) if is_file_name(word) else find_template(word)
+        for word in dict.fromkeys(options.garment or [TSHIRT])
+    ]
     outs = _outs(Path(options.out), templates)
     device = find_device(options.device)
     torch.set_num_threads(options.threads)
@@ -56,6 +65,18 @@ def _run(options: argparse.Namespace) -> int:
     finally:
         leave_group()
     return 0
+
+
+def _of_file(path: str, options: argparse.Namespace) -> GarmentTemplate:
+    """A garment that is read instead of tailored, whatever number of vertices is asked for."""
+    from snug.garment_kinds import GarmentTemplate
+
+    file = garment_file(path, options)
+
+    def tailor(body: Body, *, vertices: int) -> Garment:
+        return file.read(body)
+
+    return GarmentTemplate(file.name, f"garment of {path}", tailor)
 
 
 def _outs(out: Path, templates: Sequence[Any]) -> list[Path]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
+from snug.garment_file import add_garment_options
 from snug.recipes import RECIPES
 
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
   python -m snug.train --garment tshirt --garment tunic  one network for each garment
+  python -m snug.train --garment shirt.obj --body mine.npz    for a garment of your own (see snug.check)
   python -m snug.train --model pbns --steps 8000         the static baseline
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
   python -m snug.train --validation bow --patience 10    stop when a held-out motion gets no better
@@ -31,8 +33,9 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--model", choices=("snug", "pbns"), default="snug", help="network and loss (default: %(default)s)")
     add("--recipe", choices=tuple(RECIPES), default="default", help="named options (default: %(default)s)")
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
-    add("--garment", metavar="NAME", action="append", default=[],
-        help="tshirt, tunic or skirt; repeat for one model each (default: tshirt)")  # fmt: skip
+    add("--garment", metavar="NAME|FILE", action="append", default=[],
+        help="tshirt, tunic or skirt, or a mesh made for the body; repeat for one model each (default: "
+        "tshirt)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
     add("--body", metavar="FILE", help="an own body, .npz in SMPL's layout (default: that of the package)")
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
@@ -56,6 +59,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--checkpoint-steps", metavar="N", type=int, default=0, help="a checkpoint every N steps as well")
     add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
     add("--tensorboard", metavar="DIR", help="write curves for TensorBoard (extra: tensorboard)")
+    add_garment_options(parser)
     options = parser.parse_args(arguments)
     options.out = options.out or f"{options.model}.safetensors"
     return options

@@ -174,8 +174,10 @@ class TrainingRun:
         taught = trainer.targets.vertices if trainer.targets else trainer.data.ahead
         # Coordinates that were predicted are round-off's too, and in the checkpoint.
         features = trainer.data.features[:, : len(trainer.network.input_mean)]
-        for tensor in (features, trainer.data.rest, taught):
+        weights = trainer.dressed.weights(trainer.recipe.smoothing)
+        for tensor in (features, trainer.data.rest, taught, weights):
             digest.update(tensor.cpu().numpy().tobytes())
+        digest.update(trainer.dressed.cloth.Dm_inverse.tobytes())
         if trainer.supervision:
             digest.update(np.round(trainer.supervision.mean.cpu().numpy(), 4).tobytes())
         return {

@@ -9,6 +9,7 @@ from dataclasses import FrozenInstanceError
 import pytest
 
 from reference_sim import GRAVITY, Material
+from reference_sim.material import MaterialError
 
 
 def test_the_default_cotton_has_the_constants_that_the_paper_prints():
@@ -86,3 +87,39 @@ def test_other_impossible_values_are_refused_by_name(wrong):
 def test_a_material_is_frozen():
     with pytest.raises(FrozenInstanceError):
         Material().density = 1.0
+
+
+def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
+    toml, json = tmp_path / "silk.toml", tmp_path / "silk.json"
+    toml.write_text("young_modulus = 5e4  # Pa\ndensity = 300\n")
+    json.write_text('{"young_modulus": 5e4, "density": 300}')
+    for path in (toml, json):
+        assert Material.from_file(path) == Material(young_modulus=5e4, density=300)
+    lame = {"lame_lambda": 44_400.0, "lame_mu": 23_600.0, "thickness": 0.47e-3, "areal_density": 0.20022,
+            "bending_stiffness": 3.96e-5}  # fmt: skip
+    toml.write_text("".join(f"{name} = {value!r}\n" for name, value in lame.items()))
+    assert Material.from_file(toml) == Material.from_lame(**lame)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.toml", None, "no such file"),
+        ("a.yaml", "x: 1", "a material is a .toml or a .json"),
+        ("a.toml", "young_modulus = ", "not understood"),
+        ("a.json", "[1, 2]", "expected names and numbers"),
+        ("a.json", "[" * 100_000, "not understood"),
+        ("a.toml", "youngs_modulus = 7e4", "unknown field 'youngs_modulus': use young_modulus"),
+        ("a.toml", "density = true", "density = True is no number"),
+        ("a.toml", "density = -1.0", "Material.density = -1.0: must be"),
+        ("a.toml", "lame_mu = 23600.0", "also need lame_lambda, thickness"),
+        ("a.toml", "#" * (2 << 20), "too large for a material"),
+    ],
+)
+def test_a_bad_file_is_named_with_its_field(tmp_path, name, text, words):
+    path = tmp_path / name
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(MaterialError, match=words) as caught:
+        Material.from_file(path)
+    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)

@@ -63,6 +63,38 @@ def test_texture_coordinates_and_vertex_colours_change_nothing(tmp_path):
     assert surface.faces.tolist() == [[0, 1, 2]]
 
 
+SEAM = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 5 0\nvt 6 1\nvt 5 1\n"
+
+
+def test_a_vertex_on_a_seam_has_a_texture_coordinate_in_each_face(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text(SEAM + "f 1/1 2/2/ 3/3\nf 1/4/9 3/5 -1/-1\n")
+    surface = read_mesh(path)
+    assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert surface.uv.tolist() == [[[0, 0], [1, 0], [1, 1]], [[5, 0], [6, 1], [5, 1]]]
+    path.write_text(SEAM + "f 1/1 2/2 3/3 4/6\n")  # a quad is cut with its coordinates
+    assert read_mesh(path).uv.tolist() == [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [5, 1]]]
+    path.write_text(SEAM + "f 1/1 2/2 3/3\nf 1 3 4\n")
+    assert np.isnan(read_mesh(path).uv).all(axis=(1, 2)).tolist() == [False, True]
+    path.write_text(SEAM + "f 1 2 3\nf 1//2 3//2 4//2\n")
+    assert read_mesh(path).uv is None
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".vtk", ".vtp"])
+def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path, suffix):
+    positions, faces = grid(2, 1)
+    uv, path = 3.0 * positions[:, [0, 2]], tmp_path / f"a{suffix}"
+    if suffix == ".ply":
+        data = {"s": uv[:, 0], "t": uv[:, 1]}
+        meshio.write(path, meshio.Mesh(positions, [("triangle", faces)], point_data=data))
+    else:
+        pyvista = pytest.importorskip("pyvista")
+        surface = pyvista.PolyData(positions, np.insert(faces, 0, 3, axis=1).ravel())
+        surface.active_texture_coordinates = uv
+        surface.save(path)
+    np.testing.assert_allclose(read_mesh(path).uv, uv[faces], atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
@@ -73,6 +105,10 @@ def test_texture_coordinates_and_vertex_colours_change_nothing(tmp_path):
         ("a.obj", "# a mesh\nv 0 0 zero\n", "line 2 is not understood: 'v 0 0 zero'"),
         ("a.obj", "v 0 0 0\nv 1 0 0\n", "no triangles in it"),
         ("a.obj", "v 0 0\n", "line 1 is not understood: 'v 0 0'"),
+        ("a.obj", SEAM + "f 1 2 9\n", "triangle 0 names a vertex beyond the 4"),
+        ("a.obj", SEAM + "f 1 2 -9\n", "triangle 0 names a vertex beyond the 4"),
+        ("a.obj", SEAM + "f 1/1 2/2 3/7\n", "triangle 0 names a texture coordinate beyond the 6"),
+        ("a.obj", SEAM + "vt\nf 1 2 3\n", "line 11 is not understood: 'vt'"),
         ("a.off", "OFF\n3 1 0\n0 0\n1 0\n0 1\n3 0 1 2\n", "cannot be read"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 nan\nf 1 2 3\n", "vertex 2 is not finite"),
         (

@@ -12,12 +12,14 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from garment_files import write_obj
 from meshes import grid, sphere
 
 import reference_sim
-from reference_sim import Trajectory
+from reference_sim import Cloth, Material, Trajectory
 from reference_sim.command import choose_pins, main
 from reference_sim.command_options import EXAMPLES, make_parser
+from reference_sim.energies import StretchStVK
 from reference_sim.mesh_io import read_mesh
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -141,6 +143,26 @@ def test_options_reach_the_simulation(folder):
     assert (made["dt_s"], made["substeps"], made["options"]["tolerance"]) == (1 / 60, 2, 1e-8)
     assert made["terms"]["bending"]["scaling"] == "none"
     assert list(made["material"].values()) == [50e3, 0.3, 0.001, 300.0, 1e-5]
+
+
+def test_a_chart_and_a_material_from_files_are_the_rest_shape_and_the_cloth(folder, capsys):
+    left = SHEET[FACES].mean(axis=1)[:, 0] < 0
+    chart = 0.9 * SHEET[FACES][:, :, [0, 2]] + np.where(left, 7.0, 0.0)[:, None, None]  # two pieces, a seam
+    write_obj(Path("sewn.obj"), SHEET, FACES, 100 * chart)
+    Path("silk.toml").write_text("young_modulus = 5e4\nthickness = 0.001\n")
+    words = ["sewn.obj", "--pins", "0,6", "--frames", "2", "--quiet", "--rest", "uv"]
+    own = ["--material", "silk.toml", "--thickness", "0.002"]
+    assert main([*words, "-o", "a.vtkhdf"]) == 2
+    assert "--uv-scale 0.01111 makes them equal" in capsys.readouterr().err
+    assert main([*words, *own, "--uv-scale", "0.01", "-o", "a.vtkhdf"]) == 0
+    made = Trajectory.load("a.vtkhdf")
+    material = Material(young_modulus=5e4, thickness=0.002)
+    assert list(made.provenance["material"].values())[:4] == [5e4, 0.485, 0.002, 426.0]
+    strain = StretchStVK(Cloth(SHEET, FACES, material, rest_uv=0.9 * SHEET[:, [0, 2]]))
+    value = strain.value_and_gradient(made.positions[1].copy())[0]
+    assert made.frame_fields["energy/strain"][1] == pytest.approx(value, rel=1e-9)
+    assert main(["sewn.obj", "--uv-scale", "0.01", "-o", "b.vtkhdf"]) == 2
+    assert "add --rest uv" in capsys.readouterr().err
 
 
 def test_the_chosen_minimiser_and_barriers_are_the_ones_that_ran(folder):

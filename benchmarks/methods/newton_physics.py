@@ -124,6 +124,8 @@ def build_model(cloth: Cloth, solver: str) -> Any:
     import newton
     import warp
 
+    if cloth.rest_uv is not None:
+        raise ValueError("newton takes the rest shape from positions in space: this cloth's is a UV chart")
     builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=(0.0, -GRAVITY, 0.0))
     builder.add_cloth_mesh(
         pos=warp.vec3(0.0, 0.0, 0.0),

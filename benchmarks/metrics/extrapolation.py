@@ -58,8 +58,6 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    from reference_sim import Cloth, Material
-
     scene, x, whole = roll_out.scene, roll_out.positions, roll_out.trajectory.positions
     bare = roll_out.group.kept(skinned)
     assert scene.dressed is not None and bare is not None
@@ -68,15 +66,12 @@ def measure(roll_out: RollOut) -> dict[str, float]:
         "motion/strain": worst,
         "motion/offset": MM * float(np.linalg.norm(whole - bare[: len(whole)], axis=2).max()),
     }
-    usual, there = Material(), roll_out.counterpart
+    garment, there = scene.dressed.garment, roll_out.counterpart
     if there is not None:
-        garment = scene.dressed.garment
-        found["motion/strain_ratio"] = worst / float(
-            strains(Cloth(garment.rest_positions, garment.faces, usual), there).max()
-        )
+        found["motion/strain_ratio"] = worst / float(strains(garment.cloth(), there).max())
     if scene.obstacle is not None:
         found["motion/penetration"] = 100.0 * float(geometry.inside_of(roll_out).share.mean())
-    if scene.cloth.material != usual and len(x) == scene.frames:
+    if scene.cloth.material != garment.material and len(x) == scene.frames:
         found["motion/total"] = float(energy.energies(roll_out)["total"][roll_out.judged].mean())
     if scene.glitch is not None and there is not None:
         apart = geometry.distance_rms(whole, there[: len(whole)])

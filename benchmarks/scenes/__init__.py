@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..presets import PRESETS
 from ..registry import by_name
@@ -52,9 +52,17 @@ FURTHER = (
 )
 
 
-def find_scene(name: str) -> Scene:
+def find_scene(name: str, garment: str = "tshirt") -> Scene:
     """The scene of that name, of those that hang on no motion of the run. Raises KeyError."""
-    return by_name("scene", (*SCENES, *FURTHER))[name]
+    return by_name("scene", (*SCENES, *further_scenes(garment)))[name]
+
+
+def further_scenes(garment: str) -> tuple[Scene, ...]:
+    """FURTHER with that garment on the body: of another than the T-shirt without those that tailor one."""
+    if garment == GARMENT_SCENES[0].garment:
+        return FURTHER
+    kept = (scene for scene in FURTHER if not scene.own_garment)
+    return tuple(replace(scene, garment=garment) if scene.dressed else scene for scene in kept)
 
 
 @dataclass(frozen=True)
@@ -96,23 +104,29 @@ GARMENT_SCENES = (
 )
 
 
-def of_garment(garment: str) -> GarmentScenes:
+def of_garment(garment: str, worn: tuple[GarmentScenes, ...] = GARMENT_SCENES) -> GarmentScenes:
     """The scenes of that garment. Raises KeyError."""
-    return {scenes.garment: scenes for scenes in GARMENT_SCENES}[garment]
+    return {scenes.garment: scenes for scenes in worn}[garment]
 
 
-def all_scenes(motions: Iterable[str], dynamic_motions: Iterable[str]) -> dict[str, Scene]:
+def all_scenes(
+    motions: Iterable[str],
+    dynamic_motions: Iterable[str],
+    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES,
+) -> dict[str, Scene]:
     """Every scene by name: those without a body, then dressed bodies in each test motion and in its clip.
 
     motions: those of the T-shirt, which can do the others too; dynamic_motions: those of garments that swing.
+    worn: the garments, the first in place of the T-shirt.
     """
     motions, dynamic = list(motions), list(dynamic_motions)
-    long = map(there_and_back, motions[:1])
+    first = worn[0].garment
+    long = [there_and_back(motion, first) for motion in motions[:1]]
     chosen = {False: [*motions, *dynamic], True: dynamic}
     dressed = [
         scenes.scene(motion, part)
-        for scenes in GARMENT_SCENES
+        for scenes in worn
         for motion in chosen[scenes.dynamic]
         for part in ("whole", "clip")
     ]
-    return by_name("scene", (*SCENES, *dressed, *long, *FURTHER))
+    return by_name("scene", (*SCENES, *dressed, *long, *further_scenes(first)))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim import Cloth, Material, Obstacle, Trajectory, simulate
+from reference_sim import Cloth, Obstacle, Trajectory, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
 from snug.garments import Garment
 from snug.motion import Motion
@@ -42,7 +42,7 @@ def build(scene: Scene, assets: Assets, *, settle_frames: int, warm_up_frames: i
         start = settled(cloth, energies, assets, garment, before, settle_frames)
         return moved_along(cloth, energies, body, garment, before.followed_by(motion.cut(0, 1)), start)
 
-    cloth = Cloth(garment.rest_positions, garment.faces, Material(), pins=garment.pins)
+    cloth = garment.cloth()
     handles = garment.body_transported(body, motion.poses, motion.translations)
     energies = declared_energies(cloth)
     obstacle = Obstacle(assets.posed_body(motion), body.faces, rest_positions=body.shaped())

@@ -126,13 +126,13 @@ DRAPES = tuple(
 )  # fmt: skip
 
 
-def there_and_back(motion: str) -> Scene:
+def there_and_back(motion: str, garment: str = "tshirt") -> Scene:
     """A motion forwards and backwards for a thousand frames."""
     return Scene(
-        name="tshirt/there_and_back",
+        name=f"{garment}/there_and_back",
         description=f"{motion} forwards and backwards for a thousand frames; networks alone",
         module="benchmarks.scenes.long_motion",
-        garment="tshirt",
+        garment=garment,
         motion=motion,
         part="loop",
         networks_only=True,

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 from snug.motion import Motion, transition
 from snug.motion_library import make_motion
@@ -37,7 +36,7 @@ def build(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> BuiltScene:
         early, late = np.arange(ENDS), np.arange(motion.frames - ENDS, motion.frames)
         kept = np.concatenate([early, late])
     garment = assets.garments[scene.garment]
-    cloth = Cloth(garment.rest_positions, garment.faces, Material(), pins=garment.pins)
+    cloth = garment.cloth()
     return BuiltScene(
         name=scene.name,
         cloth=cloth,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim import Cloth, Material, Obstacle
+from reference_sim import Obstacle
 from snug.motion import Motion, transition
 from snug.motion_library import make_motion
 from snug.skeleton import JOINT, axis_angles, rotation_matrices
@@ -48,9 +48,10 @@ def build(
     """
     body, garment = assets.body, assets.garments[scene.garment]
     motion, shape = CHANGES[change](make_motion(scene.motion), **options), _shape(body, betas, scene.name)
-    changed = {name: factor * getattr(Material(), name) for name, factor in (material or {}).items()}
-    cloth = Cloth(garment.rest_positions, garment.faces, replace(Material(), **changed))
+    changed = {name: factor * getattr(garment.material, name) for name, factor in (material or {}).items()}
+    cloth = garment.cloth(replace(garment.material, **changed))
     energies = declared_energies(cloth)
+    handles = garment.body_transported(body, motion.poses, motion.translations, shape)
 
     def settle() -> np.ndarray:
         if shape is None:
@@ -70,6 +71,7 @@ def build(
         origin_heights=body.joints(shape)[0, 1] + motion.translations[:, 1],
         dressed=Dressed(body, garment, motion, shape),
         glitch=GLITCH if change in ("root_jumps", "limb_flips") else None,
+        pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )
 
 

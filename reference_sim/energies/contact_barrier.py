@@ -153,8 +153,7 @@ class ContactBarrier(Energy):
 
 def _check_heights(cloth: Cloth, distance: float) -> None:
     """A barrier that reaches across a triangle would push the resting cloth apart."""
-    points = cloth.rest_positions if cloth.rest_uv is None else cloth.rest_uv
-    corners = points[cloth.faces]
+    corners = cloth.rest_corners
     edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
     heights = 2 * cloth.areas / edges.max(axis=1)
     face = int(np.argmin(heights))

@@ -1,0 +1,104 @@
+"""The command `python -m snug.check`: what will and what will not work of garments from files."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from snug.garment_file import GarmentFile, add_garment_options, garment_file
+
+if TYPE_CHECKING:
+    from snug.body import Body
+    from snug.garment_fit import Wearer
+
+PROGRAM = "snug.check"
+USABLE, UNUSABLE, UNREADABLE = 0, 1, 2
+MARKS = {"ok": "", "note": "note", "unusable": "NO"}
+EXAMPLES = """examples:
+  python -m snug.check shirt.obj                              on the body of the package
+  python -m snug.check shirt.obj dress.ply --body mine.npz    on your own
+  python -m snug.check shirt.obj --garment-units cm --garment-up z --picture shirt.png
+  python -m snug.check shirt.obj --garment-rest uv            its UV chart as rest shape
+
+beside a mesh: <name>.weights.npz with an array "weights" (V, 24), or the vertex properties weight_0 to
+weight_23 of a PLY, are skinning weights that are kept as they are.
+
+exit status: 0 all can be used, 1 one cannot, 2 one cannot be read"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """One clear line for a wrong word, in place of the whole usage."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(UNREADABLE, f"{PROGRAM}: {message}; see --help\n")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    parser = _Parser(
+        prog=f"python -m {PROGRAM}",
+        description="Read garments as benchmarks.run and snug.train do, and say in a short table what was "
+        "found: size, place on the body, rest shape, winding, openings, weights, and what mends them.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ, PLY, VTK, STL or OFF")
+    parser.add_argument("--body", metavar="FILE", help="an own body (default: that of the package)")
+    parser.add_argument(
+        "--picture", type=Path, metavar="OUT.png",
+        help="a picture of the (last) garment on the body, what is below the skin in red",
+    )  # fmt: skip
+    add_garment_options(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    options = make_parser().parse_args(arguments)
+    try:
+        return _run(options)
+    except (ValueError, OSError) as error:
+        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+        return UNREADABLE
+
+
+def _run(options: argparse.Namespace) -> int:
+    files = [garment_file(path, options) for path in options.files]
+    if options.picture and not options.picture.parent.is_dir():
+        raise ValueError(f"--picture {options.picture}: no such folder")
+    from snug.body import Body
+    from snug.garment_fit import Wearer
+
+    body = Body.from_file(options.body) if options.body else Body.load()
+    wearer = Wearer(body)
+    return max(_check(file, body, wearer, options.picture) for file in files)
+
+
+def _check(file: GarmentFile, body: Body, wearer: Wearer, picture: Path | None) -> int:
+    """Print the table of one file; its exit status."""
+    from snug.garment_reading import examine
+    from snug.garments import GarmentError
+
+    try:
+        reading = examine(file, wearer, body)
+    except GarmentError as error:
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        return UNREADABLE
+    print(f"{file.path}: {'cannot be used' if reading.unusable else 'can be used'}")
+    for finding in reading.findings:
+        remedy = f"; {finding.remedy}" if finding.remedy else ""
+        print(f"  {MARKS[finding.level]:<5}{finding.matter:<18}{finding.says}{remedy}")
+    if picture and reading.surface is not None and reading.distances is not None:
+        from snug.check_picture import draw
+
+        draw(picture, body, reading.surface, reading.distances)
+        print(f"  {picture}")
+    return UNUSABLE if reading.unusable else USABLE
+
+
+if __name__ == "__main__":
+    sys.exit(main())
