@@ -98,7 +98,8 @@ def armhole_cut(
     arm = skin[dominated_by(body, ("left_shoulder",))]
     under = arm[arm[:, 0] < shoulder[0] + ARMPIT_ROOM, 1].min(initial=shoulder[1]) - ARMPIT_ROOM
     shirt = skin[dominated_by(body, SHIRT_BONES)]
-    edge = strap + shirt[neck.beyond(shirt) > -clearance, 0].max(initial=0.0)
+    collar = skin[dominated_by(body, (*SHIRT_BONES, "neck"))]
+    edge = strap + clearance + collar[neck.beyond(collar) > -clearance, 0].max(initial=0.0)
     over = shirt[np.abs(shirt[:, 0] - edge) < ARMPIT_ROOM]
     top = over[:, 1].max(initial=shoulder[1]) + clearance
     flank = skin[dominated_by(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
