@@ -92,7 +92,7 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
 def test_an_example_of_extending_runs_as_written(title, extended, tmp_path):
     if title == "A garment":
         from snug.body import Body
-        from snug.garments import tailor_tshirt
+        from snug.garment_kinds import tailor_tshirt
 
         shirt = tailor_tshirt(Body.load(), vertices=300)
         lines = [f"v {x} {y} {z}" for x, y, z in shirt.rest_positions.tolist()]
