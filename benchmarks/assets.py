@@ -73,7 +73,7 @@ def open_assets(
     are cut to the preset's length.
     """
     from snug.body import Body
-    from snug.garments import find_template
+    from snug.garment_kinds import find_template
 
     from .clips import clip
 

@@ -46,12 +46,12 @@ class Suite:
 
 
 def _whole_motions(extent: Extent) -> list[str]:
-    """The first garment in each test motion; others where scenes are named, or at preset paper."""
+    """The first garment in each test motion; at preset paper also what swings; others where named."""
     first, *others = extent.motions.worn
     names = [first.scene(name).name for name in extent.motions.test]
     names += [there_and_back(name, first.garment).name for name in extent.motions.test[:1]]
     if extent.further:
-        names += [o.scene(name).name for o in others for name in extent.motions.dynamic_test]
+        names += [o.scene(name).name for o in others if o.dynamic for name in extent.motions.dynamic_test]
     return names
 
 

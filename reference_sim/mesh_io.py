@@ -23,6 +23,8 @@ MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
 TRAJECTORY_SUFFIXES = (".vtkhdf", ".hdf")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
+FARTHEST = 1e12  # in any unit: squares and cubes of it are still numbers
+LONGEST_HEADER = 1 << 16  # [bytes] of a PLY
 # What programs call the texture coordinates of a vertex: two numbers, or one array of both.
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 UV_ARRAYS = ("UV", "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
@@ -65,9 +67,10 @@ def read_mesh(path: str | Path) -> Surface:
         raise MeshError(f"{path}: no triangles in it: export the surface as triangles")
     if positions.ndim != 2 or positions.shape[1] != 3:
         raise MeshError(f"{path}: vertices have shape {positions.shape}: expected three coordinates each")
-    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(positions) < FARTHEST).all(axis=1))
     if bad.size:
-        raise MeshError(f"{path}: vertex {bad[0]} is not finite: {positions[bad[0]].tolist()}")
+        where = positions[bad[0]].tolist()
+        raise MeshError(f"{path}: vertex {bad[0]} is not finite, or farther than {FARTHEST:g}: {where}")
     corners = np.array([len(polygon) for polygon in polygons])
     if corners.max() > 4 or corners.min() < 3:
         k = int(np.argmax((corners > 4) | (corners < 3)))
@@ -173,6 +176,8 @@ def _read_with_meshio(path: Path) -> _Parts:
     import meshio
     import numpy as np
 
+    if path.suffix.lower() == ".ply":
+        _check_ply(path)
     printed = io.StringIO()
     try:
         # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
@@ -193,15 +198,36 @@ def _read_with_meshio(path: Path) -> _Parts:
     return _Parts(mesh.points, [polygon for block in kinds for polygon in block.data], vertex_data=data)
 
 
+def _check_ply(path: Path) -> None:
+    """Raises MeshError for a header that does not end, at which meshio would wait for ever, or that declares
+    more than there is.
+    """
+    size = path.stat().st_size
+    with open(path, "rb") as file:
+        head, end, _ = file.read(LONGEST_HEADER).partition(b"end_header")
+    if not end:
+        raise MeshError(f"{path}: cannot be read (no end of its header): export it again, as OBJ or PLY")
+    for name, count in re.findall(rb"element\s+(\w+)\s+(\d+)", head):
+        if int(count[:20]) > size:
+            raise MeshError(f"{path}: declares {count[:20].decode()} of {name.decode()} in {size} bytes")
+
+
 def _read_with_vtk(path: Path) -> _Parts | None:
     """Points and triangles of a file of PolyData, or None if it holds none."""
     import numpy as np
     import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
 
+    shown, told = vtkObject.GetGlobalWarningDisplay(), vtkLogger.GetCurrentVerbosityCutoff()
     try:
+        vtkObject.GlobalWarningDisplayOff()  # VTK would print many lines for a damaged file
+        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
         surface = pyvista.read(path)
     except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
+    finally:
+        vtkObject.SetGlobalWarningDisplay(shown)
+        vtkLogger.SetStderrVerbosity(told)
     if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
         return None
     if not surface.is_all_triangles:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from reference_sim.array_file import read_arrays
 from snug.formats.smpl_body import read_smpl
-from snug.skeleton import JOINT_NAMES, BodyError, joint_transforms
+from snug.skeleton import JOINT_NAMES, BodyError, joint_transforms, rotation_matrices
 
 BAKED = Path(__file__).parent / "data" / "body.npz"
 _CHUNK = 64  # frames skinned in one matrix product, to bound memory
@@ -29,6 +29,8 @@ class Body:
     template: (B, 3) [m]. shape_directions: (B, 3, S) [m], for one unit of each shape coefficient.
     skinning_weights: (B, 24), rows sum to one. joint_template: (24, 3) [m]. joint_directions: (24, 3, S) [m].
     faces: (F, 3), outward. parents: (24,), -1 for the root. joint_names: 24 names, the same for every body.
+    pose_directions: None, or (B, 3, 9 K) [m]: pose correctives, for one unit of each entry of R - I, row by
+    row, of the rotations R of joints 1 to K relative to their parents (SMPL, Loper et al. 2015, eq. 9).
     """
 
     template: NDArray[np.float64]
@@ -38,6 +40,7 @@ class Body:
     joint_directions: NDArray[np.float64]
     faces: NDArray[np.int64]
     parents: NDArray[np.int64]
+    pose_directions: NDArray[np.float64] | None = None
     joint_names: ClassVar[tuple[str, ...]] = JOINT_NAMES
 
     @staticmethod
@@ -50,10 +53,7 @@ class Body:
 
     @staticmethod
     def from_file(path: str | Path) -> "Body":
-        """A user's body: an .npz in SMPL's layout. Raises BodyError.
-
-        Needs v_template, shapedirs, weights, kintree_table, f; J_regressor, or J_template with J_shapedirs.
-        """
+        """A user's body: .npz or .pkl, see snug.formats.smpl_body. Raises BodyError."""
         return Body(**read_smpl(Path(path)))
 
     @property
@@ -92,6 +92,8 @@ class Body:
 
         def pose(poses: ArrayLike, translations: ArrayLike) -> NDArray[np.float64]:
             transforms = self.transforms(poses, translations, betas)
+            if self.pose_directions is not None:
+                return self._corrected(points[:, :3], np.asarray(poses, dtype=float), transforms)
             posed = np.empty((len(transforms), len(points), 3))
             for start in range(0, len(transforms), _CHUNK):
                 part = transforms[start : start + _CHUNK]
@@ -101,6 +103,21 @@ class Body:
             return posed
 
         return pose
+
+    def _corrected(
+        self, shaped: NDArray[np.float64], poses: NDArray[np.float64], transforms: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Posed vertices (T, B, 3) [m] with pose correctives: those of a frame change what is skinned."""
+        assert self.pose_directions is not None
+        count = self.pose_directions.shape[2]
+        entries = (rotation_matrices(poses[:, 1 : 1 + count // 9]) - np.eye(3)).reshape(len(poses), -1)
+        directions = self.pose_directions.reshape(-1, count)
+        posed = np.empty((len(poses), *shaped.shape))
+        for frame, moved in enumerate(transforms):
+            rest = shaped + (directions @ entries[frame]).reshape(-1, 3)
+            blended = (self.skinning_weights @ moved.reshape(len(moved), -1)).reshape(-1, 3, 4)
+            posed[frame] = np.einsum("vab,vb->va", blended[..., :3], rest) + blended[..., 3]
+        return posed
 
     def transforms(
         self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None

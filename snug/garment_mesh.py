@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snug.body import Body
+from snug.garment_cuts import SEAM, CutPlane, cut_sheet, outlines
 from snug.remeshing import boundary_loops, corner_angles, remesh, triangle_areas
-from snug.tailoring import CutPlane, ImplicitSurface, cut_sheet, outlines
+from snug.tailoring import ImplicitSurface
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -27,11 +28,14 @@ def mesh_garment(
     except ValueError as error:
         raise ValueError(f"nothing fits this body: {error}") from error
     found = sorted(name for loop in curves for name, _ in loop)
-    if found != sorted(["seam", *(cut.name for cut in cuts)]):  # the seam runs down the front and the back
+    wanted = [cut.name for cut in cuts]  # the seam runs down front and back; of trousers the two are one
+    if found not in (sorted([SEAM, *wanted]), sorted(wanted)) or [SEAM] in [
+        [n for n, _ in c] for c in curves
+    ]:
         raise ValueError(f"nothing fits this body: the cuts of its surface are {', '.join(found)}")
     rims = [[curve for _, curve in loop] for loop in curves]
     # An opening that the seam does not meet has a twin on the other side.
-    openings = sum(2 if len(loop) == 1 else sum(name != "seam" for name, _ in loop) for loop in curves)
+    openings = sum(2 if len(loop) == 1 else sum(name != SEAM for name, _ in loop) for loop in curves)
     # V = 2 half - seam, and only the mesh tells how many vertices its seam has; some sizes come out unsound.
     half, tried, problem = vertices // 2 + int(0.57 * np.sqrt(vertices)), set[int](), ""
     while len(tried) < 16:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from reference_sim.array_file import ArrayFileError, read_arrays
 from reference_sim.closest_point import FaceTree
 from snug.body import Body
-from snug.garments import SKIRT_SMOOTHING, GarmentError, smooth_weights
+from snug.garment_kinds import SKIRT_SMOOTHING
+from snug.garments import GarmentError, smooth_weights
 from snug.skeleton import JOINT_NAMES
 from snug.tailoring import dominated_by, joint
 

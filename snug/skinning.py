@@ -74,6 +74,20 @@ def joint_transforms(
     return torch.cat([turn, shift[..., None]], dim=-1)
 
 
+def corrected(points: Tensor, directions: Tensor, transforms: Tensor, parents: Sequence[int]) -> Tensor:
+    """Points (..., P, 3) [m] of the rest pose with the pose correctives of these transforms (..., J, 3, 4).
+
+    directions: (P, 3, 9 K) [m], see snug.body.Body; the rotations of joints 1 to K relative to their parents
+    are read back from the transforms.
+    """
+    count = directions.shape[2] // 9
+    world = transforms[..., :3]
+    above = world[..., [int(parents[joint]) for joint in range(1, count + 1)], :, :]
+    relative = above.transpose(-1, -2) @ world[..., 1 : count + 1, :, :]
+    entries = (relative - torch.eye(3, dtype=world.dtype, device=world.device)).flatten(-3)
+    return points + (entries @ directions.flatten(0, 1).T).unflatten(-1, (-1, 3))
+
+
 def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
     """Linear blend skinning: x_i = sum_j w_ij T_j p_i.
 

@@ -8,7 +8,8 @@ So the solid is a union of three solids, each grown by its own distance:
   cloth hangs from its widest support; a flare widens it further, from the waist to the hem;
 - the upper arm, one convex section per distance from the shoulder.
 
-A skirt is the same without sleeves, hanging from its waistband and widening from the hips on.
+A skirt is the same without sleeves, hanging from its waistband and widening from the hips on. Of trousers the
+torso ends at the crotch and a leg begins, one convex section per height.
 
 Convex sections grown by d have 2 pi d more girth (Steiner's formula), so ease of girth e is a growth of
 e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. Only the half x >= 0 is built;
@@ -17,14 +18,12 @@ the other half is its mirror image, so the garment is exactly symmetric.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from snug.body import Body
-from snug.remeshing import boundary_loops
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -32,8 +31,15 @@ Index = NDArray[np.int64]
 SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
 DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
+CROTCH_FILLET = 0.03  # [m] the same between torso and leg
+SEAT = 0.06  # [m] by which their seat is narrower at the crotch
+TAPER = 0.4  # how steeply trousers may narrow from the seat to the thighs
+MOST_CELLS = 4e6  # of the grid: a person takes a tenth
 TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
+# What a shirt may borrow weights from: never hands, head or shins, even where they come near.
+SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
 ARM_BONES = ("left_shoulder", "left_elbow")
+LEG_BONES = ("left_hip", "left_knee")
 
 
 def dominated_by(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
@@ -123,9 +129,12 @@ def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
 
 def _torso(
     body: Body, edges: Index, points: Array, nodes: Sequence[Array], levels: tuple[float, float, float],
-    ease: float, flare: float, clearance: float, normals: Array,
+    ease: float, flare: float, clearance: float, normals: Array, narrowing: float,
 ) -> Array:  # fmt: skip
-    """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m]."""
+    """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m].
+
+    narrowing: how much [m/m] they may come nearer again on the way down.
+    """
     x, y, z = nodes
     support = _filled(_section_support(points, edges, y, 1, normals))
     mirrored = (DIRECTIONS // 2 - np.arange(DIRECTIONS)) % DIRECTIONS
@@ -134,7 +143,8 @@ def _torso(
     )  # a body that is not quite symmetric: both of its sides
     hang, waist, hem = levels
     below = np.flatnonzero(y <= hang)
-    support[below] = np.maximum.accumulate(support[below][::-1], axis=0)[::-1]
+    fall = narrowing * y[below, None]
+    support[below] = np.maximum.accumulate((support[below] - fall)[::-1], axis=0)[::-1] + fall
     smooth = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
     support[below] = np.maximum(smooth, support)[below]
     growth = clearance + ease / (2 * np.pi) * _ramp(y, hang, waist)
@@ -159,33 +169,72 @@ def _sleeve(
     return np.maximum(field, (shoulder - x)[:, None, None])
 
 
+def _leg(
+    body: Body, edges: Index, points: Array, nodes: Sequence[Array], crotch: float, ease: float,
+    clearance: float, normals: Array,
+) -> Array:  # fmt: skip
+    """Field (nx,ny,nz) of the left leg of trousers."""
+    x, y, z = nodes
+    hip, knee = joint(body, "left_hip")[1], joint(body, "left_knee")[1]
+    support = _filled(_section_support(points, edges, y, 1, normals))
+    support = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
+    # Legs that part once do not meet again above: up from the knee the inner side only comes nearer.
+    above, inner = np.flatnonzero(y >= knee), normals[:, 0] < 0
+    support[np.ix_(above, inner)] = np.maximum.accumulate(support[np.ix_(above, inner)], axis=0)
+    growth = clearance + ease / (2 * np.pi) * _ramp(-y, -crotch, -knee)
+    plane = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    field = _tube(support, growth, plane, normals).reshape(len(y), len(x), len(z)).transpose(1, 0, 2)
+    return np.maximum(field, (y - hip)[None, :, None])
+
+
+def legs_part(body: Body, room: float) -> float:
+    """Height [m] below which trousers have two legs: `room` [m] between the left thigh's skin and x = 0."""
+    points = np.asarray(body.template, dtype=np.float64)
+    edges = _edges(body, LEG_BONES)
+    levels = np.arange(joint(body, "left_knee")[1], joint(body, "left_hip")[1], 0.5 * SPACING)
+    inner = _filled(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
+    near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
+    return float(levels[near[0]] if len(near) else levels[-1])
+
+
+def _edges(body: Body, bones: Sequence[str]) -> Index:
+    """Edges (E,2) of the body between vertices that follow `bones`. Errors: ValueError for none."""
+    faces = np.asarray(body.faces, dtype=np.int64)
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    found = edges[dominated_by(body, bones)[edges].all(axis=1)]
+    if not len(found):
+        raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")
+    return found
+
+
 def build_surface(
     body: Body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
-    flare: float = 0.0,
+    flare: float = 0.0, waistband: bool = False, legs: bool = False,
 ) -> ImplicitSurface:  # fmt: skip
-    """The surface between heights `hem` and `top`, of a shirt out to x = `cuff`, else of a skirt (all [m]).
+    """The surface between heights `hem` and `top`, of a garment with sleeves out to x = `cuff` (all [m]).
 
     `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin, or
-    to the hips of a skirt; `flare` [m] is how much further the hem stands off than that place, all around.
+    to hips and legs of what hangs from a `waistband`; `flare` [m] is how much further the hem stands off than
+    that place, all around. legs: as trousers. Raises ValueError for a body too large for the grid.
     """
     import igl
 
     points = np.asarray(body.template, dtype=np.float64)
     faces = np.asarray(body.faces, dtype=np.int64)
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    torso = dominated_by(body, TORSO_BONES)
-    arm = dominated_by(body, ARM_BONES)
-    torso_edges, arm_edges = edges[torso[edges].all(axis=1)], edges[arm[edges].all(axis=1)]
-    skirt = cuff is None
-    hang = top if skirt else points[dominated_by(body, ARM_BONES[:1]), 1].min()
-    levels = hang, joint(body, "pelvis" if skirt else "spine1")[1], hem
+    torso_edges, arm_edges, leg_edges = (_edges(body, b) for b in (TORSO_BONES, ARM_BONES, LEG_BONES))
+    torso, arm, leg = (dominated_by(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
+    hang = top if waistband else points[dominated_by(body, ARM_BONES[:1]), 1].min()
+    levels = hang, joint(body, "pelvis" if waistband else "spine1")[1], hem
     margin = 0.04
-    depth = points[torso | arm, 2]
+    depth = points[torso | (leg if legs else arm), 2]
     reach = clearance + ease + flare + 2 * margin
-    side = points[torso, 0].max() + reach if cuff is None else cuff + margin
+    side = points[torso | leg if legs else torso, 0].max() + reach if cuff is None else cuff + margin
     low = np.array([0.0, hem - margin, depth.min() - reach])
     high = np.array([side, top + margin, depth.max() + reach])
     counts = np.ceil((high - low) / SPACING).astype(int) + 1
+    if not 0 < np.prod(counts.astype(float)) <= MOST_CELLS:
+        size = " x ".join(f"{length:.3g}" for length in high - low)
+        raise ValueError(f"half of it would be {size} m: give a body in metres, with its joints inside")
     nodes = [low[i] + SPACING * np.arange(counts[i]) for i in range(3)]
     angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -195,10 +244,16 @@ def build_surface(
     # promised about clearance is enforced on the finished mesh.
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
-    hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals)
+    hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals, TAPER * legs)
     if cuff is not None:
         sleeve = _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals)
         hanging = _smooth_minimum(hanging, sleeve, ARMPIT_FILLET)
+    if legs:
+        crotch = legs_part(body, clearance + ease / (2 * np.pi))
+        tube = _leg(body, leg_edges, points, nodes, crotch, ease, clearance, normals)
+        hanging = _smooth_minimum(
+            np.maximum(hanging, (crotch - nodes[1])[None, :, None]), tube, CROTCH_FILLET
+        )
     values = np.minimum(hanging, distance - clearance)  # a blend would add girth wherever both agree
     ghost = 3
     values = np.pad(values, ((ghost, 0), (0, 0), (0, 0)), mode="reflect")
@@ -208,90 +263,3 @@ def build_surface(
     values = 2 * soft - ndimage.gaussian_filter(soft, 1.0)
     origin = low - [ghost * SPACING, 0, 0]
     return ImplicitSurface(origin, SPACING, values, ndimage.spline_filter(values, order=3))
-
-
-@dataclass(frozen=True)
-class CutPlane:
-    """A plane through `point` (3,) [m]: on the side of its `normal` (3,), what has |x| < reach [m] is cut.
-
-    bend [1/m] curves it in z: bend (z - z0)^2 [m] beyond the plane.
-    """
-
-    name: str
-    normal: tuple[float, float, float]
-    point: tuple[float, float, float]
-    reach: float = np.inf
-    bend: float = 0.0
-
-    def beyond(self, points: Array) -> Array:
-        """How far (N,) [m] points (N,3) are on the side that is cut away; a distance to first order."""
-        offset = points - self.point
-        height = offset @ np.asarray(self.normal) + self.bend * offset[:, 2] ** 2
-        return np.minimum(
-            height / np.linalg.norm(self._slope(points), axis=1), self.reach - np.abs(points[:, 0])
-        )
-
-    def normals(self, points: Array) -> Array:
-        """Unit normals (N,3) at points (N,3) of the cut."""
-        slope = self._slope(points)
-        return slope / np.linalg.norm(slope, axis=1, keepdims=True)
-
-    def _slope(self, points: Array) -> Array:
-        slope = np.tile(np.asarray(self.normal), (len(points), 1))
-        slope[:, 2] += 2 * self.bend * (points[:, 2] - self.point[2])
-        return slope
-
-
-def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, Index]:
-    """The surface as a dense mesh between the cuts: points (N,3) [m], faces (M,3), wound outward."""
-    import pyvista
-
-    grid = pyvista.ImageData(
-        dimensions=surface.values.shape,
-        spacing=(surface.spacing,) * 3,
-        origin=tuple(map(float, surface.origin)),
-    )
-    grid["field"] = surface.values.ravel(order="F")
-    sheet = grid.contour([0.0], scalars="field")
-    for cut in cuts:
-        sheet["cut"] = cut.beyond(np.asarray(sheet.points, dtype=np.float64))
-        sheet = sheet.clip_scalar(scalars="cut", value=0.0)
-        # Clipping interpolates linearly along edges: onto a bent cut by one Newton step.
-        points = np.asarray(sheet.points, dtype=np.float64)
-        off = cut.beyond(points)
-        near = np.abs(off) < 2e-4
-        points[near] -= off[near, None] * cut.normals(points[near])
-        sheet.points = points
-    sheet = sheet.triangulate().clean(tolerance=1e-6).connectivity("largest")
-    points = np.asarray(sheet.points, dtype=np.float64)
-    faces = np.asarray(sheet.regular_faces, dtype=np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    if np.sum(np.cross(b - a, c - a) * surface.gradient((a + b + c) / 3)) < 0:
-        faces = faces[:, ::-1]
-    return points, faces
-
-
-def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tuple[str, Array]]]:
-    """Per boundary loop of a cut sheet its named curves (P,3) [m], end to end along the winding.
-
-    Errors: ValueError where the surface is open but no cut was made.
-    """
-    found = []
-    for loop in boundary_loops(faces):
-        distance = np.abs(np.stack([cut.beyond(points[loop]) for cut in cuts]))
-        on = distance < 1e-5
-        corners = np.flatnonzero(on.sum(axis=0) > 1)
-        if len(corners) == 0:
-            found.append([(cuts[int(np.argmin(distance.sum(axis=1)))].name, points[loop])])
-            continue
-        loop, on = np.roll(loop, -corners[0]), np.roll(on, -corners[0], axis=1)
-        stops = [*np.flatnonzero(on.sum(axis=0) > 1), len(loop)]
-        ring = np.append(loop, loop[0])
-        curves = []
-        for begin, end in pairwise(stops):
-            middle = np.flatnonzero(on[:, begin + 1 : end].all(axis=1))
-            if len(middle) != 1 or end - begin < 2:
-                raise ValueError("the surface has an opening that no cut made")
-            curves.append((cuts[int(middle[0])].name, points[ring[begin : end + 1]]))
-        found.append(curves)
-    return found

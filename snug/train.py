@@ -17,7 +17,8 @@ from snug.train_options import check, parse
 
 if TYPE_CHECKING:
     from snug.body import Body
-    from snug.garments import Garment, GarmentTemplate
+    from snug.garment_kinds import GarmentTemplate
+    from snug.garments import Garment
     from snug.parallel import Group
     from snug.trained_model import TrainedModel
 
@@ -36,7 +37,7 @@ def _run(options: argparse.Namespace) -> int:
 
     from snug.body import Body
     from snug.device import find_device
-    from snug.garments import TSHIRT, find_template
+    from snug.garment_kinds import TSHIRT, find_template
     from snug.parallel import join_group, leave_group
     from snug.training_run import Interrupted
 
@@ -72,7 +73,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _of_file(path: str, options: argparse.Namespace) -> GarmentTemplate:
     """A garment that is read instead of tailored, whatever number of vertices is asked for."""
-    from snug.garments import GarmentTemplate
+    from snug.garment_kinds import GarmentTemplate
 
     file = garment_file(path, options)
 

@@ -83,7 +83,9 @@ class Trainer:
         )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
-        self.shaped = bool(recipe.shape_range) and how.features == "motion" and how.physics
+        self.shaped = (
+            bool(recipe.shape_range and dressed.body.shape_count) and how.features == "motion" and how.physics
+        )
         self.windows = recipe.batch if how.sequences else recipe.batch * recipe.window
         self.order = np.empty(0, np.int64)
         self.epoch = 0

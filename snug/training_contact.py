@@ -19,7 +19,7 @@ from reference_sim.energies import ContactPenalty
 from snug.contact import ContactCache, Patch
 from snug.loss import Planes
 from snug.parallel import ALONE, Group
-from snug.skinning import skin
+from snug.skinning import corrected, skin
 from snug.tensor_contact_cache import TensorContactCache
 from snug.training_set import Batch, TrainingSet
 
@@ -66,6 +66,10 @@ class TrainingContact:
             torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
             for array in (body.skinning_weights, body.template, body.shape_directions)
         )
+        self.correctives: Tensor | None = None
+        if body.pose_directions is not None:
+            correctives = body.pose_directions[vertices]
+            self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
         self._mean_shape: tuple[np.ndarray, np.ndarray] | None = None
@@ -74,6 +78,15 @@ class TrainingContact:
         self._changed = np.zeros(frames, bool)
         self._before: tuple[Any, ...] | None = None
         self._credit = 0.0
+
+    def _skinned(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
+        """Patch positions (..., P, 3) of unposed ones, with pose correctives; or of `every` so many."""
+        rest = rest[..., ::every, :]
+        if self.correctives is not None:
+            parents = self.data.dressed.parents
+            directions = self.correctives[::every].to(rest.device)
+            rest = corrected(rest, directions, transforms, parents)
+        return skin(rest, self.weights[::every].to(rest.device), transforms)
 
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
         """Patch positions and normals (F, P, 3) of every frame: one body shape, computed once."""
@@ -84,6 +97,9 @@ class TrainingContact:
         positions = np.empty((self.data.frames, *self.template.shape), np.float32)
         for start in range(0, self.data.frames, TOGETHER):
             transforms = self.data.transforms[start : start + TOGETHER]  # (C, 24, 3, 4)
+            if self.correctives is not None:
+                positions[start : start + TOGETHER] = self._skinned(self.template, transforms).numpy()
+                continue
             columns = transforms.permute(1, 3, 0, 2).reshape(spread.shape[1], -1)  # (96, 3 C)
             posed = (spread @ columns).view(len(spread), len(transforms), 3)
             positions[start : start + TOGETHER] = posed.transpose(0, 1).numpy()
@@ -93,9 +109,9 @@ class TrainingContact:
     def _marks(self) -> np.ndarray:
         """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]; to propagate by."""
         # On the CPU whatever the device, so that processes that share a run propagate alike.
-        rest, weights = self.template[::MARKED].cpu(), self.weights[::MARKED].cpu()
+        rest = self.template.cpu()
         parts = self.data.transforms.split(TOGETHER)
-        return np.concatenate([skin(rest, weights, part.cpu()).numpy() for part in parts])
+        return np.concatenate([self._skinned(rest, part.cpu(), MARKED).numpy() for part in parts])
 
     def posed(self, batch: Batch) -> Posed:
         """The body where the frames of a batch have it."""
@@ -104,7 +120,7 @@ class TrainingContact:
         rest = self.template
         if batch.betas is not None:
             rest = (rest + torch.einsum("vis,ns->nvi", self.directions, batch.betas))[:, None]
-        positions = skin(rest, self.weights, batch.transforms).flatten(0, 1)
+        positions = self._skinned(rest, batch.transforms).flatten(0, 1)
         rows = np.arange(len(positions))
         if isinstance(self.cache, TensorContactCache):
             return rows, positions, self.cache.normals(positions)

@@ -98,7 +98,7 @@ class TrainingSet:
         std = self.features.std(0, correction=0).cpu().numpy()
         std = np.where(std < CONSTANT, np.inf, np.maximum(std, STD_FLOOR))
         shapes = self.dressed.body.shape_count
-        if self.recipe.shape_range and self._ends_in_shape:
+        if shapes and self.recipe.shape_range and self._ends_in_shape:
             mean[-shapes:], std[-shapes:] = 0.0, self.recipe.shape_range / np.sqrt(3.0)
         return mean, std
 

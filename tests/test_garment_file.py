@@ -23,7 +23,8 @@ from snug import check
 from snug.body import Body
 from snug.dressed_body import DressedBody
 from snug.garment_file import GarmentFile, add_garment_options, demand_a_file, garment_file
-from snug.garments import GarmentError, tailor_skirt, tailor_tshirt
+from snug.garment_kinds import tailor_skirt, tailor_tshirt
+from snug.garments import GarmentError
 
 
 @pytest.fixture(scope="session")

@@ -1,19 +1,18 @@
 """Tailored garments: topology, even triangles, room around the body, ease, flare, borrowed weights."""
 
+import dataclasses
+import time
+
 import igl
 import numpy as np
 import pytest
 from meshes import edge_counts, girth
+from other_bodies import BODIES, other_mesh, simulate_walk
 
 from snug.body import Body
-from snug.garments import (
-    GARMENT_TEMPLATES,
-    GarmentError,
-    find_template,
-    smooth_weights,
-    tailor_tshirt,
-    tailor_tunic,
-)
+from snug.garment_cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
+from snug.garment_kinds import GARMENT_TEMPLATES, find_template, tailor_tshirt, tailor_tunic
+from snug.garments import GarmentError, smooth_weights
 
 WAIST = "spine1"
 
@@ -148,7 +147,7 @@ def test_the_tunic_is_longer_and_flares_by_what_is_asked(body, shirts):
 
 def test_patterns_are_found_by_name(body):
     assert find_template("tunic").tailor is tailor_tunic
-    with pytest.raises(GarmentError, match=r"'gown'.*tshirt, tunic, skirt"):
+    with pytest.raises(GarmentError, match=r"'gown'.*tshirt, tunic, skirt.*dress"):
         find_template("gown")
     with pytest.raises(GarmentError, match=r"flare=0\.5: a tunic"):
         tailor_tunic(body, flare=0.5)
@@ -246,3 +245,149 @@ def test_a_parameter_out_of_range_is_named(body, wrong, says):
 def test_negative_smoothing_is_refused(shirt):
     with pytest.raises(GarmentError, match="iterations=-1"):
         smooth_weights(shirt.skinning_weights, shirt.faces, -1)
+
+
+SLEEVES = {"neck", "left_sleeve", "right_sleeve", "hem"}
+ARMHOLES = {"neck", "left_armhole", "right_armhole", "hem"}
+LEGS = {"waist", "left_leg", "right_leg"}
+OPENINGS = {
+    "tshirt": SLEEVES, "tunic": SLEEVES, "long_sleeves": SLEEVES, "tank_top": ARMHOLES, "dress": ARMHOLES,
+    "skirt": {"waist", "hem"}, "trousers": LEGS, "shorts": LEGS,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def another(body):
+    return other_mesh(body, 5000)
+
+
+def at(body, name):
+    return body.joint_template[body.joint_names.index(name)]
+
+
+def test_every_kind_has_its_openings_and_no_other(garment):
+    _, edges, counts = edge_counts(garment.faces)
+    assert set(garment.loops) == OPENINGS[garment.name] and counts.max() == 2
+    # A sphere with so many holes.
+    characteristic = len(garment.rest_positions) - len(edges) + len(garment.faces)
+    assert characteristic == 2 - len(garment.loops)
+    points = garment.rest_positions
+    for name, loop in garment.loops.items():
+        side = {"left": 1, "right": -1}.get(name.partition("_")[0], 0)
+        assert np.sign(np.round(points[loop, 0].mean(), 6)) == side, name
+    assert set(garment.pins) == set(garment.loops.get("waist", ()))
+    assert len(garment.hem) == len(set(garment.hem.tolist())) > 0
+
+
+def test_every_kind_is_clear_of_the_body(body, garment):
+    distance = igl.signed_distance(garment.rest_positions, body.template, body.faces)[0]
+    assert distance.min() >= garment.parameters["clearance"] - 1e-9
+
+
+def test_legs_are_as_long_as_asked_and_each_follows_its_own(body, wardrobe):
+    points = {name: wardrobe[name].rest_positions for name in ("shorts", "trousers")}
+    heights = {name: points[name][wardrobe[name].loops["left_leg"], 1] for name in points}
+    ankle = at(body, "left_ankle")[1]
+    # Two equations for the crotch, from which both inseams are measured.
+    shares = {name: wardrobe[name].parameters["length"] for name in points}
+    crotch = {name: (heights[name].mean() - shares[name] * ankle) / (1 - shares[name]) for name in points}
+    assert crotch["shorts"] == pytest.approx(crotch["trousers"], abs=0.03)  # they differ in ease
+    assert ankle < heights["trousers"].mean() < at(body, "left_knee")[1] < heights["shorts"].mean()
+    for name in points:
+        assert np.ptp(heights[name]) < 1e-4
+        below = points[name][:, 1] < crotch[name] - 0.05
+        assert np.abs(points[name][below, 0]).min() > 0.005  # apart
+        weights = wardrobe[name].skinning_weights[below & (points[name][:, 0] > 0)]
+        foreign = [body.joint_names.index(f"right_{joint}") for joint in ("hip", "knee")]
+        assert weights[:, foreign].max() < 0.2 and np.allclose(weights.sum(axis=1), 1.0)
+
+
+def test_arms_are_bare_or_covered_to_the_wrist(body, wardrobe):
+    shoulder, wrist = at(body, "left_shoulder")[0], at(body, "left_wrist")[0]
+    reach = {name: wardrobe[name].rest_positions[:, 0].max() for name in ("long_sleeves", "tank_top")}
+    share = wardrobe["long_sleeves"].parameters["sleeve"]
+    assert reach["long_sleeves"] == pytest.approx(shoulder + share * (wrist - shoulder), abs=1e-4)
+    top = wardrobe["tank_top"].rest_positions
+    armhole = top[wardrobe["tank_top"].loops["left_armhole"]]
+    assert np.ptp(armhole[:, 1]) > 0.12 and armhole[:, 0].max() < shoulder + 0.1
+    strongest = np.argmax(wardrobe["long_sleeves"].skinning_weights, axis=1)
+    assert body.joint_names.index("left_elbow") in strongest
+
+
+def test_a_dress_follows_both_thighs_below_and_the_skin_above(body, wardrobe):
+    dress = wardrobe["dress"]
+    own = body.skinning_weights[dress.body_vertices]
+    y, hip = dress.rest_positions[:, 1], at(body, "left_hip")[1]
+    assert np.array_equal(dress.skinning_weights[y > hip + 0.05], own[y > hip + 0.05])
+    _, edges, _ = edge_counts(dress.faces)
+    low = (y[edges] < hip - 0.06).all(axis=1)
+    steps, borrowed = (
+        np.abs(w[edges[low, 0]] - w[edges[low, 1]]).max() for w in (dress.skinning_weights, own)
+    )
+    assert steps < 0.2 and borrowed > 0.5
+    assert np.allclose(dress.skinning_weights.sum(axis=1), 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [pattern.name for pattern in GARMENT_TEMPLATES])
+def test_every_kind_fits_another_mesh(another, kind):
+    garment = find_template(kind).tailor(another, vertices=500)
+    assert set(garment.loops) == OPENINGS[kind]
+
+
+def test_a_neck_is_cut_above_high_shoulders(body):
+    """Lower neck joint by 4 cm: then the shoulders are as high beside it as they are on other bodies."""
+    joints = body.joint_template.copy()
+    joints[body.joint_names.index("neck"), 1] -= 0.04
+    low = dataclasses.replace(body, joint_template=joints)
+    neck = neck_cut(low, 0.015)
+    assert neck.point[1] > joints[body.joint_names.index("neck"), 1] + 0.005
+    assert neck_cut(body, 0.015).point[1] == at(body, "neck")[1]
+    shirt = tailor_tshirt(low, vertices=500)
+    assert np.abs(shirt.rest_positions[shirt.loops["neck"], 0]).max() < neck.reach - 0.005
+
+
+def test_the_bend_of_a_cut_ends(body):
+    cut = CutPlane("neck", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), bend=3.0)
+    z = np.linspace(-0.5, 0.5, 2001)
+    points = np.stack([0 * z, 0 * z, z], axis=1)
+    height = cut.height(points)
+    near, far = np.abs(z) <= BEND_SPAN, np.abs(z) >= 2 * BEND_SPAN
+    assert np.array_equal(height[near], 3.0 * z[near] ** 2)
+    assert height[far] == pytest.approx(6.0 * BEND_SPAN**2)
+    slope = cut.normals(points)
+    assert slope[:, 2] / slope[:, 1] == pytest.approx(np.gradient(height, z), abs=4e-3)
+
+
+def test_a_corner_that_clipping_left_twice_counts_once():
+    """A square with a second corner 10 micrometres from one: on both cuts too."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [1e-6, 1, 0], [0, 1, 0], [0, 0.5, 0], [0.5, 1, 0],
+                       [0.5, 0, 0], [1, 0.5, 0], [0.5, 0.5, 0]])  # fmt: skip
+    ring = [0, 7, 1, 8, 2, 6, 3, 4, 5]
+    faces = np.array([[9, a, b] for a, b in zip(ring, np.roll(ring, -1), strict=True)])
+    cuts = [
+        SEAM_CUT, CutPlane("top", (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+        CutPlane("side", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        CutPlane("hem", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
+    ]  # fmt: skip
+    (loop,) = outlines(points, faces, cuts)
+    assert sorted(name for name, _ in loop) == ["hem", "seam", "side", "top"]
+
+
+def test_a_body_too_large_for_the_grid_is_refused_at_once(body):
+    joints = body.joint_template.copy()
+    joints[body.joint_names.index("left_elbow"), 0] = 1e6
+    clock = time.perf_counter()
+    with pytest.raises(GarmentError, match="metres") as caught:
+        tailor_tshirt(dataclasses.replace(body, joint_template=joints))
+    assert "\n" not in str(caught.value) and time.perf_counter() - clock < 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vertices", [500, 1000])
+@pytest.mark.parametrize("wearer", BODIES)
+@pytest.mark.parametrize("kind", [pattern.name for pattern in GARMENT_TEMPLATES])
+def test_every_kind_on_every_body_is_simulated(kind, wearer, vertices, tmp_path):
+    simulated = simulate_walk(
+        find_template(kind).tailor(BODIES[wearer](), vertices=vertices), BODIES[wearer]()
+    )
+    assert simulated.status == "converged" and simulated.frames == 30

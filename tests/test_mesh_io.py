@@ -63,6 +63,7 @@ def test_texture_coordinates_and_vertex_colours_change_nothing(tmp_path):
     assert surface.faces.tolist() == [[0, 1, 2]]
 
 
+PLY = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nelement face {}\nend_header\n"
 SEAM = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 5 0\nvt 6 1\nvt 5 1\n"
 
 
@@ -101,9 +102,13 @@ def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path, su
         ("a.obj", None, "no such file"),
         ("a.fbx", "x", "unknown kind of mesh: convert it to one of .obj"),
         ("a.ply", "rubbish\n", "cannot be read"),
+        ("a.ply", "ply\nformat ascii 1.0\ncomment cut off", "no end of its header"),
+        ("a.ply", PLY.format(10**12, 1), "declares 1000000000000 of vertex in"),
+        ("a.ply", PLY.format(3, 10**30), "declares 10000000000000000000 of face in"),
         ("a.vtk", "rubbish\n", "cannot be read"),
         ("a.obj", "# a mesh\nv 0 0 zero\n", "line 2 is not understood: 'v 0 0 zero'"),
         ("a.obj", "v 0 0 0\nv 1 0 0\n", "no triangles in it"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1e300 0\nf 1 2 3\n", "vertex 2 is not finite, or farther than"),
         ("a.obj", "v 0 0\n", "line 1 is not understood: 'v 0 0'"),
         ("a.obj", SEAM + "f 1 2 9\n", "triangle 0 names a vertex beyond the 4"),
         ("a.obj", SEAM + "f 1 2 -9\n", "triangle 0 names a vertex beyond the 4"),
@@ -125,7 +130,8 @@ def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, capfd, name, text, wor
     with pytest.raises(MeshError, match=words) as caught:
         read_mesh(path)
     assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
-    assert capfd.readouterr().out == ""
+    printed = capfd.readouterr()
+    assert printed.out == printed.err == ""
 
 
 def test_a_sequence_follows_the_numbers_in_its_names(tmp_path):

@@ -26,7 +26,7 @@ from benchmarks.tasks.task import Context, Outcome
 from reference_sim import Trajectory
 from snug.body import Body
 from snug.dressed_body import DressedBody
-from snug.garments import find_template
+from snug.garment_kinds import find_template
 from snug.motion_library import make_motion
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions, rotation_matrices

@@ -16,7 +16,8 @@ from benchmarks.tasks.ground_truth import SimulateQuasiStatic
 from reference_sim import Trajectory
 from snug.body import Body
 from snug.dressed_body import DressedBody
-from snug.garments import GarmentError, tailor_skirt, tailor_tshirt
+from snug.garment_kinds import tailor_skirt, tailor_tshirt
+from snug.garments import GarmentError
 from snug.motion_library import make_motion
 from snug.recipe import DEFAULT
 from snug.rollout import roll_out

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from snug.garments import TSHIRT
+from snug.garment_kinds import TSHIRT
 
 from ..assets import embedded_motions, open_assets
 from ..methods.simulation import Simulation

@@ -22,7 +22,7 @@ def dressed_body(vertices: int) -> DressedBody:
     """The body in a T-shirt of about so many vertices."""
     from snug.body import Body
     from snug.dressed_body import DressedBody
-    from snug.garments import TSHIRT, find_template
+    from snug.garment_kinds import TSHIRT, find_template
 
     body = Body.load()
     return DressedBody(body, find_template(TSHIRT).tailor(body, vertices=vertices))

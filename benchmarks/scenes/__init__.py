@@ -96,6 +96,11 @@ GARMENT_SCENES = (
     GarmentScenes("tshirt", "a T-shirt"),
     GarmentScenes("tunic", "a flared tunic", dynamic=True),
     GarmentScenes("skirt", "a flared skirt", dynamic=True),
+    GarmentScenes("tank_top", "a tank top"),
+    GarmentScenes("long_sleeves", "a shirt with long sleeves"),
+    GarmentScenes("trousers", "trousers"),
+    GarmentScenes("shorts", "shorts"),
+    GarmentScenes("dress", "a dress"),
 )
 
 

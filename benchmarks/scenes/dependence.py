@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from snug.garments import find_template
+from snug.garment_kinds import find_template
 from snug.motion_library import make_motion
 
 from ..scene import BuiltScene, Scene

@@ -76,7 +76,7 @@ def shirt(
 @lru_cache(maxsize=1)
 def _dressed() -> tuple[Body, Garment]:
     from snug.body import Body
-    from snug.garments import tailor_tshirt
+    from snug.garment_kinds import tailor_tshirt
 
     body = Body.load()
     return body, tailor_tshirt(body, vertices=VERTICES)

