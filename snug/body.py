@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from reference_sim.array_file import read_arrays
 from snug.formats.smpl_body import read_smpl
 from snug.skeleton import JOINT_NAMES, BodyError, joint_transforms
 
@@ -42,8 +43,7 @@ class Body:
     @staticmethod
     def load() -> "Body":
         """The body that comes with this package."""
-        with np.load(BAKED) as stored:
-            arrays = {key: _widened(stored[key]) for key in stored.files}
+        arrays = {key: _widened(stored) for key, stored in read_arrays(BAKED).items()}
         # float32 in the file: make the rows sum to one again in float64.
         arrays["skinning_weights"] /= arrays["skinning_weights"].sum(axis=1, keepdims=True)
         return Body(**arrays)

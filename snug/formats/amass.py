@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
+from reference_sim.array_file import ArrayFileError, read_arrays
 from snug.motion import Motion, MotionError
 from snug.skeleton import axis_angles, rotation_matrices
 
@@ -59,16 +59,9 @@ def read_amass(path: Path) -> Motion:
 
 def _load(path: Path) -> dict[str, np.ndarray]:
     try:
-        # Opened here, not by numpy, which leaves a damaged file open.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            names = [n for n in stored.files if n in ("poses", "trans", *_RATE_NAMES)]
-            return {name: stored[name] for name in names}
-    except FileNotFoundError:
-        raise MotionError(f"{path}: no such file; give an .npz motion file") from None
-    except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile):
-        raise MotionError(
-            f"{path}: not a readable .npz file (empty or damaged); export or download it again"
-        ) from None
+        return read_arrays(path, ("poses", "trans", *_RATE_NAMES))
+    except ArrayFileError as error:
+        raise MotionError(f"{error}; give an .npz motion file, export or download it again") from None
 
 
 def _numbers(path: Path, arrays: dict[str, np.ndarray], name: str) -> np.ndarray:

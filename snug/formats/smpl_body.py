@@ -5,11 +5,11 @@ either J_regressor (24, B), or J_template (24, 3) with J_shapedirs (24, 3, S). P
 not used: a body here is skinned linearly.
 """
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
+from reference_sim.array_file import ArrayFileError, read_arrays
 from snug.skeleton import JOINT_NAMES, BodyError
 
 REQUIRED = ("v_template", "shapedirs", "weights", "kintree_table", "f")
@@ -50,17 +50,10 @@ def read_smpl(path: Path) -> dict[str, np.ndarray]:
 
 
 def _stored_arrays(path: Path) -> dict[str, np.ndarray]:
-    if not path.is_file():
-        raise BodyError(f"{path}: no such file")
     try:
-        # An own handle: numpy leaves the file open when it turns out to be no archive.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            return {key: stored[key] for key in (*REQUIRED, "J_regressor", "J_template", "J_shapedirs")
-                    if key in stored.files}  # fmt: skip
-    except (ValueError, OSError, EOFError, TypeError, AttributeError, zipfile.BadZipFile) as error:
-        raise BodyError(
-            f"{path}: cannot be read as an .npz of plain arrays; write them with numpy.savez, without objects"
-        ) from error
+        return read_arrays(path, (*REQUIRED, "J_regressor", "J_template", "J_shapedirs"))
+    except ArrayFileError as error:
+        raise BodyError(f"{error}; give an .npz of plain arrays, written with numpy.savez") from None
 
 
 def _float(path: Path, stored: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]) -> np.ndarray:
