@@ -19,7 +19,7 @@ from .results import Row, RunFolder, with_provenance
 from .rows import described, rows_of
 from .runner import Runner
 from .schedule import tasks_of
-from .tasks.task import one_line
+from .tasks.task import RunStopped, one_line
 
 if TYPE_CHECKING:
     from .assets import Assets
@@ -40,7 +40,7 @@ def execute(plan: Plan) -> int:
             except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
                 runner.refuse(("start", "data", "network"), one_line(error))
         runner.run(LocalExecutor(log.folder, assets, plan.workers), log)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, RunStopped):
         log.note("interrupted", True)
         rows = rows_of(plan, runner.tasks, runner.known())
         if rows or not log.folder.rows_path.is_file():  # nothing known is no reason to lose a table

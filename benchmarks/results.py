@@ -10,8 +10,8 @@ import dataclasses
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -145,16 +145,28 @@ def cells_to_row(cells: dict[str, str]) -> Row:
     return Row(**values)
 
 
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path`: renamed to it when the block ends well, removed when it does not."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+def replacing(path: Path) -> AbstractContextManager[Path]:
+    """See reference_sim.whole_file, which is not loaded before something is written."""
+    from reference_sim import whole_file
+
+    return whole_file.replacing(path)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The JSON object in a file. Raises ResultsError."""
     try:
-        yield temporary
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ResultsError(f"{path}: no such file; is this the folder of a run?") from None
+    except (ValueError, RecursionError, OSError) as error:  # also of 5000 digits or brackets
+        raise ResultsError(f"{path}: not readable as JSON ({_one_line(error)})") from None
+    if not isinstance(value, dict):
+        raise ResultsError(f"{path}: holds no JSON object")
+    return value
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 def model_path(models: Path, kind: str, seed: int) -> Path:
@@ -217,6 +229,10 @@ class RunFolder:
         """A method's answer to each frame held still, beside its trajectory."""
         return self.trajectory_path(scene, f"{method}-quasi-static", seed)
 
+    def curves_path(self, scene: str, method: str, seed: int = 0) -> Path:
+        """What was measured of each frame of a trajectory, beside it: name -> (T,)."""
+        return self.trajectory_path(scene, method, seed).with_suffix(".npz")
+
     def start_path(self, scene: str) -> Path:
         """The settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")
@@ -238,14 +254,7 @@ class RunFolder:
 
     def read_config(self) -> dict[str, Any]:
         """The configuration. Raises ResultsError when run.json is absent or broken."""
-        try:
-            config = json.loads(self.config_path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise ResultsError(f"{self.config_path}: no such file; is this the folder of a run?") from None
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            raise ResultsError(f"{self.config_path}: not readable as JSON ({error})") from None
-        if not isinstance(config, dict):
-            raise ResultsError(f"{self.config_path}: holds no JSON object")
+        config = read_json(self.config_path)
         if config.get("format") != FORMAT:
             raise ResultsError(f"{self.config_path}: {OLD}")
         return config

@@ -22,6 +22,7 @@ from .provenance import usable_cores
 from .registry import DeclarationError
 from .results import ResultsError, RunFolder
 from .selection import Request, choose, choose_motions, choose_suites, names_no_motion
+from .tasks.task import RunStopped
 from .timing import one_thread
 
 PROGRAM = "benchmarks.run"
@@ -136,6 +137,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (HeldError, DeclarationError) as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
+    except (RunStopped, OSError) as error:
+        from reference_sim.whole_file import disk_full
+
+        line = str(error) if isinstance(error, RunStopped) else disk_full(error)
+        if not line:
+            raise
+        print(f"{PROGRAM}: {line}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
         return 130

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,30 +94,6 @@ class Trajectory:
     def with_status(self, status: str, reason: str) -> Trajectory:
         """The same frames with another status."""
         return replace(self, status=status, reason=reason)
-
-
-def replace_frame_fields(path: str | Path, fields: Mapping[str, np.ndarray], *, family: str) -> None:
-    """Give a finished file these numbers per frame, each (T,), in place of those that begin with `family`.
-
-    Positions are copied as they are packed: a hundred frames take milliseconds. The file is replaced whole.
-    """
-    import h5py
-
-    part = Path(path).with_name(Path(path).name + ".part")
-    try:
-        shutil.copyfile(path, part)
-        with h5py.File(part, "r+") as file:
-            group = file["benchmark/frame_fields"]
-            for key in [key for key in group if key.replace(":", "/").startswith(family)]:
-                del group[key]
-            for name, values in fields.items():
-                key = name.replace("/", ":")
-                if key in group:
-                    del group[key]
-                group.create_dataset(key, data=np.asarray(values, "f8"), maxshape=(None,), fillvalue=np.nan)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:

@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -105,13 +106,16 @@ def draw_trajectories(folder: RunFolder, run: Run, problems: list[str]) -> list[
 
 
 def read_trajectory(folder: RunFolder, path: Path, problems: list[str]) -> Trajectory | None:
-    """A trajectory of the run, None where there is none; one that cannot be read is added to the problems."""
+    """A trajectory of the run with its curves, None where there is none; what cannot be read is a problem."""
+    from reference_sim.array_file import read_arrays
     from reference_sim.trajectory import Trajectory, TrajectoryError
 
     if not path.is_file():
         return None
     try:
         trajectory = Trajectory.load(path)
+        if (curves := path.with_suffix(".npz")).is_file():
+            trajectory = replace(trajectory, frame_fields=trajectory.frame_fields | read_arrays(curves))
         if trajectory.frames:
             return trajectory
         problems.append(f"{path.relative_to(folder.path)}: holds no whole frame")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from torch import Tensor
+
+from reference_sim.whole_file import replacing
 
 HEADER = "snug"  # name of our entry in the file's header
 
@@ -18,25 +19,13 @@ class TensorFileError(ValueError):
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> Path:
-    """Write beside the place and move there, so that a reader, or a kill at any moment, finds a whole file.
+    """Write beside the place and move there: a reader, or a kill at any moment, finds a whole file."""
+    from safetensors.torch import save
 
-    A file left unfinished by a kill is written over by the next attempt.
-    """
-    from safetensors.torch import save_file
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.part")
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    try:
-        unfinished.touch()
-        mode = unfinished.stat().st_mode  # what the user's files have; the library would make a private one
-        save_file(plain, unfinished, metadata={HEADER: json.dumps(header)})
-        unfinished.chmod(mode)
-        with open(unfinished, "rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with replacing(path) as unfinished:
+        # By Python: what the library raises on a full disk does not say that it was that.
+        unfinished.write_bytes(save(plain, {HEADER: json.dumps(header)}))
     return path
 
 
