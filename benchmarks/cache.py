@@ -16,8 +16,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from .results import ResultsError, RunFolder, read_json, replacing
-from .source import code_of, data_of, digest, digest_of_file, packages_of
+from .json_file import ResultsError, read_json
+from .results import RunFolder, digest_of_file, replacing
+from .source import code_of, data_of, digest, packages_of
 from .tasks.task import Outcome, Task, TaskId
 
 STATES = ("finished", "failed", "stale", "missing")
@@ -73,6 +74,7 @@ class Cache:
         files = {name: digest_of_file(self.folder.path / name) for name in outcome.files}
         outcome = dataclasses.replace(outcome, digests=files)
         entry = {
+            "task": task.title,
             "parts": dependencies(task),
             "needs": _needs(task, others),
             "written": datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -105,7 +107,7 @@ class Cache:
             own = entry.pop("digest", "")
         except ResultsError:
             own, entry = "", {}
-        if not own or own != digest(_text(entry).encode()):
+        if own != digest(_text(entry).encode()) or entry["task"] != task.title:
             return "missing", "its entry is damaged", {}
         outcome, parts, needs = Outcome(**entry["outcome"]), entry["parts"], entry["needs"]
         if damage := damaged(self.folder, entry["files"]):

@@ -15,7 +15,7 @@ from .cache import Cache
 from .console import remarks, summary
 from .executor import LocalExecutor
 from .plan import Plan, runs
-from .results import Row, RunFolder, with_provenance
+from .results import Row, RunFolder, digest_of_file, with_provenance
 from .rows import described, rows_of
 from .runner import Runner
 from .schedule import tasks_of
@@ -171,6 +171,8 @@ class RunLog:
         outcomes = [runner.outcomes["cell", cell.name] for cell in self.plan.cells if runs(cell)]
         cells = {"run": len(outcomes), "failed": sum(outcome.failed for outcome in outcomes)}
         self.config |= {"tasks": of_kind, "cells": cells, "outdated": runner.outdated()}
+        for outcome in runner.outcomes.values():
+            self.config["digests"] |= outcome.digests
         self.folder.write_config(self.config)
 
     def write_rows(self, rows: Sequence[Row]) -> None:
@@ -182,6 +184,7 @@ class RunLog:
         ]
         self.folder.write_rows(self.rows)
         self.config |= described(self.plan, self.rows)
+        self.config["digests"] = {self.folder.rows_path.name: digest_of_file(self.folder.rows_path)}
         self.folder.write_config(self.config)
 
     def make_report(self) -> bool:

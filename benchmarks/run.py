@@ -20,7 +20,7 @@ from .plan import Motions, OwnBody, Plan, PlanError
 from .presets import PRESETS, find_preset
 from .provenance import usable_cores
 from .registry import DeclarationError
-from .results import ResultsError, RunFolder
+from .results import ResultsError, RunFolder, digest_of_file
 from .selection import Request, choose, choose_motions, choose_suites, names_no_motion
 from .tasks.task import RunStopped
 from .timing import one_thread
@@ -195,8 +195,6 @@ def choose_body(path: str | None) -> OwnBody | None:
     if path is None:
         return None
     from snug.body import Body
-
-    from .source import digest_of_file
 
     Body.from_file(path)
     return OwnBody(Path(path), digest_of_file(Path(path)))

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from .registry import DeclarationError
+from .results import digest_of_file
 
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS = ("reference_sim", "snug", "benchmarks")
@@ -44,12 +45,6 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "items"):
         return dict(value)
     raise TypeError(f"cannot tell apart by content: {type(value).__name__}")
-
-
-def digest_of_file(path: Path) -> str:
-    """16 hexadecimal digits of a file's bytes, as digest() of them. Raises OSError."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
 
 
 def code_of(*modules: str) -> dict[str, str]:

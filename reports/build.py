@@ -61,7 +61,7 @@ def read_run(folder: RunFolder) -> Run:
         raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
     from reports.data import run_data
 
-    return run_data(config, rows)
+    return run_data(config, rows, folder.changed(config))
 
 
 def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
