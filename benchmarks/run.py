@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(listing())
             return 0
         plan = make_plan(options, words)
-    except ValueError as error:  # also the readers' own errors: each is one line with file and remedy
+    except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     from .lock import HeldError, held
@@ -210,9 +210,9 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     try:
         seeds = tuple(dict.fromkeys(int(word) for word in split([text])))
     except ValueError:
-        raise PlanError(f"--seeds '{text}': give whole numbers separated by commas") from None
-    if not seeds or min(seeds) < 0:
-        raise PlanError(f"--seeds '{text}': give at least one whole number, none below 0")
+        raise PlanError(f"--seeds '{text[:40]}': give whole numbers separated by commas") from None
+    if not seeds or min(seeds) < 0 or max(seeds) >= 1 << 63:
+        raise PlanError(f"--seeds '{text[:40]}': give at least one whole number, of 0 to 63 bits")
     return seeds
 
 

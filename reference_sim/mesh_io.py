@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .cloth import MeshError
+from .mesh_header import check_header
 
 if TYPE_CHECKING:
     import numpy as np
@@ -85,11 +86,19 @@ def _read_obj(path: Path) -> tuple[list[list[float]], list[list[int]]]:
                     x, y, z = words[1:4]  # colours may follow
                     points.append([float(x), float(y), float(z)])
                 elif words and words[0] == "f":
-                    named = [int(word.split("/")[0]) for word in words[1:]]
+                    named = [_vertex_number(word.split("/")[0]) for word in words[1:]]
                     polygons.append([n - 1 if n > 0 else len(points) + n for n in named])
             except ValueError:
                 raise MeshError(f"{path}: line {number} is not understood: {line.strip()[:60]!r}") from None
     return points, polygons
+
+
+def _vertex_number(text: str) -> int:
+    """Raises ValueError for what is none: OBJ counts from 1, and from the last by -1."""
+    number = int(text)
+    if not 0 < abs(number) < 1 << 62:
+        raise ValueError(text)
+    return number
 
 
 def _read_with_meshio(path: Path) -> tuple[Any, list[Any]]:
@@ -97,6 +106,7 @@ def _read_with_meshio(path: Path) -> tuple[Any, list[Any]]:
     import meshio
     import numpy as np
 
+    check_header(path)
     printed = io.StringIO()
     try:
         # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
@@ -121,7 +131,8 @@ def _read_with_vtk(path: Path) -> tuple[Any, list[Any]] | None:
     import pyvista
 
     try:
-        surface = pyvista.read(path)
+        with pyvista.vtk_verbosity("off"):  # it prints what it finds wrong, in colours
+            surface = pyvista.read(path)
     except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
     if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:

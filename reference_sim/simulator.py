@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from .obstacle import Obstacle
 
 
+LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other
+
+
 def simulate(
     cloth: Cloth,
     energies: Sequence[Energy],
@@ -79,12 +82,17 @@ def simulate(
         residual, see `Result`), converged (0/1), energy/<term> [J].
 
     Raises:
-        ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, refreeze with resume.
+        ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, a step of no size, a
+            tolerance that is no number above 0, refreeze with resume.
         TrajectoryError: `path` cannot be resumed: unreadable, or made by another run.
     """
     for name, count in (("frames", frames), ("substeps", substeps)):
         if count < 1:
             raise ValueError(f"simulate: {name} = {count}: must be at least 1")
+    if not LEAST_DT <= dt / substeps <= MOST_DT:
+        raise ValueError(
+            f"simulate: dt / substeps = {dt / substeps:.3g} s: give {LEAST_DT:g} to {MOST_DT:g} s"
+        )
     if refreeze and resume:
         raise ValueError("simulate: a run with refreeze cannot be resumed: start it again without resume")
     x = _checked(start, cloth.rest_positions, "start")

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .array_file import MOST_PACKED
+
 if TYPE_CHECKING:
     import h5py
 
@@ -21,6 +23,14 @@ if TYPE_CHECKING:
 UNFINISHED = "unfinished"  # status of a file whose writer did not end by itself
 # Where the writer keeps what a resumed run needs.
 BEFORE, FAILURE = "before_last_step", "first_failure"
+
+
+SMALL = 1 << 20  # [bytes] that nobody minds
+# What h5py and numpy raise for a file that is none, or is damaged.
+UNREADABLE = (
+    OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, ArithmeticError,
+    MemoryError,
+)  # fmt: skip
 
 
 class TrajectoryError(ValueError):
@@ -88,8 +98,9 @@ class Trajectory:
                 return read_trajectory(file)
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
-        except (OSError, KeyError) as error:
-            raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({error})") from None
+        except UNREADABLE as error:
+            reason = " ".join(str(error).split())
+            raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
 
     def with_status(self, status: str, reason: str) -> Trajectory:
         """The same frames with another status."""
@@ -97,20 +108,37 @@ class Trajectory:
 
 
 def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:
-    """The first `frames` frames of an open file, default all that are whole; raises KeyError or OSError."""
+    """The first `frames` frames of an open file, default all that are whole; raises one of UNREADABLE."""
     own, vtk = file["benchmark"], file["VTKHDF"]
+    provenance = json.loads(own.attrs["provenance"])
+    if not isinstance(provenance, dict):
+        raise ValueError("its provenance is no JSON object")
     frames = int(own.attrs["frames"]) if frames is None else frames
-    vertex_count = int(vtk["NumberOfPoints"][0])
+    vertex_count = int(_whole(vtk["NumberOfPoints"])[0])
     return Trajectory(
-        positions=vtk["Points"][: frames * vertex_count].reshape(frames, vertex_count, 3),
-        faces=vtk["Polygons/Connectivity"][:].reshape(-1, 3),
-        times=vtk["Steps/Values"][:frames],
-        frame_seconds=own["frame_seconds"][:frames],
+        positions=_whole(vtk["Points"], frames * vertex_count).reshape(frames, vertex_count, 3),
+        faces=_whole(vtk["Polygons/Connectivity"]).reshape(-1, 3),
+        times=_whole(vtk["Steps/Values"], frames),
+        frame_seconds=_whole(own["frame_seconds"], frames),
         status=str(own.attrs["status"]),
         reason=str(own.attrs["reason"]),
-        provenance=json.loads(own.attrs["provenance"]),
-        frame_fields={k.replace(":", "/"): v[:frames] for k, v in own["frame_fields"].items()},
+        provenance=provenance,
+        frame_fields={k.replace(":", "/"): _whole(v, frames) for k, v in own["frame_fields"].items()},
     )
+
+
+def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
+    """The first rows of a dataset, all of them by default, once their size is that of what is stored.
+
+    Raises ValueError for one that declares more numbers than it holds, or no plain numbers.
+    """
+    rows = len(dataset) if rows is None else rows
+    if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":
+        raise ValueError(f"{dataset.name} has {dataset.shape} of {dataset.dtype}")
+    size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
+    if size > MOST_PACKED * dataset.id.get_storage_size() + SMALL:
+        raise ValueError(f"{dataset.name} declares {size} bytes, more than it holds")
+    return dataset[:rows]
 
 
 class TrajectoryWriter:
