@@ -9,6 +9,7 @@ import contextlib
 import glob
 import io
 import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -131,7 +132,8 @@ def _read_with_vtk(path: Path) -> tuple[Any, list[Any]] | None:
     import pyvista
 
     try:
-        with pyvista.vtk_verbosity("off"):  # it prints what it finds wrong, in colours
+        with warnings.catch_warnings(), pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
+            warnings.simplefilter("ignore")
             surface = pyvista.read(path)
     except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
