@@ -202,5 +202,5 @@ def _perform(task: Task, needed: Needed) -> Outcome:
 def _verify(digests: Mapping[str, str]) -> None:
     """Raises RunStopped where a file is not as it was written: the next run makes it anew."""
     if damage := damaged(_context.folder, dict(digests.items() - _verified)):
-        raise RunStopped(f"{damage}; the same command makes it anew and goes on")
+        raise RunStopped(f"{damage} since this run wrote it")
     _verified.update(digests.items())

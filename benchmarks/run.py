@@ -143,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         line = str(error) if isinstance(error, RunStopped) else disk_full(error)
         if not line:
             raise
-        print(f"{PROGRAM}: {line}", file=sys.stderr)
+        print(f"{PROGRAM}: {line}; the same command goes on from there", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)

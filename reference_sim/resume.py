@@ -19,12 +19,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .trajectory import BEFORE, FAILURE, UNFINISHED, UNREADABLE, Trajectory, TrajectoryError, read_trajectory
+from .trajectory import (
+    BEFORE,
+    END_OF_FILE,
+    FAILURE,
+    UNFINISHED,
+    UNREADABLE,
+    Trajectory,
+    TrajectoryError,
+    read_trajectory,
+)
 
 if TYPE_CHECKING:
     import h5py
-
-END_OF_FILE = slice(40, 48)  # of the superblock (version 0): where HDF5 believes the file to end
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .array_file import MOST_PACKED
+from .whole_file import reserve
 
 if TYPE_CHECKING:
     import h5py
@@ -26,6 +27,8 @@ BEFORE, FAILURE = "before_last_step", "first_failure"
 
 
 SMALL = 1 << 20  # [bytes] that nobody minds
+ROOM = 1 << 20  # [bytes] that HDF5 may need beside the numbers of a frame
+END_OF_FILE = slice(40, 48)  # of the superblock (version 0): where HDF5 believes the file to end
 # What h5py and numpy raise for a file that is none, or is damaged.
 UNREADABLE = (
     OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, ArithmeticError,
@@ -164,14 +167,12 @@ class TrajectoryWriter:
         vertex_count: int,
         live: bool = True,
     ) -> None:
-        import h5py
-
         self.path = Path(path)
         self._part: Path | None = self.path.with_name(self.path.name + ".part")
-        self._file = h5py.File(self._part, "w")
         self._live = live
         self._vertex_count = vertex_count
         self.frames = 0
+        self._create(self._part, np.size(faces))
         _vtk_skeleton(self._file, np.asarray(faces, dtype=np.int64), vertex_count)
         own = self._file.create_group("benchmark")
         own.create_group("frame_fields")
@@ -184,6 +185,26 @@ class TrajectoryWriter:
                 "provenance": json.dumps(provenance),
             }
         )
+
+    def _create(self, path: Path, numbers: int) -> None:
+        """Make the file, with room for its faces; where there is none it is gone again."""
+        import h5py
+
+        path.write_bytes(b"")
+        try:
+            reserve(path, 16 * numbers + ROOM)
+            self._file = h5py.File(path, "w")
+            self._reserve(numbers)
+        except OSError:
+            path.unlink()
+            raise
+
+    def _reserve(self, numbers: int) -> None:
+        """Room for so many more numbers and what HDF5 puts around them: it crashes where it finds none.
+
+        Raises OSError; what was written before is then whole.
+        """
+        reserve(self._part or self.path, self._file.id.get_filesize() + 16 * numbers + ROOM)
 
     def append(
         self,
@@ -199,6 +220,7 @@ class TrajectoryWriter:
         before: (2, V, 3) positions [m] and velocity [m/s] from which the last step to this frame was made; a
         run with sub-steps that is resumed from this frame needs them.
         """
+        self._reserve(np.size(positions) + (0 if before is None else 2 * np.size(before)))
         k, vtk, own = self.frames, self._file["VTKHDF"], self._file["benchmark"]
         steps = vtk["Steps"]
         # VTK crashes on Values longer than NSteps, so the count is raised first.
@@ -236,7 +258,7 @@ class TrajectoryWriter:
             return
         import h5py
 
-        self._file.close()
+        self._close(self._part)
         os.replace(self._part, self.path)
         self._part = None
         self._file = h5py.File(self.path, "r+")
@@ -261,9 +283,17 @@ class TrajectoryWriter:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None and self.frames:
             self._put_in_place()
-        self._file.close()
+        self._close(self._part or self.path)
         if self._part is not None:
             self._part.unlink()
+
+    def _close(self, path: Path) -> None:
+        """Close the file, give back what was set aside and not used, and see it on the disk."""
+        self._file.close()
+        with path.open("rb+") as file:
+            head = file.read(END_OF_FILE.stop)
+            os.ftruncate(file.fileno(), int.from_bytes(head[END_OF_FILE], "little"))
+            os.fsync(file.fileno())
 
 
 def _extend(dataset: h5py.Dataset, rows: Any) -> None:

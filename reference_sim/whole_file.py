@@ -41,7 +41,22 @@ def disk_full(error: BaseException) -> str:
     path = Path(error.filename or ".").absolute()
     folder = next((parent for parent in path.parents if parent.is_dir()), Path())
     free = shutil.disk_usage(folder).free / 1e6
-    return (
-        f"{error.filename or 'a file'}: {error.strerror} ({free:.3g} MB are free there); "
-        "what was finished is kept, and the same command goes on once there is room"
-    )
+    name = error.filename or "a file"
+    return f"{name}: {error.strerror} ({free:.3g} MB are free there); what was finished is kept"
+
+
+def reserve(path: Path, size: int) -> None:
+    """Have the file system set room aside for the first `size` bytes of a file that is there.
+
+    For libraries in C that crash where they find no room. Raises OSError, which names the file. Where the
+    system cannot promise room, what is free is looked at.
+    """
+    if not hasattr(os, "posix_fallocate"):
+        if shutil.disk_usage(path.parent).free < size - path.stat().st_size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        return
+    with path.open("rb+") as file:
+        try:
+            os.posix_fallocate(file.fileno(), 0, size)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from None

@@ -84,6 +84,7 @@ def check(options: argparse.Namespace) -> None:
     for name, least in LEAST.items():
         value, most = getattr(options, name), _most(name)
         if not least <= value <= most:
-            raise ValueError(f"--{name.replace('_', '-')} {value:.6g}: give {least} to {most}")
+            wanted = f"at most {most}" if value > most else f"at least {least}"
+            raise ValueError(f"--{name.replace('_', '-')} {str(value)[:40]}: {wanted}")
     if options.patience and not options.validation:
         raise ValueError(f"--patience {options.patience}: add --validation NAME, a motion to stop by")

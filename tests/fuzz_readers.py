@@ -1,4 +1,4 @@
-"""Mutated files given to every reader: `python fuzz_readers.py COUNT FOLDER` prints what went wrong, as JSON.
+"""Mutated files given to every reader: `python fuzz_readers.py COUNT FOLDER [FIRST]` prints what went wrong.
 
 A process of its own: a reader that crashes the interpreter, or takes all memory, is found out too. READERS is
 the table; a new reader is one line in it.
@@ -318,8 +318,8 @@ def quiet() -> Iterator[list[str]]:
                 said.append(printed)
 
 
-def main(count: int, folder: Path) -> dict[str, Any]:
-    """`count` mutated files over all readers in turn, always the same ones."""
+def main(count: int, folder: Path, first: int = 0) -> dict[str, Any]:
+    """`count` mutated files over all readers in turn, always the same ones, from number `first` on."""
     os.chdir(folder)
     problems, refused, slowest = [], 0, 0.0
     valid = [reader.make() for reader in READERS]
@@ -330,7 +330,7 @@ def main(count: int, folder: Path) -> dict[str, Any]:
         print(reader.name, file=sys.stderr, flush=True)
         reader.read(place)  # what nobody has touched is read
     start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for number in range(count):
+    for number in range(first, first + count):
         reader, data = READERS[number % len(READERS)], valid[number % len(READERS)]
         path = folder / f"mutated{reader.suffix}"
         path.write_bytes(reader.mutate(data, random.Random(number)))
@@ -350,4 +350,5 @@ def main(count: int, folder: Path) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(int(sys.argv[1]), Path(sys.argv[2]).resolve()), indent=1))
+    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
+    print(json.dumps(main(numbers[0], Path(sys.argv[2]).resolve(), *numbers[1:]), indent=1))

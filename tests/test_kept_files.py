@@ -124,6 +124,6 @@ def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it
     (tmp_path / "first.txt").write_text("worst")
     assert executor._perform(second, needed).status == "ok"  # compared once in each process
     executor._verified.clear()
-    with pytest.raises(RunStopped, match=r"^first\.txt is damaged; the same command makes it anew"):
+    with pytest.raises(RunStopped, match=r"^first\.txt is damaged since this run wrote it"):
         executor._perform(second, needed)
     assert cache.find(first, {}).state == "missing"

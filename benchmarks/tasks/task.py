@@ -115,7 +115,7 @@ class Task:
 class RunStopped(RuntimeError):
     """No task can be done any more, as on a full disk: the run ends, and what is finished is kept.
 
-    The message says why, and that the same command goes on.
+    The message says why.
     """
 
 
