@@ -11,7 +11,8 @@ import numpy as np
 from .cloth import Cloth
 from .minimise import Result
 from .resume import PartialRun
-from .trajectory import Trajectory, TrajectoryWriter
+from .trajectory import Trajectory
+from .trajectory_writer import TrajectoryWriter
 
 
 class Recorder:

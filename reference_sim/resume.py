@@ -19,16 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .trajectory import (
-    BEFORE,
-    END_OF_FILE,
-    FAILURE,
-    UNFINISHED,
-    UNREADABLE,
-    Trajectory,
-    TrajectoryError,
-    read_trajectory,
-)
+from .trajectory import UNREADABLE, Trajectory, TrajectoryError, read_trajectory
+from .trajectory_writer import BEFORE, END_OF_FILE, FAILURE, UNFINISHED
 
 if TYPE_CHECKING:
     import h5py

@@ -26,7 +26,7 @@ from benchmarks import execution, run
 from benchmarks.results import RunFolder
 from reference_sim import Trajectory, command
 from reference_sim.array_file import write_array
-from reference_sim.trajectory import ROOM
+from reference_sim.trajectory_writer import ROOM
 from reference_sim.whole_file import disk_full, replacing
 from snug import training_run
 from snug.tensor_file import read_tensors, write_tensors

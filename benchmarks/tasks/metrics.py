@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -108,7 +109,7 @@ def compared(
 
 def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
     """An .npz of curves (T,), nan after the last frame that was measured."""
-    padded = {
+    padded: dict[str, Any] = {
         name: np.pad(curve, (0, frames - len(curve)), constant_values=np.nan)
         for name, curve in curves.items()
     }
