@@ -27,12 +27,13 @@ from .plan import Motions, OwnBody, OwnGarment, Plan, PlanError
 from .presets import find_preset
 from .provenance import usable_cores
 from .registry import DeclarationError
-from .results import ResultsError, RunFolder
+from .results import ResultsError, RunFolder, digest_of_file
 from .roll_out_option import RollOutError
 from .roll_out_option import parse as parse_roll_out
 from .run_options import PROGRAM, make_parser
 from .scenes import GARMENT_SCENES, all_scenes
 from .selection import MEASURED, Request, choose, choose_motions, choose_suites, names_no_motion
+from .tasks.task import RunStopped
 from .timing import one_thread
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
@@ -50,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(listing())
             return 0
         plan = make_plan(options, words)
-    except ValueError as error:  # also the readers' own errors: each is one line with file and remedy
+    except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     return carry_out(plan, dry_run=options.dry_run)
@@ -76,6 +77,14 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
     except (HeldError, DeclarationError, RollOutError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2
+    except (RunStopped, OSError) as error:
+        from reference_sim.whole_file import disk_full
+
+        line = str(error) if isinstance(error, RunStopped) else disk_full(error)
+        if not line:
+            raise
+        print(f"{PROGRAM}: {line}; the same command goes on from there", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print(f"{program}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
         return 130
@@ -154,8 +163,6 @@ def choose_body(path: str | None) -> OwnBody | None:
         return None
     from snug.body import Body
 
-    from .source import digest_of_file
-
     Body.from_file(path)
     return OwnBody(Path(path), digest_of_file(Path(path)))
 
@@ -194,9 +201,9 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     try:
         seeds = tuple(dict.fromkeys(int(word) for word in split([text])))
     except ValueError:
-        raise PlanError(f"--seeds '{text}': give whole numbers separated by commas") from None
-    if not seeds or min(seeds) < 0:
-        raise PlanError(f"--seeds '{text}': give at least one whole number, none below 0")
+        raise PlanError(f"--seeds '{text[:40]}': give whole numbers separated by commas") from None
+    if not seeds or min(seeds) < 0 or max(seeds) >= 1 << 63:
+        raise PlanError(f"--seeds '{text[:40]}': give at least one whole number, of 0 to 63 bits")
     return seeds
 
 

@@ -9,12 +9,14 @@ import contextlib
 import glob
 import io
 import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .cloth import MeshError
+from .mesh_header import check_header
 
 if TYPE_CHECKING:
     import numpy as np
@@ -167,7 +169,9 @@ def _read_obj(path: Path) -> _Parts:
 
 
 def _counted(number: int, count: int) -> int:
-    """From 0 on: OBJ counts from 1, and backwards from the last one below 0."""
+    """From 0 on: OBJ counts from 1, and backwards from the last one below 0. Raises ValueError for none."""
+    if not 0 < abs(number) < 1 << 62:
+        raise ValueError(number)
     return number - 1 if number > 0 else count + number
 
 
@@ -176,8 +180,7 @@ def _read_with_meshio(path: Path) -> _Parts:
     import meshio
     import numpy as np
 
-    if path.suffix.lower() == ".ply":
-        _check_ply(path)
+    check_header(path)
     printed = io.StringIO()
     try:
         # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
@@ -198,20 +201,6 @@ def _read_with_meshio(path: Path) -> _Parts:
     return _Parts(mesh.points, [polygon for block in kinds for polygon in block.data], vertex_data=data)
 
 
-def _check_ply(path: Path) -> None:
-    """Raises MeshError for a header that does not end, at which meshio would wait for ever, or that declares
-    more than there is.
-    """
-    size = path.stat().st_size
-    with open(path, "rb") as file:
-        head, end, _ = file.read(LONGEST_HEADER).partition(b"end_header")
-    if not end:
-        raise MeshError(f"{path}: cannot be read (no end of its header): export it again, as OBJ or PLY")
-    for name, count in re.findall(rb"element\s+(\w+)\s+(\d+)", head):
-        if int(count[:20]) > size:
-            raise MeshError(f"{path}: declares {count[:20].decode()} of {name.decode()} in {size} bytes")
-
-
 def _read_with_vtk(path: Path) -> _Parts | None:
     """Points and triangles of a file of PolyData, or None if it holds none."""
     import numpy as np
@@ -222,7 +211,9 @@ def _read_with_vtk(path: Path) -> _Parts | None:
     try:
         vtkObject.GlobalWarningDisplayOff()  # VTK would print many lines for a damaged file
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-        surface = pyvista.read(path)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            surface = pyvista.read(path)
     except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
     finally:

@@ -6,13 +6,13 @@ then float32 positions, sample by sample. PC16 is the same in float16.
 
 from __future__ import annotations
 
-import os
 import struct
 from pathlib import Path
 
 import numpy as np
 
 from .trajectory import Trajectory, TrajectoryError
+from .whole_file import replacing
 
 SIGNATURE = b"POINTCACHE2\0"
 HEADER = len(SIGNATURE) + 20
@@ -33,10 +33,12 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
     mesh = path.with_suffix(".obj")
     frames, points, _ = trajectory.positions.shape
     header = SIGNATURE + struct.pack("<iiffi", 1, points, 0.0, 1.0, frames)
-    _write_whole(path, header + trajectory.positions.astype("<f4").tobytes())
+    with replacing(path) as temporary:
+        temporary.write_bytes(header + trajectory.positions.astype("<f4").tobytes())
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in trajectory.positions[0]]
     lines += [f"f {a} {b} {c}\n" for a, b, c in trajectory.faces + 1]
-    _write_whole(mesh, "".join(["# metres, y up\n", *lines]).encode())
+    with replacing(mesh) as temporary:
+        temporary.write_text("".join(["# metres, y up\n", *lines]), encoding="utf-8")
     return path, mesh
 
 
@@ -62,9 +64,3 @@ def read_point_cache(path: str | Path) -> np.ndarray:
                 f"has {length}: write it again"
             )
         return np.fromfile(file, kind).reshape(frames, points, 3)
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(data)
-    os.replace(part, path)

@@ -19,6 +19,7 @@ MODULES = (
     "geometry",
     "body",
     "optimality",
+    "solver",
     "exact",
     "dynamics",
     "conservation",
