@@ -37,6 +37,7 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     folder = RunFolder(run_dir)
     run = read_run(folder)
     from reports.document import document
+    from reports.page.write import write_page
     from reports.tables import make_tables
 
     tables = make_tables(run)
@@ -47,6 +48,7 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
         table.write_csv(folder.tables)
     problems: list[str] = []
     pictures = draw(folder, run, problems)
+    write_page(folder, run, tables, problems, lambda path: read_trajectory(folder, path, problems))
     typeset(folder, document(run, tables, pictures, problems))
     return folder.report_path, problems
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from ..results import RunFolder, replacing
 from ..scene import BuiltScene, Scene
@@ -27,8 +28,12 @@ class SettleStart(Task):
     scene: Scene
 
     def clear(self, folder: RunFolder) -> None:
-        for path in (folder.start_path(self.scene.name), folder.body_path(self.scene.name)):
+        for path in self._files(folder):
             path.unlink(missing_ok=True)
+
+    def _files(self, folder: RunFolder) -> tuple[Path, ...]:
+        name = self.scene.name
+        return folder.start_path(name), folder.body_path(name), folder.rest_areas_path(name)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import numpy as np
@@ -40,9 +45,10 @@ class SettleStart(Task):
         write_body(run, scene)
         with replacing(run.start_path(scene.name)) as temporary:
             np.save(temporary, np.load(run.start_path(shared)) if shared else scene.start_state)
+        with replacing(run.rest_areas_path(scene.name)) as temporary:
+            np.save(temporary, scene.cloth.areas)
         context.tell(self.units)
-        paths = (run.start_path(scene.name), run.body_path(scene.name))
-        return Outcome(files=tuple(map(run.relative, paths)))
+        return Outcome(files=tuple(map(run.relative, self._files(run))))
 
 
 def write_body(run: RunFolder, scene: BuiltScene) -> None:
