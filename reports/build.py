@@ -49,6 +49,7 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     problems: list[str] = []
     pictures = draw(folder, run, problems)
     write_page(folder, run, tables, problems, lambda path: read_trajectory(folder, path, problems))
+    problems = list(dict.fromkeys(problems))  # the page reads again what was drawn
     typeset(folder, document(run, tables, pictures, problems))
     return folder.report_path, problems
 

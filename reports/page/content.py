@@ -73,9 +73,7 @@ def _table(run: Run, table: Table) -> dict[str, Any]:
         for place, column in enumerate(table.columns)
     ]
     lines = [list(line) for line in zip(*texts)]
-    rows = [
-        [_cell(text, cell) for text, cell in zip(line, row)] for line, row in zip(lines, table.rows)
-    ]
+    rows = [[_cell(text, cell) for text, cell in zip(line, row)] for line, row in zip(lines, table.rows)]
     return {
         "name": table.name, "caption": table.caption or table.name, "note": remarks_of(table, lines),
         "columns": [_column(run, column) for column in table.columns], "rows": rows,
@@ -105,7 +103,7 @@ def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
     if isinstance(value, str):
         return text["text"]
     number = None if value is None or math.isnan(value) else max(min(float(value), 1e300), -1e300)
-    return [text["text"].rstrip("\u2007\u2008"), number, text["spread"], text["mark"]]
+    return [text["text"], number, text["spread"], text["mark"]]
 
 
 def trouble_of(run: Run, tables: Mapping[str, Table]) -> tuple[str, bool, list[str]]:

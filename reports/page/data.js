@@ -109,8 +109,9 @@ function quantile(arrays, share) {
   return found.length ? found[Math.floor(share * (found.length - 1))] : 0;
 }
 
-// 1, 2 or 5 times a power of ten, not below x.
-function roundUp(x) {
+// The least of these factors times a power of ten that is not below x.
+function roundUp(x, factors = [1, 2, 5]) {
   const power = 10 ** Math.floor(Math.log10(x));
-  return [1, 2, 5, 10].map((factor) => factor * power).find((value) => value >= x * 0.999);
+  const found = [...factors, 10].find((factor) => factor * power >= x * 0.999);
+  return Number((found * power).toPrecision(3));
 }

@@ -28,11 +28,11 @@ void main() {
   vec3 n = normalize(side) * (gl_FrontFacing ? 1.0 : -1.0);
   vec3 base = coloured ? texture(colours, vec2(clamp(value, 0.002, 0.998), 0.5)).rgb : plain;
   base = pow(base, vec3(2.2)) * (gl_FrontFacing ? 1.0 : 0.55);
-  float key = max(dot(n, normalize(vec3(-0.78, 0.42, 0.46))), 0.0);
+  float key = max(dot(n, normalize(vec3(-0.84, 0.4, 0.34))), 0.0);
   float fill = max(dot(n, normalize(vec3(0.85, 0.1, 0.5))), 0.0);
   float sky = 0.5 + 0.5 * n.y;
   float edge = mix(0.72, 1.0, smoothstep(0.0, 0.55, abs(n.z)));
-  vec3 lit = base * edge * (0.16 + 0.16 * sky + 0.86 * key + 0.2 * fill);
+  vec3 lit = base * edge * (0.15 + 0.14 * sky + 1.0 * key + 0.17 * fill);
   colour = vec4(pow(lit, vec3(1.0 / 2.2)), 1.0);
 }`;
 

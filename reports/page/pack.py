@@ -31,7 +31,7 @@ class Pack:
         self.entries[name] = {"at": start, "shape": list(array.shape), **how}
 
     def positions(self, name: str, positions: np.ndarray) -> None:
-        """(T,V,3) [m], finite: two planes of bytes, low then high, of what linear motion does not foretell."""
+        """(T,V,3) [m], finite: low bytes, then high ones, of what linear motion does not foretell."""
         low = positions.reshape(-1, 3).min(axis=0)
         step = max(float((positions - low).max()) / STEPS, 1e-9)
         steps = np.rint((positions - low) / step).astype(np.uint16)
@@ -77,4 +77,3 @@ def residuals(steps: np.ndarray) -> np.ndarray:
 def deflated(data: bytes) -> str:
     """zlib's format in base64."""
     return base64.b64encode(zlib.compress(data, 9)).decode("ascii")
-

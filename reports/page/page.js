@@ -11,6 +11,7 @@ const COLOURS = {
   depth: { title: 'Depth under the skin', unit: 'mm', stops: SEQUENTIAL },
 };
 const BRIGHTEST = 0.98; // share of the values of all panes below the end of the scale
+const HOLD = 500; // at the end, before it starts again [ms]
 const byId = (id) => document.getElementById(id);
 const state = { scene: '', methods: [], frame: 0, colour: 'plain', playing: false };
 let content;
@@ -125,7 +126,7 @@ function colourScale() {
   const values = arrays.map((one) => one[state.colour]).filter(Boolean);
   byId('scale').hidden = byId('limits').hidden = !own.stops;
   if (!own.stops) return;
-  const limit = roundUp((quantile(values, BRIGHTEST) || 1) * 1.6 ** Number(byId('limit').value));
+  const limit = roundUp((quantile(values, BRIGHTEST) || 1) * 1.6 ** Number(byId('limit').value), [1, 1.5, 2, 3, 4, 5, 6, 8]);
   view.limit = limit;
   view.drawing.setColours(own.stops);
   const signed = values[0].signed;
@@ -196,13 +197,15 @@ function play(on) {
   requestAnimationFrame(tick);
 }
 
-function tick(now) {
+function tick() {
   if (!state.playing) return;
+  const now = performance.now();
+  requestAnimationFrame(tick);
+  if (now < since) return; // held on the last frame
   const time = from + ((now - since) / 1000) * Number(byId('speed').value);
   const frame = frameAt(times, time);
   if (frame !== state.frame) goTo(frame);
-  if (frame >= times.length - 1) [since, from] = [now + 500, times[0]];
-  requestAnimationFrame(tick);
+  if (frame >= times.length - 1) [since, from] = [now + HOLD, times[0]];
 }
 
 // The frame to go to; playing goes on from there.

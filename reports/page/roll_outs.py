@@ -22,26 +22,31 @@ if TYPE_CHECKING:
 SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one
 BLOCK = 32  # frames at a time, to bound memory
 ROOM = 1500  # bytes beside a text: its tags, and what the content says of it
+NOTE = 400  # bytes to say that roll-outs of a scene were left out
 CURVES = ("energy", "curvature")  # families of metrics whose numbers per frame are drawn
 Reader = Callable[[Path], "Trajectory | None"]
 
 
 @dataclass
 class Embedded:
-    """scenes: scene -> its body and methods, each the id of a text and what lies in it. texts: id -> text."""
+    """scenes: scene -> its body and methods, each the id of a text and what lies in it. texts: id -> text.
+    missing: scene -> how many roll-outs did not fit.
+    """
 
     scenes: dict[str, dict[str, Any]] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
-    missing: dict[str, list[str]] = field(default_factory=dict)
+    missing: dict[str, int] = field(default_factory=dict)
 
     def left_out(self, rule: str) -> str:
         """How many roll-outs are there, by what rule, and which are not."""
         have = sum(len(scene["methods"]) for scene in self.scenes.values())
-        lack = sum(map(len, self.missing.values()))
+        lack = sum(self.missing.values())
         if not lack:
-            return f"All {have} roll-outs of this run that were kept, one seed of each, can be shown."
-        names = "; ".join(f"{scene}: {', '.join(methods)}" for scene, methods in self.missing.items())
-        return f"{have} of {have + lack} roll-outs can be shown ({rule}). Left out for size: {names}."
+            return f"All {have} roll-outs that this run kept can be shown: the first seed of each method."
+        names = ", ".join(f"{scene} ({count})" for scene, count in self.missing.items())
+        return (
+            f"{have} of {have + lack} roll-outs can be shown: {rule}. Left out for size, by scene: {names}."
+        )
 
 
 def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
@@ -50,9 +55,11 @@ def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
     read: gives the trajectory of a file, None where there is none to be had.
     """
     found, references = Embedded(), {}
-    for group in groups(folder, run):
+    wanted = list(groups(folder, run))
+    budget -= NOTE * len(wanted)
+    for group in wanted:
         if found.missing:
-            found.missing.setdefault(group.scene, []).extend(map(run.label, group.paths))
+            found.missing[group.scene] = found.missing.get(group.scene, 0) + len(group.paths)
             continue
         read_ones = {method: read(path) for method, path in group.paths.items()}
         whole = {method: _finite(cloth) for method, cloth in read_ones.items() if cloth is not None}
@@ -71,7 +78,7 @@ def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
             new = {name: text for name, text in texts.items() if name not in found.texts}
             budget -= sum(ROOM + len(text) for text in new.values())
             if budget < 0:
-                found.missing.setdefault(group.scene, []).append(run.label(method))
+                found.missing[group.scene] = found.missing.get(group.scene, 0) + 1
             else:
                 found.texts |= new
                 found.scenes[group.scene] = scene

@@ -1,6 +1,6 @@
 // Up to four panes on one canvas, one camera for all of them.
 
-const CLOTH = [0.56, 0.27, 0.22];
+const CLOTH = [0.66, 0.36, 0.28];
 const SKIN = [0.7, 0.69, 0.68];
 const ANGLE = 0.42; // of the view from bottom to top [rad]
 
@@ -86,7 +86,7 @@ class View {
 
   // The height of what is seen at the centre [m].
   height() {
-    return (1.22 * (this.follows ? this.reach.size : this.reach.all)) / this.zoom;
+    return (1.12 * (this.follows ? this.reach.size : this.reach.all)) / this.zoom;
   }
 
   camera(centre, aspect) {

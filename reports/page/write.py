@@ -51,7 +51,11 @@ def write_page(
 
 
 def _page(
-    run: Run, tables: Mapping[str, Table], problems: Sequence[str], content: dict[str, Any], embedded: Embedded
+    run: Run,
+    tables: Mapping[str, Table],
+    problems: Sequence[str],
+    content: dict[str, Any],
+    embedded: Embedded,
 ) -> str:
     style = (HERE / "page.css").read_text(encoding="utf-8")
     code = "".join((HERE / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
