@@ -1,7 +1,8 @@
 """python -m reports.build RUN_DIR: the tables, figures and PDF of a finished run.
 
 Reads run.json, results.csv, trajectories and histories of trainings in RUN_DIR, and nothing else; writes
-tables/*.csv, figures/*.svg and *.png, and report.pdf there. Run twice, it writes the same bytes twice.
+tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same bytes
+twice.
 """
 
 from __future__ import annotations
@@ -176,7 +177,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status: 0 made; 1 made, but some file of the run could not be read; 2 no run folder."""
     parser = argparse.ArgumentParser(
         prog="python -m reports.build",
-        description="Make tables/*.csv, figures/* and report.pdf of a finished run from its result files.",
+        description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run from its files.",
         epilog="Exit status: 0 when all is made, 1 when some file of the run could not be read (the report "
         "names it), 2 when RUN_DIR is no run folder.",
     )

@@ -1,4 +1,4 @@
-"""The page of a run: one file that fetches nothing, true to the positions, safe with any name, in its size."""
+"""The page of a run: one file that fetches nothing, true to the positions, safe with any name."""
 
 from __future__ import annotations
 
@@ -155,16 +155,12 @@ def test_values_are_off_by_less_than_a_hundredth_and_finer_where_small(signed):
 
 
 def test_curvature_is_that_of_a_sphere_and_of_the_metric():
-    longitude, latitude = np.meshgrid(np.arange(40) * np.pi / 20, np.linspace(0.3, np.pi - 0.3, 40))
-    globe = 0.5 * np.stack(
-        [np.sin(latitude) * np.cos(longitude), np.cos(latitude), np.sin(latitude) * np.sin(longitude)],
-        axis=-1,
-    ).reshape(1, -1, 3)
-    row_, column = np.meshgrid(np.arange(39), np.arange(40), indexing="ij")
-    a, b = row_ * 40 + column, row_ * 40 + (column + 1) % 40
-    faces = np.concatenate(
-        [np.stack([a, b, a + 40], -1).reshape(-1, 3), np.stack([b, b + 40, a + 40], -1).reshape(-1, 3)]
-    )
+    around, down = np.meshgrid(np.arange(40) * np.pi / 20, np.linspace(0.3, np.pi - 0.3, 40))
+    ring = [np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)]
+    globe = 0.5 * np.stack(ring, axis=-1).reshape(1, -1, 3)
+    line, column = np.meshgrid(np.arange(39), np.arange(40), indexing="ij")
+    a, b = (40 * line + column).ravel(), (40 * line + (column + 1) % 40).ravel()
+    faces = np.concatenate([np.stack([a, b, a + 40], axis=1), np.stack([b, b + 40, a + 40], axis=1)])
     found = mean_curvature(globe, faces)[0]
     inner = found > 0.0
     assert inner.sum() == 38 * 40
@@ -178,7 +174,7 @@ def test_change_of_area_distance_and_depth_have_their_known_values():
     x, faces = sheet(0.0)
     rest = np.full(len(faces), 0.4 / 3 * 0.5 / 3 / 2)
     np.testing.assert_allclose(area_change(1.1 * x, faces, rest), 21.0, rtol=1e-9)
-    np.testing.assert_allclose(distance(x[:2] + [0.0, 0.003, 0.004], x), 5.0, rtol=1e-9)
+    np.testing.assert_allclose(distance(x[:2] + np.array([0.0, 0.003, 0.004]), x), 5.0, rtol=1e-9)
     corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
     squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     box = np.array([half for a, b, c, d in squares for half in ((a, b, c), (a, c, d))])

@@ -119,9 +119,9 @@ def trouble_of(run: Run, tables: Mapping[str, Table]) -> tuple[str, bool, list[s
     order = [*(status for status in WRONG if status in counts), *(s for s in counts.index if s not in WRONG)]
     text = ", ".join(f"{counts[status]} {status}" for status in order)
     lines = []
-    for row in merged(tables["unfinished"], ("suite", "scene")).rows:
-        own = dict(zip(names, row))
+    for line in merged(tables["unfinished"], ("suite", "scene")).rows:
+        own = dict(zip(names, line))
         label = run.label(str(own["method"]))
         lines.append(f"{own['status']}: {label}, seed {own['seed']}, {own['scene']}: {own['reason']}")
-    lines.sort(key=lambda line: order.index(line.partition(":")[0]))
+    lines.sort(key=lambda said: order.index(said.partition(":")[0]))
     return f"Not every cell ran to its end: {text}.", any(status in counts for status in WRONG), lines

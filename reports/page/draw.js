@@ -134,6 +134,11 @@ class Drawing {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   }
 
+  // What is drawn from now on hides all that was drawn before.
+  forgetDepth() {
+    this.gl.clear(this.gl.DEPTH_BUFFER_BIT);
+  }
+
   draw(mesh, camera, plain, values, limit) {
     const gl = this.gl;
     gl.uniformMatrix4fv(this.at.project, false, camera.project);

@@ -8,7 +8,7 @@ const COLOURS = {
   curvature: { title: 'Mean curvature', unit: '1/m', stops: SEQUENTIAL },
   area: { title: 'Change of area from rest', unit: '%', stops: DIVERGING },
   distance: { title: 'Distance to the simulation', unit: 'mm', stops: SEQUENTIAL },
-  depth: { title: 'Depth under the skin', unit: 'mm', stops: SEQUENTIAL },
+  depth: { title: 'Depth under the skin', unit: 'mm', stops: SEQUENTIAL, through: true }, // the skin would hide it
 };
 const BRIGHTEST = 0.98; // share of the values of all panes below the end of the scale
 const HOLD = 500; // at the end, before it starts again [ms]
@@ -125,6 +125,7 @@ function colourScale() {
   const own = COLOURS[state.colour];
   const values = arrays.map((one) => one[state.colour]).filter(Boolean);
   byId('scale').hidden = byId('limits').hidden = !own.stops;
+  view.through = own.through;
   if (!own.stops) return;
   const limit = roundUp((quantile(values, BRIGHTEST) || 1) * 1.6 ** Number(byId('limit').value), [1, 1.5, 2, 3, 4, 5, 6, 8]);
   view.limit = limit;

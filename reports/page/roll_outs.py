@@ -70,7 +70,7 @@ def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
         depths = _depths(cloths, body) if body else {}
         for method, cloth in cloths.items():
             scene = dict(found.scenes.get(group.scene) or {"body": None, "methods": {}})
-            texts = {}
+            texts: dict[str, str] = {}
             if body and scene["body"] is None:
                 scene["body"] = _kept(texts, _body(body))
             pack = _cloth(folder, group.scene, cloth, references.get(group.scene), depths.get(method))
@@ -148,7 +148,7 @@ def _rest_areas(folder: RunFolder, scene: str, faces: int) -> np.ndarray | None:
 
 
 def _depths(cloths: Mapping[str, Trajectory], body: Trajectory) -> dict[str, np.ndarray]:
-    """Method -> (T,V) [mm] below the skin; all methods of a frame at once, for the search tree is the cost."""
+    """Method -> (T,V) [mm] below the skin; all of a frame at once, for its search tree is the cost."""
     found = {method: np.zeros(cloth.positions.shape[:2]) for method, cloth in cloths.items()}
     for frame in range(body.frames):
         having = [method for method, cloth in cloths.items() if frame < cloth.frames]
@@ -161,13 +161,14 @@ def _depths(cloths: Mapping[str, Trajectory], body: Trajectory) -> dict[str, np.
 
 
 def _body(body: Trajectory) -> Pack:
-    """The skin with few faces: the same vertices of it in every frame."""
+    """The skin with few faces, the same vertices of it in every frame; whole where its faces do not close."""
     import igl
 
     kept, faces = np.arange(body.positions.shape[1]), body.faces.astype(np.int64)
     if len(faces) > SKIN_FACES:
         first = np.ascontiguousarray(body.positions[0], dtype=float)
-        _, faces, _, kept = igl.decimate(first, np.ascontiguousarray(faces), SKIN_FACES)
+        _, fewer, _, birth = igl.decimate(first, np.ascontiguousarray(faces), SKIN_FACES)
+        kept, faces = (birth, fewer) if len(fewer) else (kept, faces)
     pack = Pack()
     pack.indices("faces", faces)
     pack.numbers("times", body.times)

@@ -38,7 +38,7 @@ def mean_curvature(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def area_change(positions: np.ndarray, faces: np.ndarray, rest_areas: np.ndarray) -> np.ndarray:
-    """Area over rest area less 1 (T,V) [%], mean over a vertex's faces by rest area; rest_areas (F,) [m^2]."""
+    """Area over rest area less 1 (T,V) [%], mean over a vertex's faces by rest area; those (F,) [m^2]."""
     corners = positions[:, faces]
     normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
     areas = 0.5 * np.linalg.norm(normals, axis=-1)

@@ -63,6 +63,7 @@ class View {
       this.drawing.begin([box.left - outer.left, box.top - outer.top, box.width, box.height], background);
       const camera = this.camera(centre, box.width / box.height);
       if (this.skin && this.withBody) this.drawing.draw(this.skin.mesh, camera, SKIN, null, 1);
+      if (this.through) this.drawing.forgetDepth();
       this.drawing.draw(pane.mesh, camera, CLOTH, pane.values, this.limit);
     }
   }
