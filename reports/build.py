@@ -177,7 +177,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status: 0 made; 1 made, but some file of the run could not be read; 2 no run folder."""
     parser = argparse.ArgumentParser(
         prog="python -m reports.build",
-        description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run from its files.",
+        description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run.",
         epilog="Exit status: 0 when all is made, 1 when some file of the run could not be read (the report "
         "names it), 2 when RUN_DIR is no run folder.",
     )
