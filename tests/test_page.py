@@ -295,9 +295,11 @@ def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(t
     cloth[3:] = np.nan
     write_mesh(run.trajectory_path(WHOLE, "snug"), cloth, faces, {})
     run.trajectory_path(WHOLE, "pbns").write_bytes(b"no mesh")
+    run.rest_areas_path(WHOLE).write_bytes(b"no areas")
     (problem,) = write(run)
     assert "pbns.vtkhdf" in problem
-    assert len(arrays_of(run, WHOLE, "snug")["positions"]) == 3
+    found = arrays_of(run, WHOLE, "snug")
+    assert len(found["positions"]) == 3 and "area" not in found
     assert "pbns" not in content_of(run)["scenes"][WHOLE]["methods"]
     first = run.page_path.read_bytes()
     assert "pbns.vtkhdf" in first.decode()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,6 @@ SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whol
 BLOCK = 32  # frames at a time, to bound memory
 ROOM = 1500  # bytes beside a text: its tags, and what the content says of it
 NOTE = 400  # bytes to say that roll-outs of a scene were left out
-CURVES = ("energy", "curvature")  # families of metrics whose numbers per frame are drawn
 Reader = Callable[[Path], "Trajectory | None"]
 
 
@@ -68,12 +67,13 @@ def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
             references[group.scene] = cloths[run.reference]
         body = read(folder.trajectory_path(group.scene, "body"))
         depths = _depths(cloths, body) if body else {}
+        rest = _rest_areas(folder.rest_areas_path(group.scene))
         for method, cloth in cloths.items():
             scene = dict(found.scenes.get(group.scene) or {"body": None, "methods": {}})
             texts: dict[str, str] = {}
             if body and scene["body"] is None:
                 scene["body"] = _kept(texts, _body(body))
-            pack = _cloth(folder, group.scene, cloth, references.get(group.scene), depths.get(method))
+            pack = _cloth(cloth, rest, references.get(group.scene), depths.get(method), run.metrics)
             scene["methods"] = {**scene["methods"], method: _kept(texts, pack) | {"ending": _ending(cloth)}}
             new = {name: text for name, text in texts.items() if name not in found.texts}
             budget -= sum(ROOM + len(text) for text in new.values())
@@ -112,17 +112,17 @@ def _ending(cloth: Trajectory) -> str:
 
 
 def _cloth(
-    folder: RunFolder, scene: str, cloth: Trajectory, reference: Trajectory | None, depths: np.ndarray | None
-) -> Pack:
-    """Positions, times, colours and curves of a roll-out."""
+    cloth: Trajectory, rest: np.ndarray | None, reference: Trajectory | None, depths: np.ndarray | None,
+    curves: Container[str],
+) -> Pack:  # fmt: skip
+    """Positions, times, colours, and those numbers per frame that `curves` holds, of a roll-out."""
     pack, faces = Pack(), cloth.faces
     pack.indices("faces", faces)
     pack.numbers("times", cloth.times)
     pack.positions("positions", cloth.positions)
     blocks = [cloth.positions[k : k + BLOCK] for k in range(0, cloth.frames, BLOCK)]
     pack.values("curvature", np.concatenate([mean_curvature(block, faces) for block in blocks]))
-    rest = _rest_areas(folder, scene, len(faces))
-    if rest is not None:
+    if rest is not None and rest.shape == (len(faces),):
         strain = np.concatenate([area_change(block, faces, rest) for block in blocks])
         pack.values("area", strain, signed=True)
     if reference is not None and _comparable(cloth, reference):
@@ -130,7 +130,7 @@ def _cloth(
     if depths is not None:
         pack.values("depth", depths)
     for name, curve in cloth.frame_fields.items():
-        if name.partition("/")[0] in CURVES:
+        if name in curves:
             pack.numbers(name, curve)
     return pack
 
@@ -140,11 +140,12 @@ def _comparable(cloth: Trajectory, reference: Trajectory) -> bool:
     return same and np.allclose(cloth.times, reference.times[: cloth.frames])
 
 
-def _rest_areas(folder: RunFolder, scene: str, faces: int) -> np.ndarray | None:
-    """(F,) [m^2] where the run kept them."""
-    path = folder.rest_areas_path(scene)
-    areas = np.load(path) if path.is_file() else np.empty(0)
-    return areas if areas.shape == (faces,) else None
+def _rest_areas(path: Path) -> np.ndarray | None:
+    """(F,) [m^2]; None where there are none to be read, and the page then offers no change of area."""
+    try:
+        return np.load(path)
+    except (OSError, ValueError):
+        return None
 
 
 def _depths(cloths: Mapping[str, Trajectory], body: Trajectory) -> dict[str, np.ndarray]:
