@@ -209,7 +209,7 @@ class RunLog:
         self.folder.write_config(self.config)
 
     def make_report(self) -> bool:
-        """tables/, figures/ and report.pdf from the files; a failure is said and leaves the results."""
+        """tables/, figures/, report.html and report.pdf; a failure is said and leaves the results."""
         self.note("finished", now())
         try:
             with self.stage("report"):

@@ -26,7 +26,6 @@ TRAJECTORY_SUFFIXES = (".vtkhdf", ".hdf")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
 FARTHEST = 1e12  # in any unit: squares and cubes of it are still numbers
-LONGEST_HEADER = 1 << 16  # [bytes] of a PLY
 # What programs call the texture coordinates of a vertex: two numbers, or one array of both.
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 UV_ARRAYS = ("UV", "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
