@@ -121,7 +121,8 @@ def check(
         motions = dict.fromkeys([TRAIN, *(scene.motion for scene in plan.scenes if scene.dressed)])
         assets = open_assets(plan.preset, embedded_motions(motions), plan.garments)
     schedule = Schedule(plan)
-    before = [task for task in schedule.tasks() if task.stage in ("ground truth", "training")]
+    of_methods = dataclasses.replace(plan, cells=tuple(c for c in plan.cells if c.entry.declared_in))
+    before = [t for t in Schedule(of_methods).tasks() if t.stage in ("ground truth", "training")]
     runner = Runner(before, Cache(run))
     runner.run(LocalExecutor(run, assets, 1), _Quiet())
     executor = LocalExecutor(run, assets, 1)
