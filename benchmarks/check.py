@@ -71,10 +71,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     wrong = 0
-    with tempfile.TemporaryDirectory() as folder:
-        for line, fine in check(declared, Path(folder), options.seconds):
-            print(line, flush=True)
-            wrong += not fine
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            for line, fine in check(declared, Path(folder), options.seconds):
+                print(line, flush=True)
+                wrong += not fine
+    except ValueError as error:  # there is no such motion
+        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
     print("nothing is wrong" if not wrong else f"{wrong} to mend")
     return 1 if wrong else 0
 
@@ -108,12 +112,17 @@ def check(
     from .schedule import Schedule
 
     plan = plan_of(declared, folder)
+    for entry in declared["methods"]:
+        if not any(cell.entry is entry for cell in plan.cells):
+            why = next(filter(None, map(entry.skip, SCENES)), "no scene is meant for it")
+            yield f"{entry.name}: wrong\n  is skipped in every scene: {why}", False
     run, assets = RunFolder(folder), None
     if plan.garments:
         motions = dict.fromkeys([TRAIN, *(scene.motion for scene in plan.scenes if scene.dressed)])
         assets = open_assets(plan.preset, embedded_motions(motions), plan.garments)
     schedule = Schedule(plan)
-    before = [task for task in schedule.tasks() if task.stage in ("ground truth", "training")]
+    of_methods = dataclasses.replace(plan, cells=tuple(c for c in plan.cells if c.entry.declared_in))
+    before = [t for t in Schedule(of_methods).tasks() if t.stage in ("ground truth", "training")]
     runner = Runner(before, Cache(run))
     runner.run(LocalExecutor(run, assets, 1), _Quiet())
     executor = LocalExecutor(run, assets, 1)

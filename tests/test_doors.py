@@ -292,6 +292,7 @@ def test_a_file_that_cannot_be_meant_is_one_line(text, words, tmp_path, monkeypa
         ("--metrics", "twice.py", "metric 'energy/total' is declared twice, by the project itself and by "),
         ("--metrics", "bare.py", "metric 'mine/x' has no unit"),
         ("--scenes", "taken.py", "a case of the project has this name"),
+        ("--scenes", "worn.py", "no garment is called 'toga'; there are tshirt, "),
         ("--methods", "random.py", "Python knows random as"),
         (
             "--methods",
@@ -311,6 +312,8 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
     (tmp_path / "twice.py").write_text(text)
     (tmp_path / "bare.py").write_text(text.replace("energy/total", "mine/x").replace('unit="m"', 'unit=""'))
     (tmp_path / "taken.py").write_text(SCENE_FILE.replace('"lift", d', '"membrane/uniaxial", d'))
+    worn = SCENE_FILE.replace('"lift", d', '"worn", garment="toga", motion="kick", d')
+    (tmp_path / "worn.py").write_text(worn)
     (tmp_path / "random.py").write_text("METHODS = ()\n")
     for module, name in (("one", "packed"), ("two", "packed"), ("other", "snug")):
         installed(tmp_path / "site", module, name=name)
@@ -593,6 +596,12 @@ def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monke
     monkeypatch.setattr(check, "BARE", ("free_fall",))
     found = list(check.check({"methods": [entry], "scenes": [], "metrics": []}, tmp_path, 4.0))
     assert [fine for _, fine in found] == [False] and words in found[0][0]
+
+
+def test_the_check_says_what_is_skipped_everywhere(tmp_path):
+    entry = MethodEntry(name="m", description="", module="misbehaving", package="nowhere")
+    ((line, fine),) = check.check({"methods": [entry], "scenes": [], "metrics": []}, tmp_path)
+    assert not fine and "is skipped in every scene: m needs the package nowhere" in line
 
 
 @pytest.fixture

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from reference_sim.energies import Energy
 
+    from ..assets import Assets
+
 FEWEST = 3  # frames: inertia needs two before the one that is judged
 MOVED = 0.02  # of the mean edge, for the places at which derivatives are compared
 STEP = 1e-6  # [m] of central differences: their error is some 1e-7 of the derivative
@@ -29,6 +31,9 @@ class CheckScene(Task):
     kind = "check"
     stage = "check"
     scene: Scene
+
+    def assets(self, assets: Assets | None) -> Assets | None:
+        return assets.only(self.scene.motion) if assets is not None and self.scene.dressed else None
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         findings = Findings(self.scene.declared_in or self.scene.module)
