@@ -279,7 +279,7 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
     if status != "ok" and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
-    return status, ("" if status == "ok" else reason)
+    return status, ("" if trajectory.status == "converged" else reason)
 
 
 def peak_memory() -> float:
