@@ -92,7 +92,7 @@ def _rows(
         value, uncertainty = found if isinstance(found, (tuple, list)) else (found, None)
         metric, why, ended = find_metric(name, outside), reason, status
         if name == "cost/frame" and not entry.timed:
-            why = why or DECLARED
+            why = DECLARED
         if name == "cost/spread" and value > 100.0 * SPREAD:
             why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
         judged: dict[str, Any] = {}

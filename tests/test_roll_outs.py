@@ -177,7 +177,7 @@ def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):
         method.prepare(SCENE)  # its last frame comes before the scene's
     np.savez(path, positions=np.concatenate([X[::2], 2 * X[-1:] - X[-2:-1]]))
     method.prepare(SCENE)
-    assert np.allclose(method.stored.positions[1], (X[0] + X[2]) / 2) and "linear" in method.done[0]
+    assert np.allclose(method.stored.positions[1], (X[0] + X[2]) / 2) and "linear" in method.run().reason
     assert np.array_equal(method.stored.positions[::2], X[::2])
 
 

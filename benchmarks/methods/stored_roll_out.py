@@ -41,7 +41,7 @@ class Stored(Method):
         return None if held is None else self._trajectory(held, self.stored)
 
     def _trajectory(self, positions: np.ndarray, stored: StoredRollOut) -> Trajectory:
-        finite = bool(np.isfinite(positions).all())
+        finite, changes = bool(np.isfinite(positions).all()), "; ".join(self.done)
         # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
         claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
         return Trajectory(
@@ -49,12 +49,8 @@ class Stored(Method):
             faces=np.asarray(self.scene.cloth.faces),
             times=np.arange(len(positions)) * self.scene.dt,
             status="ok" if finite else "diverged",
-            reason="" if finite else f"{self.path}: holds a position that is not finite",
-            provenance={
-                "method": "stored roll-out",
-                "file": Path(self.path).name,
-                "changes": list(self.done),
-            },
+            reason=changes if finite else f"{self.path}: holds a position that is not finite",
+            provenance={"method": "stored roll-out", "file": Path(self.path).name, "changes": changes},
             frame_fields={"converged": claims},
         )
 
