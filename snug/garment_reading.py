@@ -122,7 +122,7 @@ def _of_place(reading: Reading, file: GarmentFile, wearer: Wearer, raw: Surface)
         shift = ",".join(f"{value:g}" for value in mend.shift)
         words = {"units": (mend.units, file.units), "up": (mend.up, file.up)}
         given = [f"{OPTION}{name} {found}" for name, (found, was) in words.items() if found != was]
-        given += [f"{OPTION}shift {shift}"] if mend.shift != file.shift else []
+        given += [f"{OPTION}shift={shift}"] if mend.shift != file.shift else []
         remedy = " ".join(given)
     reading.find("place", f"does not lie on the body ({size} m, {problem})", remedy, "unusable")
     return False
@@ -135,7 +135,8 @@ def _of_rest(reading: Reading, file: GarmentFile, surface: Surface) -> Array | N
         reading.find("rest", "the mesh itself; the file has no UV")
         return None
     try:
-        chart = rest_chart(surface, file.uv_scale or METRES[file.units], prefix=OPTION)
+        scale = METRES[file.units] if file.uv_scale is None else file.uv_scale
+        chart = rest_chart(surface, scale, prefix=OPTION)
     except MeshError as error:
         says, _, remedy = str(error).partition(": ")
         if asked:
@@ -144,11 +145,9 @@ def _of_rest(reading: Reading, file: GarmentFile, surface: Surface) -> Array | N
             reading.find("rest", f"the mesh itself; {says}")
         return None
     off = np.abs(stretches(surface.positions[surface.faces], chart) - 1).max(axis=1)
-    strain = (
-        f"on the mesh stretched by {np.median(off):.1%} (median), {np.quantile(off, 0.99):.0%} (99 % of it)"
-    )
-    reading.find("rest", f"{'the UV chart' if asked else 'the mesh itself; the UV chart is'}, {strain}"
-                 .replace("is,", "is"))  # fmt: skip
+    most = f"99 % of it by less than {np.quantile(off, 0.99):.0%}"
+    strain = f"stretched by {np.median(off):.1%} on the mesh (median; {most})"
+    reading.find("rest", f"the UV chart, {strain}" if asked else f"the mesh itself; its UV chart is {strain}")
     return chart if asked else None
 
 

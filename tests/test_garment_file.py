@@ -194,7 +194,7 @@ def test_the_shift_that_is_said_mends_a_displaced_garment(tmp_path, body, shirt,
     path = saved(tmp_path, shirt, positions=shirt.rest_positions + away)
     with pytest.raises(GarmentError, match=r"mm deep in the body|fits far better") as refused:
         GarmentFile(path=path).read(body)
-    shift = tuple(map(float, str(refused.value).rpartition("--garment-shift ")[2].split(",")))
+    shift = tuple(map(float, str(refused.value).rpartition("--garment-shift=")[2].split(",")))
     np.testing.assert_allclose(np.add(shift, away), 0.0, atol=0.02)
     GarmentFile(path=path, shift=shift).read(body)
 
@@ -238,7 +238,7 @@ def test_wrong_weights_are_refused(tmp_path, body, tube, weights, words):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--garment-shift", "1,2"], "give three numbers"),
+        (["--garment-shift=-1,2"], "give three numbers"),
         (["--garment-uv-scale", "2"], "add --garment-rest uv"),
     ],
 )
