@@ -212,7 +212,8 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     except ValueError:
         raise PlanError(f"--seeds '{text[:40]}': give whole numbers separated by commas") from None
     if not seeds or min(seeds) < 0 or max(seeds) >= 1 << 63:
-        raise PlanError(f"--seeds '{text[:40]}': give at least one whole number, none below 0 or beyond 63 bits")
+        wanted = "at least one whole number, none below 0 or beyond 63 bits"
+        raise PlanError(f"--seeds '{text[:40]}': give {wanted}")
     return seeds
 
 
