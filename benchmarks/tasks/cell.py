@@ -281,8 +281,7 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
     if status != "ok" and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
-    # A reference says where round-off excused it; what others say beside an ok is for no row.
-    return status, (reason if status != "ok" or trajectory.status == "converged" else "")
+    return status, reason
 
 
 def peak_memory() -> float:
