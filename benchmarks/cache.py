@@ -2,7 +2,8 @@
 twice.
 
 An entry is written whole after the files that it speaks of. A run that is killed therefore loses what it was
-at, and nothing else. Stored files are compared with their hash before they are used again.
+at, and nothing else. It holds the digest of each of its files, and of itself: what is not as it was written
+is missing, and done again.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from .results import RunFolder, replacing
-from .source import code_of, data_of, digest, digest_of_file, packages_of
+from .json_file import ResultsError, read_json
+from .results import RunFolder, digest_of_file, replacing
+from .source import code_of, data_of, digest, packages_of
 from .tasks.task import Outcome, Task, TaskId
 
 STATES = ("finished", "failed", "stale", "missing")
@@ -28,8 +30,8 @@ NOWHERE: Mapping[str, Any] = {}
 class Found:
     """What the folder says of a task. state: one of STATES; why: what has changed, or what failed.
 
-    outcome: that of the entry, also of a stale one; None without one, or where its files are gone. content:
-    equal where what others read of it is. wanted: to be done now.
+    outcome: that of the entry, also of a stale one; None without one, or where its files are gone or damaged.
+    content: equal where what others read of it is. wanted: to be done now.
     """
 
     state: str
@@ -59,28 +61,30 @@ class Cache:
         """Whether the task is done, and what came of it. others: what is known of those that it reads."""
         state, why, entry = self._state(task, others)
         outcome = None
-        if entry:
-            outcome = Outcome(**entry["outcome"], files=tuple(entry["files"]), origin=entry["origin"])
+        if state != "missing":
+            files = entry["files"]
+            outcome = Outcome(**entry["outcome"], files=tuple(files), digests=files, origin=entry["origin"])
             if state == "stale":
                 outcome = dataclasses.replace(outcome, remark=f"kept though {why} changed")
-        gone = state == "missing"
-        return Found(
-            state, why, None if gone else outcome, "" if gone else _content(entry), wanted=state in self.only
-        )
+        content = "" if outcome is None else _content(entry)
+        return Found(state, why, outcome, content, wanted=state in self.only)
 
     def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Found]) -> Found:
         """Write the entry, after the files; gives what find() would."""
-        names = outcome.files
+        files = {name: digest_of_file(self.folder.path / name) for name in outcome.files}
+        outcome = dataclasses.replace(outcome, digests=files)
         entry = {
+            "task": task.title,
             "parts": dependencies(task),
             "needs": _needs(task, others),
             "written": datetime.now().astimezone().isoformat(timespec="seconds"),
             "origin": self.origin,
-            "files": {name: digest_of_file(self.folder.path / name) for name in names},
+            "files": files,
             "outcome": {name: getattr(outcome, name) for name in _KEPT},
         }
+        text = _text(entry | {"digest": digest(_text(entry).encode())})
         with replacing(self.path(task)) as temporary:
-            temporary.write_text(json.dumps(entry, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+            temporary.write_text(text, encoding="utf-8")
         state = "failed" if outcome.failed else "finished"
         return Found(state, _why(outcome), outcome, _content(entry), wanted=False)
 
@@ -95,20 +99,19 @@ class Cache:
         return self.folder.cache / task.kind / f"{task.name}.json"
 
     def _state(self, task: Task, others: Mapping[TaskId, Found]) -> tuple[str, str, dict[str, Any]]:
-        try:
-            entry = json.loads(self.path(task).read_text(encoding="utf-8"))
-            parts, files, needs = dict(entry["parts"]), dict(entry["files"]), dict(entry["needs"])
-            outcome = Outcome(**entry["outcome"], origin=entry["origin"])
-        except FileNotFoundError:
+        path = self.path(task)
+        if not path.is_file():
             return "missing", "", {}
-        except (ValueError, KeyError, TypeError):
-            return "missing", "its entry cannot be read", {}
-        for name in files:
-            if not (self.folder.path / name).is_file():
-                return "missing", f"{name} is gone", entry
-        for name, content in files.items():
-            if _content_of_file(self.folder.path / name) != content:
-                return "stale", name, entry
+        try:
+            entry = read_json(path)
+            own = entry.pop("digest", "")
+        except ResultsError:
+            own, entry = "", {}
+        if own != digest(_text(entry).encode()) or entry["task"] != task.title:
+            return "missing", "its entry is damaged", {}
+        outcome, parts, needs = Outcome(**entry["outcome"]), entry["parts"], entry["needs"]
+        if damage := damaged(self.folder, entry["files"]):
+            return "missing", damage, {}
         now = dependencies(task)
         changed = [name for name in now if parts.get(name) != now[name]]
         changed += [name for name in parts if name not in now]
@@ -117,6 +120,17 @@ class Cache:
         if changed:
             return "stale", ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""), entry
         return ("failed", _why(outcome), entry) if outcome.failed else ("finished", "", entry)
+
+
+def damaged(folder: RunFolder, files: Mapping[str, str]) -> str:
+    """Which of these files, name -> digest, is gone or not as it was written; empty where none is."""
+    for name, content in files.items():
+        path = folder.path / name
+        if not path.is_file():
+            return f"{name} is gone"
+        if digest_of_file(path) != content:
+            return f"{name} is damaged"
+    return ""
 
 
 _KEPT = ("status", "reason", "failed", "result", "seconds")
@@ -139,17 +153,9 @@ def _why(outcome: Outcome) -> str:
 
 
 def _content(entry: Mapping[str, Any]) -> str:
-    """Equal where the files are, and what the task says of them. What succeeds again is another, by its time:
-    metrics have added curves to a trajectory, which one with the same positions lacks.
-    """
-    if not entry:
-        return ""
-    outcome = entry["outcome"] | ({"seconds": 0.0} if entry["outcome"]["failed"] else {})
-    return digest([entry["files"], outcome])
+    """Equal where the files are, and what the task says of them, whatever time it took."""
+    return digest([entry["files"], entry["outcome"] | {"seconds": 0.0}])
 
 
-def _content_of_file(path: Path) -> str:
-    try:
-        return digest_of_file(path)
-    except (OSError, KeyError):
-        return "damaged"
+def _text(entry: Mapping[str, Any]) -> str:
+    return json.dumps(entry, indent=1, ensure_ascii=False) + "\n"

@@ -15,11 +15,11 @@ from .cache import Cache
 from .console import remarks, summary
 from .executor import LocalExecutor
 from .plan import Plan, runs
-from .results import Row, RunFolder, with_provenance
+from .results import Row, RunFolder, digest_of_file, with_provenance
 from .rows import described, rows_of
 from .runner import Runner
 from .schedule import tasks_of
-from .tasks.task import one_line
+from .tasks.task import RunStopped, one_line
 
 if TYPE_CHECKING:
     from .assets import Assets
@@ -40,7 +40,7 @@ def execute(plan: Plan) -> int:
             except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
                 runner.refuse(("start", "data", "network"), one_line(error))
         runner.run(LocalExecutor(log.folder, assets, plan.workers), log)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, RunStopped):
         log.note("interrupted", True)
         rows = rows_of(plan, runner.tasks, runner.known())
         if rows or not log.folder.rows_path.is_file():  # nothing known is no reason to lose a table
@@ -174,6 +174,8 @@ class RunLog:
         outcomes = [runner.outcomes["cell", cell.name] for cell in self.plan.cells if runs(cell)]
         cells = {"run": len(outcomes), "failed": sum(outcome.failed for outcome in outcomes)}
         self.config |= {"tasks": of_kind, "cells": cells, "outdated": runner.outdated()}
+        for outcome in runner.outcomes.values():
+            self.config["digests"] |= outcome.digests
         self.folder.write_config(self.config)
 
     def write_rows(self, rows: Sequence[Row]) -> None:
@@ -185,6 +187,7 @@ class RunLog:
         ]
         self.folder.write_rows(self.rows)
         self.config |= described(self.plan, self.rows)
+        self.config["digests"] = {self.folder.rows_path.name: digest_of_file(self.folder.rows_path)}
         self.folder.write_config(self.config)
 
     def make_report(self) -> bool:

@@ -15,9 +15,10 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any, Protocol
 
 from .assets import Assets
+from .cache import damaged
 from .process import IsolatedProcess
 from .results import RunFolder
-from .tasks.task import Context, Outcome, Task, TaskId, failure, tell_nobody
+from .tasks.task import Context, Outcome, RunStopped, Task, TaskId, failure, tell_nobody
 
 POLL = 0.2  # [s] between looks at the progress
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
@@ -172,6 +173,7 @@ def _end(futures: set[Future[Any]]) -> None:
 # --- in the process ----------------------------------------------------------------------------------------
 
 _context: Context
+_verified: set[tuple[str, str]] = set()  # files that this process has compared with their digests
 
 
 def _begin(context: Context, progress: Any = None) -> None:
@@ -187,9 +189,18 @@ def _forget() -> None:
 
 
 def _perform(task: Task, needed: Needed) -> Outcome:
+    for outcome in needed.values():
+        _verify(outcome.digests)
     clock = time.perf_counter()
     try:
         outcome = task.run(_context, needed)
     except Exception as error:
         outcome = failure(error)
     return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
+
+
+def _verify(digests: Mapping[str, str]) -> None:
+    """Raises RunStopped where a file is not as it was written: the next run makes it anew."""
+    if damage := damaged(_context.folder, dict(digests.items() - _verified)):
+        raise RunStopped(f"{damage} since this run wrote it")
+    _verified.update(digests.items())

@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import hashlib
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from .json_file import ResultsError, check_config, read_json
 
 FORMAT = 3  # of run.json, results.csv and the cache; written into run.json
 OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
@@ -43,10 +46,6 @@ def as_right(family: str, level: float | None) -> bool:
     if family == "simulation-tolerance":
         return level is not None and level <= REFERENCE_TOLERANCE
     return family in ("simulation-perturbed", "simulation-refrozen")
-
-
-class ResultsError(ValueError):
-    """A run folder or one of its files is absent or not what it should be; the message names it."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +111,8 @@ class Row:
 _OPTIONAL_NUMBERS = ("value", "expected", "tolerance", "uncertainty", "level")
 _WHOLE_NUMBERS = ("seed", "threads")
 _TRUTHS = {"true": True, "false": False}
+_NAMES = ("suite", "scene", "method", "metric", "garment", "motion", "part", "family", "role", "base")
+LONGEST = 150  # bytes of such a name: files are named after it
 
 
 def row_to_cells(row: Row) -> dict[str, str]:
@@ -131,13 +132,18 @@ def row_to_cells(row: Row) -> dict[str, str]:
 
 
 def cells_to_row(cells: dict[str, str]) -> Row:
-    """The row written in the cells. Raises ResultsError for a cell that is no number where one is due."""
+    """The row written in the cells. Raises ResultsError for one that is no number, or name, as it should."""
     values: dict[str, Any] = dict(cells)
     try:
         for name in _OPTIONAL_NUMBERS:
             values[name] = float(cells[name]) if cells[name] else None
         for name in _WHOLE_NUMBERS:
             values[name] = int(cells[name])
+            if abs(values[name]) >= 1 << 63:
+                raise ValueError("a number beyond 64 bits")
+        for name in _NAMES:
+            if not cells[name].isprintable() or len(cells[name].encode()) > LONGEST:
+                raise ValueError(f"no name of at most {LONGEST} printable bytes")
         name = "seeded"
         values[name] = _TRUTHS[cells[name]]
     except (ValueError, KeyError) as error:
@@ -145,16 +151,17 @@ def cells_to_row(cells: dict[str, str]) -> Row:
     return Row(**values)
 
 
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path`: renamed to it when the block ends well, removed when it does not."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+def replacing(path: Path) -> AbstractContextManager[Path]:
+    """See reference_sim.whole_file, which is not loaded before something is written."""
+    from reference_sim import whole_file
+
+    return whole_file.replacing(path)
+
+
+def digest_of_file(path: Path) -> str:
+    """16 hexadecimal digits of a file's bytes. Raises OSError."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
 
 
 def model_path(models: Path, kind: str, seed: int) -> Path:
@@ -217,6 +224,10 @@ class RunFolder:
         """A method's answer to each frame held still, beside its trajectory."""
         return self.trajectory_path(scene, f"{method}-quasi-static", seed)
 
+    def curves_path(self, scene: str, method: str, seed: int = 0) -> Path:
+        """What was measured of each frame of a trajectory, beside it: name -> (T,)."""
+        return self.trajectory_path(scene, method, seed).with_suffix(".npz")
+
     def start_path(self, scene: str) -> Path:
         """The settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")
@@ -238,17 +249,20 @@ class RunFolder:
 
     def read_config(self) -> dict[str, Any]:
         """The configuration. Raises ResultsError when run.json is absent or broken."""
-        try:
-            config = json.loads(self.config_path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise ResultsError(f"{self.config_path}: no such file; is this the folder of a run?") from None
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            raise ResultsError(f"{self.config_path}: not readable as JSON ({error})") from None
-        if not isinstance(config, dict):
-            raise ResultsError(f"{self.config_path}: holds no JSON object")
+        config = read_json(self.config_path)
         if config.get("format") != FORMAT:
             raise ResultsError(f"{self.config_path}: {OLD}")
+        check_config(self.config_path, config)
         return config
+
+    def changed(self, config: dict[str, Any]) -> list[str]:
+        """Files of the run that are not as it wrote them; those that are gone are not named."""
+        paths = {name: self.path / name for name in config.get("digests") or ()}
+        return [
+            name
+            for name, path in paths.items()
+            if path.is_file() and digest_of_file(path) != config["digests"][name]
+        ]
 
     def write_rows(self, rows: Iterable[Row]) -> None:
         """Write results.csv whole or not at all."""
@@ -266,21 +280,27 @@ class RunFolder:
             stream = self.rows_path.open(newline="", encoding="utf-8")
         except FileNotFoundError:
             raise ResultsError(f"{self.rows_path}: no such file; is this the folder of a run?") from None
-        rows = []
         with stream:
-            reader = csv.DictReader(stream)
-            if tuple(reader.fieldnames or ()) == COLUMNS[: COLUMNS.index("garment")]:
-                raise ResultsError(f"{self.rows_path}: {OLD}")
-            if tuple(reader.fieldnames or ()) != COLUMNS:
-                raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
-            for cells in reader:
-                if None in cells or None in cells.values():
-                    line = f"{self.rows_path}: line {reader.line_num}"
-                    raise ResultsError(f"{line}: {len(COLUMNS)} cells are due")
-                try:
-                    rows.append(cells_to_row(cells))
-                except ResultsError as error:
-                    raise ResultsError(f"{self.rows_path}: line {reader.line_num}: {error}") from None
+            try:
+                return self._rows(stream)
+            except (UnicodeDecodeError, csv.Error) as error:  # also for a cell of 131 kB
+                raise ResultsError(f"{self.rows_path}: not readable as CSV in UTF-8 ({error})") from None
+
+    def _rows(self, stream: Iterable[str]) -> list[Row]:
+        rows = []
+        reader = csv.DictReader(stream)
+        if tuple(reader.fieldnames or ()) == COLUMNS[: COLUMNS.index("garment")]:
+            raise ResultsError(f"{self.rows_path}: {OLD}")
+        if tuple(reader.fieldnames or ()) != COLUMNS:
+            raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
+        for cells in reader:
+            line = f"{self.rows_path}: line {reader.line_num}"
+            if None in cells or None in cells.values():
+                raise ResultsError(f"{line}: {len(COLUMNS)} cells are due")
+            try:
+                rows.append(cells_to_row(cells))
+            except ResultsError as error:
+                raise ResultsError(f"{line}: {error}") from None
         return rows
 
 

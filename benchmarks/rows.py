@@ -44,7 +44,7 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
     if outcome.files and measured is None:
         return  # interrupted before it was measured
     metrics: dict[str, Any] = {}  # a number, or a number and its uncertainty
-    status, reason = outcome.status, outcome.reason or outcome.remark
+    status, reason = outcome.status, "; ".join(filter(None, (outcome.reason, outcome.remark)))
     if outcome.files:
         assert measured is not None
         if measured.status == "skipped":

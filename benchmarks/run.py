@@ -24,9 +24,10 @@ from .plan import Motions, OwnBody, OwnGarment, Plan, PlanError
 from .presets import PRESETS, find_preset
 from .provenance import usable_cores
 from .registry import DeclarationError
-from .results import ResultsError, RunFolder
+from .results import ResultsError, RunFolder, digest_of_file
 from .scenes import GARMENT_SCENES, all_scenes
 from .selection import Request, choose, choose_motions, choose_suites, names_no_motion
+from .tasks.task import RunStopped
 from .timing import one_thread
 
 PROGRAM = "benchmarks.run"
@@ -128,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(listing())
             return 0
         plan = make_plan(options, words)
-    except ValueError as error:  # also the readers' own errors: each is one line with file and remedy
+    except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     from .lock import HeldError, held
@@ -146,6 +147,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (HeldError, DeclarationError) as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
+    except (RunStopped, OSError) as error:
+        from reference_sim.whole_file import disk_full
+
+        line = str(error) if isinstance(error, RunStopped) else disk_full(error)
+        if not line:
+            raise
+        print(f"{PROGRAM}: {line}; the same command goes on from there", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
         return 130
@@ -201,8 +210,6 @@ def choose_body(path: str | None) -> OwnBody | None:
         return None
     from snug.body import Body
 
-    from .source import digest_of_file
-
     Body.from_file(path)
     return OwnBody(Path(path), digest_of_file(Path(path)))
 
@@ -225,8 +232,6 @@ def choose_garment(options: argparse.Namespace) -> OwnGarment | None:
         )
     from snug.body import Body
 
-    from .source import digest_of_file
-
     file.read(Body.from_file(options.body) if options.body else Body.load())
     return OwnGarment(file, tuple(map(digest_of_file, file.files)))
 
@@ -241,9 +246,10 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     try:
         seeds = tuple(dict.fromkeys(int(word) for word in split([text])))
     except ValueError:
-        raise PlanError(f"--seeds '{text}': give whole numbers separated by commas") from None
-    if not seeds or min(seeds) < 0:
-        raise PlanError(f"--seeds '{text}': give at least one whole number, none below 0")
+        raise PlanError(f"--seeds '{text[:40]}': give whole numbers separated by commas") from None
+    if not seeds or min(seeds) < 0 or max(seeds) >= 1 << 63:
+        wanted = "at least one whole number, none below 0 or beyond 63 bits"
+        raise PlanError(f"--seeds '{text[:40]}': give {wanted}")
     return seeds
 
 

@@ -149,7 +149,7 @@ class Runner:
         except (TypeError, ValueError, OSError) as error:  # a result that is no plain value, a file not there
             outcome = failure(error)
             self.found[task.id] = self.cache.keep(task, outcome, self.found)
-        self.outcomes[task.id] = outcome
+        self.outcomes[task.id] = self.found[task.id].outcome or outcome
 
     # --- without running -----------------------------------------------------------------------------------
 

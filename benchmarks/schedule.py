@@ -23,9 +23,10 @@ from .metrics import names_of
 from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
 from .registry import DeclarationError
+from .results import digest_of_file
 from .scene import Scene
 from .scenes import find_scene, of_garment
-from .source import digest, digest_of_file, find_module
+from .source import digest, find_module
 from .tasks.case import RunCase
 from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
 from .tasks.ground_truth import SettleStart, SimulateMotion, SimulateQuasiStatic

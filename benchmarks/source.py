@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from .registry import DeclarationError
+from .results import digest_of_file
 
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS = ("reference_sim", "snug", "benchmarks")
@@ -44,20 +45,6 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "items"):
         return dict(value)
     raise TypeError(f"cannot tell apart by content: {type(value).__name__}")
-
-
-def digest_of_file(path: Path) -> str:
-    """16 hexadecimal digits of a file's bytes; of a trajectory those of its positions.
-
-    Curves are added to a trajectory when it is measured; its positions stay as they were computed. Raises
-    OSError or KeyError for a trajectory that cannot be read.
-    """
-    if path.suffix != ".vtkhdf":
-        return digest(path.read_bytes())
-    import h5py
-
-    with h5py.File(path) as file:
-        return digest(file["VTKHDF/Points"][:].tobytes())
 
 
 def code_of(*modules: str) -> dict[str, str]:

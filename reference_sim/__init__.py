@@ -10,7 +10,8 @@ from .material import GRAVITY, Material
 from .minimise import Result, minimise
 from .potential import Potential
 from .simulator import simulate
-from .trajectory import Trajectory, TrajectoryError, TrajectoryWriter
+from .trajectory import Trajectory, TrajectoryError
+from .trajectory_writer import TrajectoryWriter
 
 if TYPE_CHECKING:
     from .obstacle import Obstacle

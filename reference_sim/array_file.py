@@ -27,12 +27,13 @@ class ArrayFileError(ValueError):
     """A file that is no .npy or .npz of plain arrays; the message names file and array."""
 
 
-def read_array(path: str | Path, *, limit: int = LIMIT) -> np.ndarray:
-    """The array of an .npy file. Raises ArrayFileError, also for one of more than `limit` bytes."""
+def read_array(path: str | Path) -> np.ndarray:
+    """The array of an .npy file, as long as the file. Raises ArrayFileError."""
     path = Path(path)
     try:
         with path.open("rb") as stream:
-            return _array(stream, path.stat().st_size, limit)
+            length = path.stat().st_size
+            return _array(stream, length, length)
     except Exception as error:
         raise _refusal(path, "", error) from None
 
@@ -60,6 +61,14 @@ def read_arrays(
         return found
     except Exception as error:
         raise _refusal(path, name, error) from None
+
+
+def write_array(path: str | Path, array: np.ndarray) -> None:
+    """An .npy file. Raises OSError with its errno, which numpy.save hides where the disk is full."""
+    array = np.ascontiguousarray(array)
+    with open(path, "wb") as stream:
+        np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(array))
+        stream.write(array.reshape(-1).data)
 
 
 def array_names(path: str | Path) -> list[str]:

@@ -38,6 +38,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(options)
     except (ValueError, OSError) as error:
+        from .whole_file import disk_full
+
+        if line := disk_full(error):
+            print(f"simulate: {line}; --resume goes on from it once there is room", file=sys.stderr)
+            return NOT_CONVERGED
         print(f"simulate: {' '.join(str(error).split())}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:

@@ -12,6 +12,7 @@ from typing import NoReturn
 from .material import Material
 
 DEFAULT_FRAMES = 60
+DIGITS = 9  # of a count
 UNITS_OF_MATERIAL = {
     "young_modulus": ("PA", "Young's modulus [Pa]"),
     "poisson_ratio": ("NU", "Poisson's ratio, in (-1, 0.5]"),
@@ -213,6 +214,8 @@ def _positive(text: str) -> float:
 
 
 def _count(text: str) -> int:
-    if not text.isdigit() or int(text) < 1:
+    if len(text) > DIGITS:
+        raise argparse.ArgumentTypeError(f"{text[:40]!r} has more than {DIGITS} digits")
+    if not (text.isascii() and text.isdigit()) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no whole number above 0")
     return int(text)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import io
-import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .cloth import MeshError
+from .mesh_header import check_header
 
 if TYPE_CHECKING:
     import numpy as np
 
 UV_OF_VTK = "UV"  # what the texture coordinates of a VTK file are called here
-LONGEST_HEADER = 1 << 16  # [bytes] of a PLY
 
 
 @dataclass(frozen=True)
@@ -57,17 +57,20 @@ def _read_obj(path: Path) -> Parts:
                     uv.append([float(words[1]), float(words[2]) if len(words) > 2 else 0.0])
                 elif words and words[0] == "f":
                     corners = [word.split("/") for word in words[1:]]
-                    polygons.append([_counted(int(c[0]), len(points)) for c in corners])
+                    polygons.append([_counted(c[0], len(points)) for c in corners])
                     uv_polygons.append(
-                        [_counted(int(c[1]), len(uv)) if len(c) > 1 and c[1] else -1 for c in corners]
+                        [_counted(c[1], len(uv)) if len(c) > 1 and c[1] else -1 for c in corners]
                     )
             except (ValueError, IndexError):
                 raise MeshError(f"{path}: line {number} is not understood: {line.strip()[:60]!r}") from None
     return Parts(points, polygons, uv, uv_polygons)
 
 
-def _counted(number: int, count: int) -> int:
-    """From 0 on: OBJ counts from 1, and backwards from the last one below 0."""
+def _counted(text: str, count: int) -> int:
+    """From 0 on: OBJ counts from 1, and from the last by -1. Raises ValueError for what is no number."""
+    number = int(text)
+    if not 0 < abs(number) < 1 << 62:
+        raise ValueError(text)
     return number - 1 if number > 0 else count + number
 
 
@@ -76,8 +79,7 @@ def _read_with_meshio(path: Path) -> Parts:
     import meshio
     import numpy as np
 
-    if path.suffix.lower() == ".ply":
-        _check_ply(path)
+    check_header(path)
     printed = io.StringIO()
     try:
         # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
@@ -98,36 +100,17 @@ def _read_with_meshio(path: Path) -> Parts:
     return Parts(mesh.points, [polygon for block in kinds for polygon in block.data], vertex_data=data)
 
 
-def _check_ply(path: Path) -> None:
-    """Raises MeshError for a header that does not end, at which meshio would wait for ever, or that declares
-    more than there is.
-    """
-    size = path.stat().st_size
-    with open(path, "rb") as file:
-        head, end, _ = file.read(LONGEST_HEADER).partition(b"end_header")
-    if not end:
-        raise MeshError(f"{path}: cannot be read (no end of its header): export it again, as OBJ or PLY")
-    for name, count in re.findall(rb"element\s+(\w+)\s+(\d+)", head):
-        if int(count[:20]) > size:
-            raise MeshError(f"{path}: declares {count[:20].decode()} of {name.decode()} in {size} bytes")
-
-
 def _read_with_vtk(path: Path) -> Parts | None:
     """Points and triangles of a file of PolyData, or None if it holds none."""
     import numpy as np
     import pyvista
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
 
-    shown, told = vtkObject.GetGlobalWarningDisplay(), vtkLogger.GetCurrentVerbosityCutoff()
     try:
-        vtkObject.GlobalWarningDisplayOff()  # VTK would print many lines for a damaged file
-        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-        surface = pyvista.read(path)
+        with warnings.catch_warnings(), pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
+            warnings.simplefilter("ignore")
+            surface = pyvista.read(path)
     except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
-    finally:
-        vtkObject.SetGlobalWarningDisplay(shown)
-        vtkLogger.SetStderrVerbosity(told)
     if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
         return None
     if not surface.is_all_triangles:

@@ -6,11 +6,11 @@ then float32 positions, sample by sample.
 
 from __future__ import annotations
 
-import os
 import struct
 from pathlib import Path
 
 from .trajectory import Trajectory
+from .whole_file import replacing
 
 SIGNATURE = b"POINTCACHE2\0"
 
@@ -29,14 +29,10 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
     mesh = path.with_suffix(".obj")
     frames, points, _ = trajectory.positions.shape
     header = SIGNATURE + struct.pack("<iiffi", 1, points, 0.0, 1.0, frames)
-    _write_whole(path, header + trajectory.positions.astype("<f4").tobytes())
+    with replacing(path) as temporary:
+        temporary.write_bytes(header + trajectory.positions.astype("<f4").tobytes())
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in trajectory.positions[0]]
     lines += [f"f {a} {b} {c}\n" for a, b, c in trajectory.faces + 1]
-    _write_whole(mesh, "".join(["# metres, y up\n", *lines]).encode())
+    with replacing(mesh) as temporary:
+        temporary.write_text("".join(["# metres, y up\n", *lines]), encoding="utf-8")
     return path, mesh
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(data)
-    os.replace(part, path)

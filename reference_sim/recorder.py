@@ -11,7 +11,8 @@ import numpy as np
 from .cloth import Cloth
 from .minimise import Result
 from .resume import PartialRun
-from .trajectory import Trajectory, TrajectoryWriter
+from .trajectory import Trajectory
+from .trajectory_writer import TrajectoryWriter
 
 
 class Recorder:
@@ -61,18 +62,21 @@ class Recorder:
             fields = {name: float(values[k]) for name, values in old.frame_fields.items()}
             before = earlier.before if k == old.frames - 1 else None
             self.add(old.positions[k], float(old.times[k]), float(old.frame_seconds[k]), fields, before)
-        if old.status != "converged":
-            self._fail(old.status, old.reason)
+        if old.reason:
+            self._tell(old.status, old.reason)
         if self._file:
             self._file.go_live()
 
     def note(self, frame: int, results: Sequence[Result]) -> None:
-        """Take note of the first minimisation that did not converge, on the way to `frame`."""
+        """Take note of the first minimisation that did not converge, on the way to `frame`; until there is
+        one, of the first that converged within round-off alone.
+        """
         for result in results:
-            if result.status != "converged" and self.status == "converged":
-                self._fail(result.status, f"frame {frame}: {result.reason}")
+            failed = result.status != "converged" and self.status == "converged"
+            if failed or (result.relaxed and not self.reason):
+                self._tell(result.status, f"frame {frame}: {result.reason}")
 
-    def _fail(self, status: str, reason: str) -> None:
+    def _tell(self, status: str, reason: str) -> None:
         self.status, self.reason = status, reason
         if self._file:
             self._file.first_failure(status, reason)

@@ -19,12 +19,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .trajectory import BEFORE, FAILURE, UNFINISHED, Trajectory, TrajectoryError, read_trajectory
+from .trajectory import UNREADABLE, Trajectory, TrajectoryError, read_trajectory
+from .trajectory_writer import BEFORE, END_OF_FILE, FAILURE, UNFINISHED
 
 if TYPE_CHECKING:
     import h5py
-
-END_OF_FILE = slice(40, 48)  # of the superblock (version 0): where HDF5 believes the file to end
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +68,7 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Par
     try:
         with _opened(path) as file:
             earlier = _whole_frames(file)
-    except (OSError, KeyError, RuntimeError, ValueError) as error:
+    except UNREADABLE as error:
         raise TrajectoryError(
             f"{path}: nothing to resume: not a readable trajectory ({_one_line(error)}); "
             "remove it, or write elsewhere"
@@ -107,7 +106,7 @@ def _opened(path: Path) -> Iterator[h5py.File]:
 def _whole_frames(file: h5py.File) -> PartialRun:
     own, points = file["benchmark"], file["VTKHDF/Points"]
     vertex_count = int(file["VTKHDF/NumberOfPoints"][0])
-    written = int(own.attrs["frames"])
+    written = min(int(own.attrs["frames"]), len(points) // vertex_count)
     whole = 0
     while whole < written:
         try:

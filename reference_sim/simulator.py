@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from .obstacle import Obstacle
 
 
+LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other
+
+
 def simulate(
     cloth: Cloth,
     energies: Sequence[Energy],
@@ -76,15 +79,19 @@ def simulate(
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the first other status; a
         frame that is not finite ends it. frame_fields: iterations, factorisations, gradient_norm (relative
-        residual, see `Result`), converged (0/1), energy/<term> [J].
+        residual, see `Result`), converged (0/1), relaxed (1 where round-off excused a residual above the
+        tolerance; the reason tells of the first), energy/<term> [J].
 
     Raises:
-        ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, refreeze with resume.
+        ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, a step of no size, a
+            tolerance that is no number above 0, refreeze with resume.
         TrajectoryError: `path` cannot be resumed: unreadable, or made by another run.
     """
     for name, count in (("frames", frames), ("substeps", substeps)):
         if count < 1:
             raise ValueError(f"simulate: {name} = {count}: must be at least 1")
+    if 0 < (step := dt / substeps) < LEAST_DT or MOST_DT < step < float("inf"):
+        raise ValueError(f"simulate: dt / substeps = {step:.3g} s: give {LEAST_DT:g} to {MOST_DT:g} s")
     if refreeze and resume:
         raise ValueError("simulate: a run with refreeze cannot be resumed: start it again without resume")
     x = _checked(start, cloth.rest_positions, "start")
@@ -118,6 +125,7 @@ def _fields(results: Sequence[Result]) -> dict[str, float]:
         "factorisations": float(sum(result.factorisations for result in results)),
         "gradient_norm": max(result.gradient_norm for result in results),
         "converged": float(all(result.status == "converged" for result in results)),
+        "relaxed": float(any(result.relaxed for result in results)),
     } | {f"energy/{name}": value for name, value in results[-1].terms.items()}
 
 

@@ -197,6 +197,7 @@ class Stepper:
             "factorisations": 0.0,
             "gradient_norm": float("nan"),
             "converged": 1.0,
+            "relaxed": 0.0,
         } | fields
 
     def provenance(self) -> dict[str, Any]:

@@ -1,28 +1,31 @@
 """A trajectory: positions over time, whether and how they converged, and its file.
 
 The file is VTKHDF (temporal PolyData), so ParaView opens it as it is; what VTK has no place for lies in the
-top-level group /benchmark. Frames are appended and flushed one by one: a killed run keeps every whole frame.
+top-level group /benchmark.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import shutil
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .array_file import MOST_PACKED
+from .trajectory_writer import TrajectoryWriter
+
 if TYPE_CHECKING:
     import h5py
 
 
-UNFINISHED = "unfinished"  # status of a file whose writer did not end by itself
-# Where the writer keeps what a resumed run needs.
-BEFORE, FAILURE = "before_last_step", "first_failure"
+SMALL = 1 << 20  # [bytes] that nobody minds
+# What h5py and numpy raise for a file that is none, or is damaged.
+UNREADABLE = (
+    OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, ArithmeticError,
+    MemoryError,
+)  # fmt: skip
 
 
 class TrajectoryError(ValueError):
@@ -90,208 +93,44 @@ class Trajectory:
                 return read_trajectory(file)
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
-        except (OSError, KeyError) as error:
-            raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({error})") from None
+        except UNREADABLE as error:
+            reason = " ".join(str(error).split())
+            raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
 
     def with_status(self, status: str, reason: str) -> Trajectory:
         """The same frames with another status."""
         return replace(self, status=status, reason=reason)
 
 
-def replace_frame_fields(path: str | Path, fields: Mapping[str, np.ndarray], *, family: str) -> None:
-    """Give a finished file these numbers per frame, each (T,), in place of those that begin with `family`.
-
-    Positions are copied as they are packed: a hundred frames take milliseconds. The file is replaced whole.
-    """
-    import h5py
-
-    part = Path(path).with_name(Path(path).name + ".part")
-    try:
-        shutil.copyfile(path, part)
-        with h5py.File(part, "r+") as file:
-            group = file["benchmark/frame_fields"]
-            for key in [key for key in group if key.replace(":", "/").startswith(family)]:
-                del group[key]
-            for name, values in fields.items():
-                key = name.replace("/", ":")
-                if key in group:
-                    del group[key]
-                group.create_dataset(key, data=np.asarray(values, "f8"), maxshape=(None,), fillvalue=np.nan)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:
-    """The first `frames` frames of an open file, default all that are whole; raises KeyError or OSError."""
+    """The first `frames` frames of an open file, default all that are whole; raises one of UNREADABLE."""
     own, vtk = file["benchmark"], file["VTKHDF"]
+    provenance = json.loads(own.attrs["provenance"])
+    if not isinstance(provenance, dict):
+        raise ValueError("its provenance is no JSON object")
     frames = int(own.attrs["frames"]) if frames is None else frames
-    vertex_count = int(vtk["NumberOfPoints"][0])
+    vertex_count = int(_whole(vtk["NumberOfPoints"])[0])
     return Trajectory(
-        positions=vtk["Points"][: frames * vertex_count].reshape(frames, vertex_count, 3),
-        faces=vtk["Polygons/Connectivity"][:].reshape(-1, 3),
-        times=vtk["Steps/Values"][:frames],
-        frame_seconds=own["frame_seconds"][:frames],
+        positions=_whole(vtk["Points"], frames * vertex_count).reshape(frames, vertex_count, 3),
+        faces=_whole(vtk["Polygons/Connectivity"]).reshape(-1, 3),
+        times=_whole(vtk["Steps/Values"], frames),
+        frame_seconds=_whole(own["frame_seconds"], frames),
         status=str(own.attrs["status"]),
         reason=str(own.attrs["reason"]),
-        provenance=json.loads(own.attrs["provenance"]),
-        frame_fields={k.replace(":", "/"): v[:frames] for k, v in own["frame_fields"].items()},
+        provenance=provenance,
+        frame_fields={k.replace(":", "/"): _whole(v, frames) for k, v in own["frame_fields"].items()},
     )
 
 
-class TrajectoryWriter:
-    """Appends frames to a VTKHDF file; use it in a `with` block.
+def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
+    """The first rows of a dataset, all of them by default, once their size is that of what is stored.
 
-    A file appears under its name with its first whole frame in it, and from then on a frame counts only once
-    all of it has been flushed: kill -9 leaves the whole frames.
-
-    Args:
-        path: the file, replaced if it exists.
-        faces: (F, 3).
-        provenance: JSON values.
-        vertex_count: V.
-        live: False to put the file in place at the end, and only if the block ends well.
+    Raises ValueError for one that declares more numbers than it holds, or no plain numbers.
     """
-
-    def __init__(
-        self,
-        path: str | Path,
-        faces: np.ndarray,
-        provenance: dict[str, Any],
-        *,
-        vertex_count: int,
-        live: bool = True,
-    ) -> None:
-        import h5py
-
-        self.path = Path(path)
-        self._part: Path | None = self.path.with_name(self.path.name + ".part")
-        self._file = h5py.File(self._part, "w")
-        self._live = live
-        self._vertex_count = vertex_count
-        self.frames = 0
-        _vtk_skeleton(self._file, np.asarray(faces, dtype=np.int64), vertex_count)
-        own = self._file.create_group("benchmark")
-        own.create_group("frame_fields")
-        own.create_dataset("frame_seconds", (0,), maxshape=(None,), dtype="f8")
-        own.attrs.update(
-            {
-                "frames": 0,
-                "status": UNFINISHED,
-                "reason": "the run that wrote this did not end",
-                "provenance": json.dumps(provenance),
-            }
-        )
-
-    def append(
-        self,
-        positions: np.ndarray,
-        time: float,
-        seconds: float = float("nan"),
-        fields: dict[str, float] | None = None,
-        *,
-        before: np.ndarray | None = None,
-    ) -> None:
-        """Add one frame: positions (V, 3) [m], its time [s], the clock's seconds, further numbers by name.
-
-        before: (2, V, 3) positions [m] and velocity [m/s] from which the last step to this frame was made; a
-        run with sub-steps that is resumed from this frame needs them.
-        """
-        k, vtk, own = self.frames, self._file["VTKHDF"], self._file["benchmark"]
-        steps = vtk["Steps"]
-        # VTK crashes on Values longer than NSteps, so the count is raised first.
-        steps.attrs.modify("NSteps", k + 1)
-        _extend(vtk["Points"], positions)
-        _extend(steps["Values"], [time])
-        _extend(steps["PointOffsets"], [k * self._vertex_count])
-        _extend(steps["PartOffsets"], [0])
-        _extend(steps["NumberOfParts"], [1])
-        for name in ("CellOffsets", "ConnectivityIdOffsets"):
-            _extend(steps[name], np.zeros((1, 4), dtype=np.int64))
-        _extend(own["frame_seconds"], [seconds])
-        for name, value in (fields or {}).items():
-            group = own["frame_fields"]
-            # An energy's name has a slash in it; HDF5 would make a group of that.
-            key = name.replace("/", ":")
-            if key not in group:
-                group.create_dataset(key, (0,), maxshape=(None,), dtype="f8", fillvalue=np.nan)
-            group[key].resize((k + 1,))
-            group[key][k] = value
-        if before is not None:
-            if BEFORE not in own:
-                own.create_dataset(BEFORE, (2, *np.shape(before)), dtype="f8")
-            own[BEFORE][k % 2] = before  # the other half still serves the frame before, should this one fail
-        self.frames = k + 1
-        if self._live:
-            self._file.flush()
-        own.attrs.modify("frames", self.frames)  # last: a reader trusts only whole frames
-        if self._live:
-            self._file.flush()
-            self._put_in_place()
-
-    def _put_in_place(self) -> None:
-        if self._part is None:
-            return
-        import h5py
-
-        self._file.close()
-        os.replace(self._part, self.path)
-        self._part = None
-        self._file = h5py.File(self.path, "r+")
-
-    def go_live(self) -> None:
-        """From now on every frame is flushed; the file is put in place with what it holds."""
-        self._live = True
-        self._file.flush()
-        self._put_in_place()
-
-    def first_failure(self, status: str, reason: str) -> None:
-        """Remember how the frame failed that is appended next, for a run that resumes this one."""
-        self._file["benchmark"].attrs[FAILURE] = json.dumps([status, reason])
-
-    def finish(self, status: str, reason: str) -> None:
-        """Say how it ended."""
-        self._file["benchmark"].attrs.update({"status": status, "reason": reason})
-
-    def __enter__(self) -> TrajectoryWriter:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None and self.frames:
-            self._put_in_place()
-        self._file.close()
-        if self._part is not None:
-            self._part.unlink()
-
-
-def _extend(dataset: h5py.Dataset, rows: Any) -> None:
-    rows = np.asarray(rows)
-    size = dataset.shape[0]
-    dataset.resize(size + len(rows), axis=0)
-    dataset[size:] = rows
-
-
-def _vtk_skeleton(file: h5py.File, faces: np.ndarray, vertex_count: int) -> None:
-    """The groups VTK's reader insists on, for one moving PolyData with fixed faces."""
-    root = file.create_group("VTKHDF")
-    root.attrs["Version"] = np.array([2, 3], dtype="i8")
-    root.attrs.create("Type", b"PolyData", dtype="S8")
-    root["NumberOfPoints"] = np.array([vertex_count], dtype="i8")
-    chunk = (vertex_count, 3)
-    root.create_dataset(
-        "Points", (0, 3), maxshape=(None, 3), dtype="f8", chunks=chunk, compression=1, shuffle=True
-    )
-    for name in ("Vertices", "Lines", "Polygons", "Strips"):
-        cells = faces if name == "Polygons" else np.zeros((0, 3), dtype=np.int64)
-        group = root.create_group(name)
-        group["NumberOfCells"] = np.array([len(cells)], dtype="i8")
-        group["NumberOfConnectivityIds"] = np.array([cells.size], dtype="i8")
-        group["Connectivity"] = cells.ravel()
-        group["Offsets"] = np.arange(len(cells) + 1, dtype="i8") * 3
-    steps = root.create_group("Steps")
-    steps.attrs["NSteps"] = 0
-    steps.create_dataset("Values", (0,), maxshape=(None,), dtype="f8")
-    for name in ("PointOffsets", "PartOffsets", "NumberOfParts"):
-        steps.create_dataset(name, (0,), maxshape=(None,), dtype="i8")
-    for name in ("CellOffsets", "ConnectivityIdOffsets"):
-        steps.create_dataset(name, (0, 4), maxshape=(None, 4), dtype="i8")
+    rows = len(dataset) if rows is None else rows
+    if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":
+        raise ValueError(f"{dataset.name} has {dataset.shape} of {dataset.dtype}")
+    size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
+    if size > MOST_PACKED * dataset.id.get_storage_size() + SMALL:
+        raise ValueError(f"{dataset.name} declares {size} bytes, more than it holds")
+    return dataset[:rows]

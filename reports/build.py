@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,7 +61,7 @@ def read_run(folder: RunFolder) -> Run:
         raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
     from reports.data import run_data
 
-    return run_data(config, rows)
+    return run_data(config, rows, folder.changed(config))
 
 
 def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
@@ -105,17 +106,20 @@ def draw_trajectories(folder: RunFolder, run: Run, problems: list[str]) -> list[
 
 
 def read_trajectory(folder: RunFolder, path: Path, problems: list[str]) -> Trajectory | None:
-    """A trajectory of the run, None where there is none; one that cannot be read is added to the problems."""
+    """A trajectory of the run with its curves, None where there is none; what cannot be read is a problem."""
+    from reference_sim.array_file import read_arrays
     from reference_sim.trajectory import Trajectory, TrajectoryError
 
-    if not path.is_file():
-        return None
     try:
+        if not path.is_file():
+            return None
         trajectory = Trajectory.load(path)
+        if (curves := path.with_suffix(".npz")).is_file():
+            trajectory = replace(trajectory, frame_fields=trajectory.frame_fields | read_arrays(curves))
         if trajectory.frames:
             return trajectory
         problems.append(f"{path.relative_to(folder.path)}: holds no whole frame")
-    except (TrajectoryError, ValueError) as error:
+    except (TrajectoryError, ValueError, OSError) as error:
         problems.append(str(error).replace(f"{folder.path}/", ""))
     return None
 
@@ -198,9 +202,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(picture.caption, picture.path, sep="\n")
             return 0
         path, problems = build_report(options.run_dir)
-    except ResultsError as error:
-        print(f"reports.build: {error}", file=sys.stderr)
-        return 2
+    except (ResultsError, OSError) as error:
+        from reference_sim.whole_file import disk_full
+
+        full = disk_full(error)
+        print(f"reports.build: {full or error}", file=sys.stderr)
+        return 1 if full else 2
     for problem in problems:
         print(f"reports.build: left out: {problem}", file=sys.stderr)
     print(path)

@@ -11,7 +11,7 @@ import pandas as pd
 from reports.numbers import DASH, duration, number
 
 # What the rows mean, not how they were made: the tables say it. Nor is what earlier runs in the folder did.
-DECLARED = ("format", "metrics", "cases", "earlier")
+DECLARED = ("format", "metrics", "cases", "earlier", "digests")
 UNITS = {" gb": "GB", " mb": "MB", " seconds": "s"}  # endings of names
 
 
@@ -66,8 +66,9 @@ def _title(name: str) -> str:
 
 
 def moment(text: Any) -> datetime | None:
-    """An ISO date and time, or None where it is absent or none."""
+    """An ISO date and time since 1971, or None where it is absent or none."""
     try:
-        return datetime.fromisoformat(str(text))
+        found = datetime.fromisoformat(str(text))
     except ValueError:
         return None
+    return found if found.year > 1970 else None

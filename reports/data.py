@@ -48,13 +48,15 @@ class Run:
     """The rows and their declarations.
 
     frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table` (of
-    its metric) and `case` (the check or stress test that it is, else empty).
+    its metric) and `case` (the check or stress test that it is, else empty). changed: files that are not as
+    the run wrote them.
     """
 
     config: Mapping[str, Any]
     frame: pd.DataFrame
     metrics: Mapping[str, Metric]
     methods: Mapping[str, Method]
+    changed: Sequence[str] = ()
 
     def suite(self, *names: str) -> pd.DataFrame:
         return self.frame[self.frame["suite"].isin(names)]
@@ -115,7 +117,7 @@ class Run:
         return {name for name in self.with_role("ablation") if self.methods[name].base in usable}
 
 
-def run_data(config: Mapping[str, Any], rows: Sequence[Row]) -> Run:
+def run_data(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[str] = ()) -> Run:
     """The run of these rows. What run.json does not declare is named after itself and has no table."""
     frame = pd.DataFrame.from_records(
         [[getattr(row, name) for name in COLUMNS] for row in rows], columns=list(COLUMNS)
@@ -131,7 +133,7 @@ def run_data(config: Mapping[str, Any], rows: Sequence[Row]) -> Run:
     frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
     frame["case"] = _cases(frame, config.get("cases") or {})
     methods = _methods(frame, config.get("methods") or {})
-    return Run(config, frame, metrics, methods)
+    return Run(config, frame, metrics, methods, changed)
 
 
 def _metric(name: str, unit: str, said: Mapping[str, Any]) -> Metric:

@@ -24,6 +24,7 @@ from reports.pareto import (
     truncated,
 )
 
+SHOWN = 4  # names of files
 TOTAL, CURVATURE, DISTANCE = "energy/total", "curvature/error", "distance/rms"
 
 
@@ -35,6 +36,7 @@ def summary(run: Run) -> list[tuple[str, str]]:
     compared = next(iter(compared_scenes(run, cells).values()), [])
     has_network = NETWORK in set(worn["method"])
     found = [
+        ("Changed since", changed(run)),
         ("Total energy", least(run, worn, TOTAL, "J")),
         ("Wrinkles", least(run, worn, CURVATURE, "1/m")),
         ("Run time", run_time(run, worn if has_network else cells[cells["scene"].isin(compared)])),
@@ -47,6 +49,14 @@ def summary(run: Run) -> list[tuple[str, str]]:
     ]
     # A number keeps its unit on its line.
     return [(topic, re.sub(r"(?<=\d) (?=(J|ms|1/m|%)\b|%)", "\u00a0", said)) for topic, said in found if said]
+
+
+def changed(run: Run) -> str:
+    """That files are not what the run wrote: who reads the numbers is to know it first."""
+    if not run.changed:
+        return ""
+    more = f" and {len(run.changed) - SHOWN} more" if len(run.changed) > SHOWN else ""
+    return f"Not as the run wrote them: {', '.join(run.changed[:SHOWN])}{more}. What is said here is of them."
 
 
 def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:

@@ -7,6 +7,8 @@ from pathlib import Path
 from snug.formats import READERS
 from snug.motion import Motion, MotionError, clear_arms, place, resample, spread_arms
 
+LONGEST_NAME = 100  # bytes of a motion's name
+
 
 def load_motions(path: str | Path, *, spread_degrees: float | None = None, fps: float = 30.0) -> list[Motion]:
     """Motions from a .amc or .npz file, or from every such file of a folder, in the order of their names.
@@ -31,6 +33,11 @@ def load_motions(path: str | Path, *, spread_degrees: float | None = None, fps: 
 
 
 def _read(file: Path) -> Motion:
+    if not file.stem.isprintable() or len(file.stem.encode(errors="replace")) > LONGEST_NAME:
+        raise MotionError(
+            f"{str(file)[:200]!a}: files are named after a motion; give this one a name of at most "
+            f"{LONGEST_NAME} printable bytes"
+        )
     reader = READERS.get(file.suffix.lower())
     if reader is None:
         remedy = " Give the .amc clips that belong to it." if file.suffix.lower() == ".asf" else ""

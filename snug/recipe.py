@@ -13,6 +13,9 @@ from typing import Any
 TERMS = ("strain", "bending", "gravity", "inertia", "collision")
 
 
+MOST_COMPONENTS = 1024
+
+
 class RecipeError(ValueError):
     """A recipe that cannot be trained: the message names the option, its value and what it may be."""
 
@@ -116,8 +119,10 @@ class Recipe:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
-        if self.pca_components < 1:
-            raise RecipeError(f"recipe option pca_components={self.pca_components}: use at least 1")
+        if not 1 <= self.pca_components <= MOST_COMPONENTS:
+            raise RecipeError(
+                f"recipe option pca_components={self.pca_components}: use 1 to {MOST_COMPONENTS}"
+            )
         sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pca_dynamics", "pretraining")
         for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", *sizes):
             if getattr(self, option) < 0:
@@ -151,7 +156,17 @@ class Recipe:
         unknown = sorted(set(values) - known)
         if unknown:
             raise RecipeError(f"unknown recipe option {unknown[0]!r}")
+        for field in fields(cls):
+            value = values.get(field.name, field.default)
+            if type(value) not in _READ_AS.get(type(field.default), (type(field.default),)):
+                raise RecipeError(f"recipe option {field.name}={str(value)[:40]!r}: of another type")
+        if not all(isinstance(term, str) for term in values.get("terms", ())):
+            raise RecipeError("recipe option terms: give names")
         return cls(**{**values, "terms": tuple(values.get("terms", TERMS))})
 
 
+# Types of an option in a file, by that of its default; an optional one is a number.
+_READ_AS: dict[type, tuple[type, ...]] = {
+    float: (float, int), tuple: (tuple, list), type(None): (type(None), float, int),
+}  # fmt: skip
 DEFAULT = Recipe()

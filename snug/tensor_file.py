@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from torch import Tensor
 
+from reference_sim.whole_file import replacing
+
 HEADER = "snug"  # name of our entry in the file's header
+DIGEST = "digest"  # in it: of everything else in the file
 
 
 class TensorFileError(ValueError):
@@ -18,43 +21,44 @@ class TensorFileError(ValueError):
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> Path:
-    """Write beside the place and move there, so that a reader, or a kill at any moment, finds a whole file.
-
-    A file left unfinished by a kill is written over by the next attempt.
-    """
-    from safetensors.torch import save_file
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.part")
+    """Write beside the place and move there: a reader, or a kill at any moment, finds a whole file."""
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    try:
-        unfinished.touch()
-        mode = unfinished.stat().st_mode  # what the user's files have; the library would make a private one
-        save_file(plain, unfinished, metadata={HEADER: json.dumps(header)})
-        unfinished.chmod(mode)
-        with open(unfinished, "rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with replacing(path) as unfinished:
+        # By Python: what the library raises on a full disk does not say that it was that.
+        unfinished.write_bytes(_packed(plain, {**header, DIGEST: _digest(plain, header)}))
     return path
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Tensors and header. Raises TensorFileError for a missing, broken or foreign file."""
+    """Tensors and header. Raises TensorFileError for a missing, broken, changed or foreign file."""
     from safetensors import SafetensorError, safe_open
 
     if not path.is_file():
         raise TensorFileError(f"{path}: no such model file")
     try:
         with safe_open(path, framework="pt") as stored:
-            header = (stored.metadata() or {}).get(HEADER)
+            text = (stored.metadata() or {}).get(HEADER)
             tensors = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
-    except (SafetensorError, OSError) as error:
+    except (SafetensorError, OSError, ValueError, RuntimeError, AttributeError, TypeError) as error:
         raise TensorFileError(f"{path}: not a safetensors file ({error})") from error
-    if header is None:
+    if text is None:
         raise TensorFileError(f"{path}: no model of this project (its header has no '{HEADER}' entry)")
     try:
-        return tensors, json.loads(header)
-    except json.JSONDecodeError as error:
+        header = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise TensorFileError(f"{path}: broken header ({error})") from error
+    if not isinstance(header, dict):
+        raise TensorFileError(f"{path}: broken header (no JSON object)")
+    if header.pop(DIGEST, None) != _digest(tensors, header):
+        raise TensorFileError(f"{path}: is not as it was written: copy it again, or train again")
+    return tensors, header
+
+
+def _packed(tensors: dict[str, Tensor], header: Mapping[str, Any]) -> bytes:
+    from safetensors.torch import save
+
+    return save(tensors, {HEADER: json.dumps(header)})
+
+
+def _digest(tensors: dict[str, Tensor], header: Mapping[str, Any]) -> str:
+    return hashlib.sha256(_packed(tensors, header)).hexdigest()

@@ -27,6 +27,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(options)
     except (ValueError, OSError) as error:
+        from reference_sim.whole_file import disk_full
+
+        if line := disk_full(error):
+            print(f"snug.train: {line}; --resume goes on once there is room", file=sys.stderr)
+            return 1
         print(f"snug.train: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
 

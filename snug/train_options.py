@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
 
 from snug.garment_file import add_garment_options
@@ -72,13 +73,22 @@ LEAST = {
     "patience": 0,
     "checkpoint_minutes": 0,
     "checkpoint_steps": 0,
+    "steps": 1,
+    "vertices": 1,
 }
+
+
+def _most(name: str) -> int:
+    """More threads than cores only wait for each other; a seed has 63 bits."""
+    return {"seed": (1 << 63) - 1, "threads": os.cpu_count() or 1}.get(name, 10**9)
 
 
 def check(options: argparse.Namespace) -> None:
     """Raises ValueError for a word that is out of range, or means nothing without another."""
     for name, least in LEAST.items():
-        if getattr(options, name) < least:
-            raise ValueError(f"--{name.replace('_', '-')} {getattr(options, name)}: at least {least}")
+        value, most = getattr(options, name), _most(name)
+        if not least <= value <= most:
+            wanted = f"at most {most}" if value > most else f"at least {least}"
+            raise ValueError(f"--{name.replace('_', '-')} {str(value)[:40]}: {wanted}")
     if options.patience and not options.validation:
         raise ValueError(f"--patience {options.patience}: add --validation NAME, a motion to stop by")

@@ -4,7 +4,7 @@ file.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,10 @@ from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.two_stage_regressor import TwoStageRegressor
 
 FORMAT = "snug-model-7"
+_TYPES: dict[str, Any] = {
+    "kind": str, "recipe": dict, "inputs": int, "vertices": int, "pins": list, "seed": int, "steps": int,
+    "seconds": int | float, "setup_seconds": int | float, "history": list, "summary": dict,
+}  # fmt: skip
 KEPT = ("seed", "steps", "seconds", "setup_seconds", "history", "summary")  # in the file as in the model
 
 
@@ -119,6 +123,7 @@ class TrainedModel:
             if data["format"] != FORMAT:
                 known = f"this version reads {FORMAT!r}: train again"
                 raise ModelFileError(f"{path}: format {data['format']!r}, {known}")
+            _check(tensors, data)
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(
                 data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=data["pins"]
@@ -127,9 +132,27 @@ class TrainedModel:
             rest = {name: data[name] for name in KEPT}
         except ModelFileError:
             raise
-        except (KeyError, ValueError, RuntimeError) as error:
+        except (KeyError, ValueError, RuntimeError, TypeError) as error:
             raise ModelFileError(f"{path}: broken model file ({error})") from error
         return cls(data["kind"], network.eval(), recipe, **rest)
+
+
+def _check(tensors: Mapping[str, Tensor], data: Mapping[str, Any]) -> None:
+    """Raises ValueError for entries of wrong types, and for sizes that no tensor in the file has."""
+    for name, kind in _TYPES.items():
+        if not isinstance(data[name], kind) or isinstance(data[name], bool):
+            raise ValueError(f"{name} is {str(data[name])[:40]!r}")
+    sizes = {size for tensor in tensors.values() for size in tensor.shape}
+    for name, size in (("inputs", data["inputs"]), ("vertices", 3 * data["vertices"])):
+        if size <= 0 or size not in sizes:
+            raise ValueError(f"no tensor in it has the size of {name}, {data[name]}")
+    if not all(type(pin) is int and 0 <= pin < data["vertices"] for pin in data["pins"]):
+        raise ValueError(f"pins name no vertices 0..{data['vertices'] - 1}")
+    if not 0 <= data["seed"] < 1 << 63:
+        raise ValueError(f"seed {data['seed']}")
+    for row in data["history"]:
+        if not isinstance(row, dict) or not all(isinstance(v, int | float) for v in row.values()):
+            raise ValueError("its history is no list of rows of numbers")
 
 
 def find_kind(name: str) -> Kind:

@@ -211,7 +211,9 @@ class TrainingRun:
             return
         if header.get("format") != FORMAT:
             raise TensorFileError(f"{path}: no checkpoint of this version, give another name or delete it")
-        mine, there = self._identity(), header["of"]
+        mine, there = self._identity(), header.get("of")
+        if not isinstance(there, dict):
+            raise TensorFileError(f"{path}: broken checkpoint; delete it to start anew")
         for name, value in mine.items():
             if there.get(name) != value:
                 named = (
@@ -225,7 +227,7 @@ class TrainingRun:
             self.best_value, self.best_step, self.last_value, self._validating = header["validation"]
             self.done, self.seconds = header["done"], header["seconds"]
             self.history, self.recent = header["history"], header["recent"]
-        except (KeyError, RuntimeError) as error:
+        except (KeyError, RuntimeError, TypeError, ValueError, AttributeError, IndexError) as error:
             raise TensorFileError(f"{path}: broken checkpoint ({error}); delete it to start anew") from error
 
     def _finished(self) -> TrainedModel:

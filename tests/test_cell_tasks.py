@@ -248,10 +248,10 @@ def test_a_trajectory_that_was_changed_is_found_out(tmp_path):
     path = RunFolder(tmp_path).trajectory_path("free_fall", "simulation")
     with h5py.File(path, "r+") as file:
         file["VTKHDF/Points"][0, 0] += 1e-9
-    assert found_of(plan).why == "trajectories/free_fall/simulation.vtkhdf"
+    assert found_of(plan).why == "trajectories/free_fall/simulation.vtkhdf is damaged"
     assert found_of(plan, "metrics", 1).state == "stale"  # it was compared with what is no more
     path.write_bytes(path.read_bytes()[:2000])
-    assert found_of(plan).state == "stale"
+    assert found_of(plan).state == "missing"
     runner = finish(plan, "cells", "metrics")
     assert len(runner.reused) == 1 and found_of(plan).state == "finished"  # newton-1 alone was sound
 

@@ -17,7 +17,13 @@ ALLOWED = {
     "reference_sim": ("reference_sim",),
     "snug": ("snug", "reference_sim"),
     "benchmarks": ("benchmarks", "snug", "reference_sim"),
-    "reports": ("reports", "benchmarks.results", "reference_sim.trajectory"),
+    "reports": (
+        "reports",
+        "benchmarks.results",
+        "reference_sim.trajectory",
+        "reference_sim.array_file",
+        "reference_sim.whole_file",
+    ),
 }
 # The referee's solvers are not for the contestants.
 FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate")}

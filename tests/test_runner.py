@@ -192,7 +192,8 @@ def test_a_damaged_file_is_made_anew_with_all_that_was_made_from_it(tmp_path):
     assert len(run_tasks(tmp_path, *tasks).reused) == 3
     (tmp_path / "first.txt").write_text("damaged")
     cache = Cache(RunFolder(tmp_path))
-    assert cache.find(tasks[0], {}).state == "stale" and cache.find(tasks[0], {}).why == "first.txt"
+    assert cache.find(tasks[0], {}).state == "missing"
+    assert cache.find(tasks[0], {}).why == "first.txt is damaged"
     runner = run_tasks(tmp_path, *tasks)
     assert (tmp_path / "first.txt").read_text() == "first" and "network third" in runner.reused
     (tmp_path / "second.txt").unlink()

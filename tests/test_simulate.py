@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 
+import h5py
 import numpy as np
 import pytest
 import torch
@@ -23,6 +24,7 @@ from reference_sim.energies import (
     Gravity,
     StretchStVK,
 )
+from reference_sim.summary import summary
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
 DOWN = np.array([0.0, -GRAVITY, 0.0])
@@ -284,6 +286,28 @@ def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
     assert (result.frame_fields["gradient_norm"][1:] > 1e-6).all()
 
 
+def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):
+    """A million metres away positions have 1e-10 m of round-off, and forces more than 1e-6 weights."""
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    path, far = tmp_path / "far.vtkhdf", SHEET + np.array([1e6, 0.0, 0.0])
+    result = simulate(cloth, terms_of(cloth), start=far, frames=4, path=path)
+    residual, relaxed = (result.frame_fields[name] for name in ("gradient_norm", "relaxed"))
+    assert result.status == "converged" and result.frame_fields["converged"].all()
+    np.testing.assert_array_equal(relaxed[1:], residual[1:] > 1e-6)
+    first = int(np.flatnonzero(relaxed)[0])
+    said = f"frame {first}: round-off: residual {residual[first]:.1e} above tolerance 1.0e-06"
+    assert result.reason.startswith(said) and Trajectory.load(path).reason == result.reason
+    assert f"round-off  {relaxed.sum():.0f} frames above the tolerance, first {said}" in summary(
+        result, None, frames=4
+    )
+    with h5py.File(path, "r+") as file:  # a run that was killed
+        file["benchmark"].attrs["status"] = "unfinished"
+    again = simulate(cloth, terms_of(cloth), start=far, frames=5, path=path, resume=True)
+    assert again.status == "converged" and again.reason == result.reason
+    near = simulate(cloth, terms_of(cloth), frames=4)
+    assert near.reason == "" and not near.frame_fields["relaxed"].any()
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -296,6 +320,11 @@ def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
         ({"velocity": SHEET[:, :2]}, "velocity has shape (49, 2): expected finite (49, 3)"),
         ({"dt": 0.0}, "dt = 0.0: must be a finite number of seconds above 0"),
         ({"dt": np.nan}, "dt = nan"),
+        ({"dt": 1e300}, "dt / substeps = 1e+300 s: give 1e-07 to 10000 s"),
+        ({"substeps": 10**9}, "dt / substeps = 3.33e-11 s: give 1e-07 to 10000 s"),
+        ({"tolerance": np.nan}, "tolerance = nan: give a finite number above 0"),
+        ({"tolerance": np.inf}, "tolerance = inf: give"),
+        ({"tolerance": -1e-6, "method": "newton"}, "tolerance = -1e-06: give"),
     ],
 )
 def test_what_cannot_be_simulated_is_refused_before_any_file_is_written(options, message, tmp_path):

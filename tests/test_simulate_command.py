@@ -280,6 +280,9 @@ BAD = {
     ),
     "number": (["sheet.obj", "--density", "heavy"], "argument --density: 'heavy' is no number"),
     "dt": (["sheet.obj", "--dt", "0"], "argument --dt: 0 is not above 0"),
+    "dt too long": (["sheet.obj", "--dt", "1e300"], "dt / substeps = 1e+300 s: give 1e-07 to 10000 s"),
+    "too many sub-steps": (["sheet.obj", "--substeps", "900000000"], "dt / substeps = 3.7e-11 s: give"),
+    "count of many digits": (["sheet.obj", "--frames", "1" * 5000], "has more than 9 digits"),
     "frames": (["sheet.obj", "--frames", "0"], "argument --frames: '0' is no whole number above 0"),
     "friction": (["sheet.obj", "--friction", "-1"], "argument --friction: -1 is below 0"),
     "pin out of range": (["sheet.obj", "--pins", "3,49"], "--pins 49: the garment has vertices 0..48"),
@@ -318,6 +321,9 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, case):
 def test_an_output_of_another_kind_is_refused(folder, capsys):
     assert main(["sheet.obj", "-o", "out.obj"]) == 2
     assert "out.obj: the trajectory ends in .vtkhdf" in capsys.readouterr().err
+    assert main(["sheet.obj", "-o", "o" * 300 + ".vtkhdf"]) == 2
+    error = capsys.readouterr().err
+    assert "File name too long" in error and error.count("\n") == 1
 
 
 def test_interrupted_by_hand(folder, capsys, monkeypatch):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import shutil
 
 import h5py
@@ -11,7 +10,6 @@ import pytest
 from meshes import grid
 
 from reference_sim import Trajectory, TrajectoryError, TrajectoryWriter
-from reference_sim.trajectory import replace_frame_fields
 
 REST, FACES = grid(4, 3)
 
@@ -190,16 +188,3 @@ def test_pyvista_reads_it(tmp_path):
     mesh = reader.read()
     assert mesh.n_points == len(REST) and mesh.n_cells == len(FACES)
     np.testing.assert_array_equal(mesh.points, wave(3).positions[2])
-
-
-def test_frame_fields_are_replaced_and_the_rest_is_left_bit_for_bit(tmp_path):
-    whole = wave()
-    path = tmp_path / "a.vtkhdf"
-    whole.save(path)
-    fields = {"energy/total": np.linspace(0, 1, 5), "curvature/mean": np.full(5, 2.0)}
-    for _ in range(2):
-        replace_frame_fields(path, fields, family="energy/")
-    iterations = whole.frame_fields["iterations"]
-    expected = dataclasses.replace(whole, frame_fields={"iterations": iterations, **fields})
-    assert_same(Trajectory.load(path), expected)
-    assert [p.name for p in tmp_path.iterdir()] == ["a.vtkhdf"]

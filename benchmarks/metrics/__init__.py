@@ -18,6 +18,7 @@ MODULES = (
     "shape",
     "geometry",
     "optimality",
+    "solver",
     "exact",
     "dynamics",
     "conservation",

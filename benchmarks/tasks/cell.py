@@ -65,6 +65,9 @@ class Cell:
     def trajectory(self, folder: RunFolder) -> Path:
         return folder.trajectory_path(self.scene.name, self.method, self.seed)
 
+    def curves(self, folder: RunFolder) -> Path:
+        return folder.curves_path(self.scene.name, self.method, self.seed)
+
     def quasi_static(self, folder: RunFolder) -> Path:
         return folder.quasi_static_path(self.scene.name, self.method, self.seed)
 
@@ -137,6 +140,7 @@ class RunCell(CellTask):
 
     def clear(self, folder: RunFolder) -> None:
         self.cell.trajectory(folder).unlink(missing_ok=True)
+        self.cell.curves(folder).unlink(missing_ok=True)
         self.cell.quasi_static(folder).unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
@@ -231,10 +235,10 @@ def built(scene: Scene, context: Context) -> BuiltScene:
     run, assets = context.folder, context.assets
     if assets is None or not run.body_path(scene.name).is_file():
         return scene.build(assets)
-    import numpy as np
+    from reference_sim.array_file import read_array
 
-    bodies = {assets.motion(scene.motion, scene.part).name: np.load(run.body_path(scene.name))}
-    start = np.load(run.start_path(scene.name))
+    bodies = {assets.motion(scene.motion, scene.part).name: read_array(run.body_path(scene.name))}
+    start = read_array(run.start_path(scene.name))
     dressed = scene.build(replace(assets, bodies=bodies))
     return replace(dressed, settle=lambda: start)
 
@@ -277,7 +281,7 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
     if status != "ok" and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
-    return status, ("" if status == "ok" else reason)
+    return status, reason
 
 
 def peak_memory() -> float:

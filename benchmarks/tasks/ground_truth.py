@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from ..results import RunFolder, replacing
 from ..scene import BuiltScene, Scene
@@ -27,22 +28,25 @@ class SettleStart(Task):
     scene: Scene
 
     def clear(self, folder: RunFolder) -> None:
-        for path in (folder.start_path(self.scene.name), folder.body_path(self.scene.name)):
+        for path in self._paths(folder):
             path.unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        import numpy as np
+        from reference_sim.array_file import read_array, write_array
 
         scene, run, shared = self.scene.build(context.assets), context.folder, self.scene.start_of
         assert scene.obstacle is not None
         with replacing(run.body_path(scene.name)) as temporary:
-            np.save(temporary, scene.obstacle.positions)
+            write_array(temporary, scene.obstacle.positions)
         write_body(run, scene)
         with replacing(run.start_path(scene.name)) as temporary:
-            np.save(temporary, np.load(run.start_path(shared)) if shared else scene.start_state)
+            write_array(temporary, read_array(run.start_path(shared)) if shared else scene.start_state)
         context.tell(self.units)
-        paths = (run.start_path(scene.name), run.body_path(scene.name))
-        return Outcome(files=tuple(map(run.relative, paths)))
+        return Outcome(files=tuple(map(run.relative, self._paths(run))))
+
+    def _paths(self, folder: RunFolder) -> tuple[Path, ...]:
+        name = self.scene.name
+        return folder.start_path(name), folder.body_path(name), folder.trajectory_path(name, "body")
 
 
 def write_body(run: RunFolder, scene: BuiltScene) -> None:

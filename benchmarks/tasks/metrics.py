@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..metric import Estimate, RollOut, SceneRollOuts
 from ..metrics import find_metric, modules, names_of
+from ..results import RunFolder, replacing
 from .cell import Cell, built
 from .task import Context, Outcome, Task, TaskId
 
@@ -31,17 +33,21 @@ class MeasureCell(Task):
     quasi_static: TaskId | None = None
     counterpart: Cell | None = None
 
+    def clear(self, folder: RunFolder) -> None:
+        self.cell.curves(folder).unlink(missing_ok=True)
+
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """The energies of each frame, and other curves, are added to the trajectory file."""
+        """The energies of each frame, and other curves, are written beside the trajectory."""
         if "roll-outs" not in context.memo:
             context.memo["roll-outs"] = self._roll_outs(context, needed)
         roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
         if self.counterpart is not None and ("cell", self.counterpart.name) in needed:
             roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
         metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics)
-        _add_curves(self.cell.trajectory(folder), curves, roll_out.trajectory.frames)
+        path = self.cell.curves(folder)
+        write_curves(path, curves, roll_out.trajectory.frames)
         context.tell(self.units)
-        return Outcome(status, reason, result=metrics)
+        return Outcome(status, reason, result=metrics, files=(folder.relative(path),))
 
     def _roll_outs(self, context: Context, needed: Mapping[TaskId, Outcome]) -> dict[Cell, RollOut]:
         """Those of the batch beside each other: they share search trees, and the energies of references."""
@@ -101,14 +107,14 @@ def compared(
     }
 
 
-def _add_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
-    from reference_sim.trajectory import replace_frame_fields
-
-    padded = {
+def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
+    """An .npz of curves (T,), nan after the last frame that was measured."""
+    padded: dict[str, Any] = {
         name: np.pad(curve, (0, frames - len(curve)), constant_values=np.nan)
         for name, curve in curves.items()
     }
-    replace_frame_fields(path, padded, family="energy/")
+    with replacing(path) as temporary:
+        np.savez(temporary, **padded)
 
 
 def _positions(path: Path) -> np.ndarray:

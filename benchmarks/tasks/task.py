@@ -24,9 +24,9 @@ class Outcome:
     """What came of a task.
 
     status and reason: in the words of a result row. failed: whether there is nothing to build upon. result:
-    plain values. files: what it has left, by their names in the run's folder. seconds: wall time. origin:
-    commit, preset and hardware, where an earlier run did it. remark: what has changed since, where it is kept
-    all the same.
+    plain values. files: what it has left, by their names in the run's folder; digests: of these, by name,
+    once it is kept. seconds: wall time. origin: commit, preset and hardware, where an earlier run did it.
+    remark: what has changed since, where it is kept all the same.
     """
 
     status: str = "ok"
@@ -34,6 +34,7 @@ class Outcome:
     failed: bool = False
     result: Mapping[str, Any] = field(default_factory=dict)
     files: tuple[str, ...] = ()
+    digests: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
     origin: Mapping[str, Any] = field(default_factory=dict)
     remark: str = ""
@@ -111,6 +112,13 @@ class Task:
         return []
 
 
+class RunStopped(RuntimeError):
+    """No task can be done any more, as on a full disk: the run ends, and what is finished is kept.
+
+    The message says why.
+    """
+
+
 def one_line(error: BaseException) -> str:
     """What was raised, in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())
@@ -118,8 +126,14 @@ def one_line(error: BaseException) -> str:
 
 def failure(error: BaseException) -> Outcome:
     """The outcome of a task that raised, or whose process died. torch's allocator on a CPU raises a plain
-    RuntimeError.
+    RuntimeError. Raises RunStopped for what is no fault of the task.
     """
+    from reference_sim.whole_file import disk_full
+
+    if isinstance(error, RunStopped):
+        raise error
+    if line := disk_full(error):
+        raise RunStopped(line) from None
     if isinstance(error, WorkerDied):
         return Outcome(error.status, str(error), failed=True)
     memory = isinstance(error, MemoryError) or type(error).__name__ == "OutOfMemoryError"

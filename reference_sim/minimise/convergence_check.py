@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .factorised import FactorisedDescent
@@ -21,13 +23,17 @@ def convergence_check(
     What is left to ask is whether that is positive definite (up to round-off, so that rigid motions of an
     unpinned cloth do not count) and its step below step_tolerance [m].
     """
-    within = "tolerance" if run.gradient_norm() <= tolerance else "its round-off, above the tolerance"
+    residual = run.gradient_norm()
+    relaxed = residual > tolerance
+    why = "gradient within tolerance"
+    if relaxed:
+        why = f"round-off: residual {residual:.1e} above tolerance {tolerance:.1e}"
     if run.factorise(data, run.hessian.tiny_shift(data)):
         step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
-        if step <= step_tolerance or run.gradient_norm() == 0.0:
-            return run.result("converged", f"gradient within {within}, Newton step {step:.1e} m")
+        if step <= step_tolerance or residual == 0.0:
+            return replace(run.result("converged", f"{why}, Newton step {step:.1e} m"), relaxed=relaxed)
         if not run.factorise(data, 0.0):  # no step along such a direction can be told from another
-            return run.result("converged", f"gradient within {within}, a direction without curvature")
+            return replace(run.result("converged", f"{why}, a direction without curvature"), relaxed=relaxed)
         return None
     if escape_saddle(run, data, FIRST_ESCAPE * step_tolerance):
         run.iterations += 1

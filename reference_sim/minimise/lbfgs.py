@@ -19,7 +19,7 @@ from ..potential import Potential
 from .descent import Descent, Observer
 from .lbfgs_history import LBFGSHistory
 from .newton import FIRST_SHIFT, Newton
-from .result import Result
+from .result import Result, check_tolerance
 
 SWITCH = 1.0  # relative residual
 
@@ -57,6 +57,7 @@ class LBFGS:
     ) -> None:
         cloth = potential.cloth
         self.potential, self.memory, self.timeout = potential, memory, timeout
+        check_tolerance(tolerance)
         self.observe = observe
         self.max_iterations = min(patience, max_iterations) if finish else max_iterations
         self.switch = max(switch, tolerance) if finish else tolerance

@@ -29,7 +29,7 @@ from .convergence_check import convergence_check
 from .descent import Descent, Observer, approximate_wolfe, sufficient_decrease
 from .factorised import FactorisedDescent, FactorisedHessian
 from .lbfgs_history import LBFGSHistory, dot
-from .result import Result
+from .result import Result, check_tolerance
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
 # In units of M/dt^2. A static cloth that nothing holds needs a shift against its rigid motions alone; begun
@@ -72,6 +72,7 @@ class Newton:
         start_projected: bool = False,
         observe: Observer | None = None,
     ) -> None:
+        check_tolerance(tolerance)
         self.potential, self.reuse, self.observe = potential, reuse, observe
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
         self.first_level = len(CONVEXITY) - 1 if start_projected else 0

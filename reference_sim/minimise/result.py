@@ -18,6 +18,7 @@ class Result:
         status: one of STATUSES. "converged" means: gradient within tolerance, the unregularised Newton step
             negligible, and no negative curvature left.
         reason: one line in words.
+        relaxed: whether round-off let a residual above the tolerance count as converged: see the reason.
         iterations, factorisations: counts.
         gradient_norm: the relative residual [1], by which every minimisation here is stopped: the largest
             component of dPhi/dx over the free vertices, divided by the mean weight of a vertex.
@@ -35,3 +36,10 @@ class Result:
     energy: float
     terms: dict[str, float]
     seconds: dict[str, float] = field(default_factory=dict)
+    relaxed: bool = False
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Raises ValueError for a tolerance that is no finite number above zero."""
+    if not 0.0 < tolerance < float("inf"):
+        raise ValueError(f"tolerance = {tolerance}: give a finite number above 0, in mean vertex weights")

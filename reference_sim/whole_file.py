@@ -1,0 +1,65 @@
+"""Files that appear whole or not at all, also where the disk is full."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path`: renamed to it when the block ends well, removed when it does not.
+
+    What was there before is there until the new file is on the disk. Raises OSError, which names `path` where
+    there is no room for it.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        yield temporary
+        with temporary.open("rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        if error.errno in NO_ROOM:
+            error.filename, error.filename2 = str(path), None
+        raise
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def disk_full(error: BaseException) -> str:
+    """One line of which file found no room, and how much there is; empty where something else was raised."""
+    if not isinstance(error, OSError) or error.errno not in NO_ROOM:
+        return ""
+    path = Path(error.filename or ".").absolute()
+    folder = next((parent for parent in path.parents if parent.is_dir()), Path())
+    free = shutil.disk_usage(folder).free / 1e6
+    name = error.filename or "a file"
+    return f"{name}: {error.strerror} ({free:.3g} MB are free there); what was finished is kept"
+
+
+def reserve(path: Path, size: int) -> None:
+    """Have the file system set room aside for a file to grow to `size` bytes; it then has that size.
+
+    For libraries in C that crash where they find no room. Raises OSError, which names the file. Where the
+    system cannot promise room, what is free is looked at.
+    """
+    there = path.stat().st_size
+    if size <= there:
+        return
+    if not hasattr(os, "posix_fallocate"):
+        if shutil.disk_usage(path.parent).free < size - there:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        return
+    with path.open("rb+") as file:
+        try:
+            os.posix_fallocate(file.fileno(), there, size - there)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from None

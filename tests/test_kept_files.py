@@ -1,0 +1,129 @@
+"""Nothing damaged is believed: what a run has kept is done again where it is not as it was written."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from tasks_by_hand import InProcess
+from test_cell_tasks import TINY, NoLog, plan_of
+from test_runner import task
+
+from benchmarks import executor
+from benchmarks.cache import Cache
+from benchmarks.results import RunFolder
+from benchmarks.rows import rows_of
+from benchmarks.runner import Runner
+from benchmarks.schedule import tasks_of
+from benchmarks.tasks.task import Context, Outcome, RunStopped
+
+QUICK = dataclasses.replace(TINY, least_seconds=0.0)
+METHODS = ("simulation", "newton-1")
+# What is done again where something of newton-1, or of the simulation that all are compared with, is damaged.
+CELL, METRICS = "cell hanging_sheet x newton-1", "metrics hanging_sheet x newton-1"
+ALL = {CELL, METRICS, "cell hanging_sheet x simulation", "metrics hanging_sheet x simulation"}
+
+
+def done(folder: Path) -> tuple[Runner, dict]:
+    """All tasks of a small run there, and what does not come from the clock of its rows."""
+    plan = plan_of(folder, *METHODS, scene="hanging_sheet", preset=QUICK)
+    runner = Runner(tasks_of(plan), Cache(RunFolder(folder)))
+    runner.run(InProcess(RunFolder(folder)), NoLog())
+    rows = rows_of(plan, runner.tasks, runner.outcomes)
+    return runner, {
+        (r.method, r.metric): (r.value, r.status, r.reason) for r in rows if not r.metric.startswith("cost/")
+    }
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> tuple[Path, dict]:
+    folder = tmp_path_factory.mktemp("whole")
+    return folder, done(folder)[1]
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 16
+    path.write_bytes(data)
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 3])
+
+
+def replace(path: Path) -> None:
+    """By a whole file of the same kind."""
+    other = path.with_name(path.name.replace("newton-1", "simulation"))
+    shutil.copyfile(other, path)
+
+
+@pytest.mark.parametrize("damage", [flip, truncate, replace, Path.unlink])
+@pytest.mark.parametrize(
+    ("name", "redone"),
+    [
+        ("trajectories/hanging_sheet/newton-1.vtkhdf", {CELL, METRICS}),
+        ("trajectories/hanging_sheet/newton-1.npz", {METRICS}),
+        ("cache/cell/hanging_sheet/newton-1.json", {CELL, METRICS}),
+        ("cache/metrics/hanging_sheet/newton-1.json", {METRICS}),
+    ],
+)
+def test_what_is_damaged_is_done_again_alone(whole, tmp_path, damage, name, redone):
+    folder = shutil.copytree(whole[0], tmp_path / "run")
+    damage(folder / name)
+    runner, rows = done(folder)
+    assert set(runner.reused) == ALL - redone
+    assert rows == whole[1]
+    assert len(done(folder)[0].reused) == len(ALL)
+
+
+def test_what_hangs_on_a_damaged_reference_is_done_again(whole, tmp_path):
+    folder = shutil.copytree(whole[0], tmp_path / "run")
+    flip(folder / "trajectories/hanging_sheet/simulation.vtkhdf")
+    runner, rows = done(folder)
+    assert runner.reused == [CELL] and rows == whole[1]
+
+
+def test_a_number_changed_in_a_record_is_not_believed(whole, tmp_path):
+    folder = shutil.copytree(whole[0], tmp_path / "run")
+    path = folder / "cache/metrics/hanging_sheet/newton-1.json"
+    entry = json.loads(path.read_text())
+    entry["outcome"]["result"]["energy/total"] = 4.11
+    path.write_text(json.dumps(entry, indent=1, ensure_ascii=False))
+    runner, rows = done(folder)
+    assert METRICS not in runner.reused and rows == whole[1]
+
+
+def test_a_file_that_comes_back_as_it_was_does_nothing_else_again(tmp_path):
+    tasks = task("first"), task("second", needs=(("network", "first"),))
+
+    def run() -> Runner:
+        runner = Runner(tasks, Cache(RunFolder(tmp_path)))
+        runner.run(InProcess(RunFolder(tmp_path)), NoLog())
+        return runner
+
+    run()
+    (tmp_path / "first.txt").write_text("damaged")
+    runner = run()
+    assert runner.reused == ["network second"]
+    assert (tmp_path / "first.txt").read_text() == "first"
+
+
+def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it(tmp_path, monkeypatch):
+    folder = RunFolder(tmp_path)
+    first, second = task("first"), task("second", needs=(("network", "first"),))
+    cache = Cache(folder)
+    monkeypatch.setattr(executor, "_context", Context(folder), raising=False)
+    monkeypatch.setattr(executor, "_verified", set())
+    found = cache.keep(first, executor._perform(first, {}), {})
+    assert isinstance(found.outcome, Outcome)
+    needed = {first.id: found.outcome}
+    assert executor._perform(second, needed).status == "ok"
+    (tmp_path / "first.txt").write_text("worst")
+    assert executor._perform(second, needed).status == "ok"  # compared once in each process
+    executor._verified.clear()
+    with pytest.raises(RunStopped, match=r"^first\.txt is damaged since this run wrote it"):
+        executor._perform(second, needed)
+    assert cache.find(first, {}).state == "missing"
