@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -106,8 +107,7 @@ def _read_with_vtk(path: Path) -> Parts | None:
     import pyvista
 
     try:
-        with warnings.catch_warnings(), pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            warnings.simplefilter("ignore")
+        with _silent_vtk(), pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
             surface = pyvista.read(path)
     except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
@@ -119,3 +119,20 @@ def _read_with_vtk(path: Path) -> Parts | None:
     if surface.active_texture_coordinates is not None:
         data[UV_OF_VTK] = np.asarray(surface.active_texture_coordinates)
     return Parts(surface.points, list(surface.faces.reshape(-1, 4)[:, 1:]), vertex_data=data)
+
+
+@contextlib.contextmanager
+def _silent_vtk() -> Iterator[None]:
+    """VTK and pyvista print many lines about a damaged file, by two loggers and as warnings."""
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    told, disabled = vtkLogger.GetCurrentVerbosityCutoff(), logging.root.manager.disable
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    logging.disable(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(disabled)
+        vtkLogger.SetStderrVerbosity(told)
