@@ -10,7 +10,7 @@ and where numbers compare a roll-out with the reference simulation
     compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]     name -> value
 
 which is called with the reference, and with each simulation that is as right as the reference: how far a
-number moves with them is its uncertainty. And where it wants curves in the trajectory file
+number moves with them is its uncertainty. And where it wants curves beside the trajectory
 
     series(roll_out: RollOut) -> dict[str, np.ndarray]  name -> (T,)
 

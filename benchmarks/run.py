@@ -185,8 +185,6 @@ def choose_garment(options: argparse.Namespace) -> OwnGarment | None:
         )
     from snug.body import Body
 
-    from .source import digest_of_file
-
     file.read(Body.from_file(options.body) if options.body else Body.load())
     return OwnGarment(file, tuple(map(digest_of_file, file.files)))
 
@@ -203,7 +201,8 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     except ValueError:
         raise PlanError(f"--seeds '{text[:40]}': give whole numbers separated by commas") from None
     if not seeds or min(seeds) < 0 or max(seeds) >= 1 << 63:
-        raise PlanError(f"--seeds '{text[:40]}': give at least one whole number, of 0 to 63 bits")
+        wanted = "at least one whole number, none below 0 or beyond 63 bits"
+        raise PlanError(f"--seeds '{text[:40]}': give {wanted}")
     return seeds
 
 

@@ -97,7 +97,7 @@ class Cloth:
         return self.rest_uv[self.faces] if self.rest_uv.ndim == 2 else self.rest_uv
 
     @cached_property
-    def _frames(self) -> np.ndarray:
+    def frames(self) -> np.ndarray:
         """(F, 2, 2) matrices Dm = [X1 - X0, X2 - X0] in a local orthonormal frame of the face [m]."""
         corner = self.rest_corners
         if corner.shape[2] == 2:
@@ -112,12 +112,12 @@ class Cloth:
     @cached_property
     def areas(self) -> np.ndarray:
         """(F,) rest areas [m^2]."""
-        return 0.5 * np.abs(np.linalg.det(self._frames))
+        return 0.5 * np.abs(np.linalg.det(self.frames))
 
     @cached_property
     def Dm_inverse(self) -> np.ndarray:
         """(F, 2, 2) inverse of Dm [1/m]; F = [x1 - x0, x2 - x0] Dm^-1 is the deformation gradient."""
-        return np.linalg.inv(self._frames)
+        return np.linalg.inv(self.frames)
 
     @cached_property
     def masses(self) -> np.ndarray:

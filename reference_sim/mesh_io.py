@@ -5,18 +5,15 @@ The files are meshio's formats (OBJ, PLY, STL, OFF, VTK) and trajectories of thi
 
 from __future__ import annotations
 
-import contextlib
 import glob
-import io
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .cloth import MeshError
-from .mesh_header import check_header
+from .mesh_formats import UV_OF_VTK, Parts, read_parts
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,7 +25,7 @@ UP_AXES = ("y", "z")
 FARTHEST = 1e12  # in any unit: squares and cubes of it are still numbers
 # What programs call the texture coordinates of a vertex: two numbers, or one array of both.
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
-UV_ARRAYS = ("UV", "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
+UV_ARRAYS = (UV_OF_VTK, "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +59,7 @@ def read_mesh(path: str | Path) -> Surface:
         raise MeshError(f"{path}: no such file")
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
-    parts = _read_obj(path) if path.suffix.lower() == ".obj" else _read_with_meshio(path)
+    parts = read_parts(path)
     positions, polygons = np.asarray(parts.points, dtype=np.float64), parts.polygons
     if not polygons:
         raise MeshError(f"{path}: no triangles in it: export the surface as triangles")
@@ -85,25 +82,12 @@ def read_mesh(path: str | Path) -> Surface:
     )
 
 
-@dataclass(frozen=True)
-class _Parts:
-    """What a file holds, before its polygons become triangles. uv_polygons: places in uv (N, 2), parallel to
-    polygons, -1 for a corner without; empty where the UV are those of the vertices.
-    """
-
-    points: Any
-    polygons: list[Any]
-    uv: Any = ()
-    uv_polygons: tuple[Any, ...] | list[Any] = ()
-    vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
-
-
 def _halved(polygons: Any) -> list[Any]:
     """Triangles of triangles and quads."""
     return [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
 
 
-def _corner_uv(path: Path, parts: _Parts, faces: np.ndarray) -> np.ndarray | None:
+def _corner_uv(path: Path, parts: Parts, faces: np.ndarray) -> np.ndarray | None:
     """Texture coordinates (F, 3, 2) of the faces' corners, NaN where there are none."""
     import numpy as np
 
@@ -136,96 +120,6 @@ def _uv_of_vertices(data: Mapping[str, np.ndarray]) -> np.ndarray | None:
         if name in data and data[name].ndim == 2 and data[name].shape[1] >= 2:
             return data[name][:, :2].astype(np.float64)
     return None
-
-
-def _read_obj(path: Path) -> _Parts:
-    """Vertices, polygons and texture coordinates of an OBJ file.
-
-    meshio refuses a file with more texture coordinates than vertices, which every garment with seams has.
-    """
-    points: list[list[float]] = []
-    polygons: list[list[int]] = []
-    uv: list[list[float]] = []
-    uv_polygons: list[list[int]] = []
-    with open(path, encoding="utf-8", errors="replace") as file:
-        for number, line in enumerate(file, start=1):
-            words = line.split()
-            try:
-                if words and words[0] == "v":
-                    x, y, z = words[1:4]  # colours may follow
-                    points.append([float(x), float(y), float(z)])
-                elif words and words[0] == "vt":
-                    uv.append([float(words[1]), float(words[2]) if len(words) > 2 else 0.0])
-                elif words and words[0] == "f":
-                    corners = [word.split("/") for word in words[1:]]
-                    polygons.append([_counted(int(c[0]), len(points)) for c in corners])
-                    uv_polygons.append(
-                        [_counted(int(c[1]), len(uv)) if len(c) > 1 and c[1] else -1 for c in corners]
-                    )
-            except (ValueError, IndexError):
-                raise MeshError(f"{path}: line {number} is not understood: {line.strip()[:60]!r}") from None
-    return _Parts(points, polygons, uv, uv_polygons)
-
-
-def _counted(number: int, count: int) -> int:
-    """From 0 on: OBJ counts from 1, and backwards from the last one below 0. Raises ValueError for none."""
-    if not 0 < abs(number) < 1 << 62:
-        raise ValueError(number)
-    return number - 1 if number > 0 else count + number
-
-
-def _read_with_meshio(path: Path) -> _Parts:
-    """Points and polygons through meshio; legacy and XML PolyData, which it cannot read, through VTK."""
-    import meshio
-    import numpy as np
-
-    check_header(path)
-    printed = io.StringIO()
-    try:
-        # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
-        with (
-            contextlib.redirect_stdout(printed),
-            contextlib.redirect_stderr(printed),
-            np.errstate(over="ignore"),
-        ):
-            mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:
-        if path.suffix.lower() in (".vtk", ".vtp") and (parts := _read_with_vtk(path)):
-            return parts
-        message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
-        reason = " ".join(message.split()) or type(error).__name__
-        raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY") from None
-    kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
-    data = {name: np.asarray(values) for name, values in mesh.point_data.items()}
-    return _Parts(mesh.points, [polygon for block in kinds for polygon in block.data], vertex_data=data)
-
-
-def _read_with_vtk(path: Path) -> _Parts | None:
-    """Points and triangles of a file of PolyData, or None if it holds none."""
-    import numpy as np
-    import pyvista
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
-
-    shown, told = vtkObject.GetGlobalWarningDisplay(), vtkLogger.GetCurrentVerbosityCutoff()
-    try:
-        vtkObject.GlobalWarningDisplayOff()  # VTK would print many lines for a damaged file
-        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            surface = pyvista.read(path)
-    except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
-        return None
-    finally:
-        vtkObject.SetGlobalWarningDisplay(shown)
-        vtkLogger.SetStderrVerbosity(told)
-    if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
-        return None
-    if not surface.is_all_triangles:
-        raise MeshError(f"{path}: has faces that are no triangles: triangulate the mesh")
-    data = {name: np.asarray(surface.point_data[name]) for name in surface.point_data}
-    if surface.active_texture_coordinates is not None:
-        data[UV_ARRAYS[0]] = np.asarray(surface.active_texture_coordinates)
-    return _Parts(surface.points, list(surface.faces.reshape(-1, 4)[:, 1:]), vertex_data=data)
 
 
 def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:

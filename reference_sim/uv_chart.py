@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .cloth import MeshError
+from .cloth import Cloth, MeshError
 from .mesh_io import Surface
 
 JOINED = 1e-6  # [m] from which two vertices are one: round-off of six digits
@@ -87,6 +87,12 @@ def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndar
             f"is a texture and no pattern; {instead}"
         )
     return chart
+
+
+def flattened(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """A chart (F, 3, 2) [m] of a mesh at rest in space: each triangle laid flat by itself, as it is."""
+    frames = Cloth(positions, faces).frames
+    return np.concatenate([np.zeros((len(faces), 1, 2)), frames.transpose(0, 2, 1)], axis=1)
 
 
 def areas_of(corners: np.ndarray) -> np.ndarray:

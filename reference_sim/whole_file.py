@@ -46,17 +46,20 @@ def disk_full(error: BaseException) -> str:
 
 
 def reserve(path: Path, size: int) -> None:
-    """Have the file system set room aside for the first `size` bytes of a file that is there.
+    """Have the file system set room aside for a file to grow to `size` bytes; it then has that size.
 
     For libraries in C that crash where they find no room. Raises OSError, which names the file. Where the
     system cannot promise room, what is free is looked at.
     """
+    there = path.stat().st_size
+    if size <= there:
+        return
     if not hasattr(os, "posix_fallocate"):
-        if shutil.disk_usage(path.parent).free < size - path.stat().st_size:
+        if shutil.disk_usage(path.parent).free < size - there:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
         return
     with path.open("rb+") as file:
         try:
-            os.posix_fallocate(file.fileno(), 0, size)
+            os.posix_fallocate(file.fileno(), there, size - there)
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(path)) from None

@@ -70,7 +70,7 @@ def add_garment_options(parser: ArgumentParser) -> None:
     add(f"{OPTION}units", default="m", choices=("m", "cm", "mm", "in"), help="of the file (default m)")
     add(f"{OPTION}up", default="y", choices=("y", "z"), help="up axis of the file (default y)")
     add(f"{OPTION}shift", default="0,0,0", metavar="DX,DY,DZ",
-        help="in metres, after units and axis: the body stands elsewhere in the file")  # fmt: skip
+        help="metres to add then, where the body stood elsewhere; with '=' if DX is below 0")  # fmt: skip
     add(f"{OPTION}rest", default="mesh", choices=RESTS,
         help="what has no strain: the mesh (default), or its UV chart, the sewing pattern")  # fmt: skip
     add(f"{OPTION}uv-scale", type=float, metavar="M",

@@ -8,7 +8,7 @@ squares with the far ones held back (Huber), begun from many places. How high a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,10 +81,31 @@ class Fit:
         return float(uneven / self.size + self.at_ends)
 
 
+def file_pose(body: Body) -> Array:
+    """The pose (24,3) [rad] that a body has in its file, in which garments were made for it."""
+    pose = np.zeros((len(body.joint_names), 3))
+    if body.arms_lowered is None:
+        return pose
+    pose[body.joint_names.index("left_shoulder"), 2] = -body.arms_lowered[0]
+    pose[body.joint_names.index("right_shoulder"), 2] = body.arms_lowered[1]
+    return pose
+
+
+def as_in_file(body: Body) -> Body:
+    """The mean body with template and joints as its file has them."""
+    if body.arms_lowered is None:
+        return body
+    pose, here = file_pose(body)[None], np.zeros((1, 3))
+    moved = body.transforms(pose, here)[0]
+    joints = np.einsum("jab,jb->ja", moved[..., :3], body.joint_template) + moved[..., 3]
+    return replace(body, template=body.vertices(pose, here)[0], joint_template=joints)
+
+
 class Wearer:
-    """The unposed body as something to measure distances to."""
+    """The mean body, as its file has it, as something to measure distances to. body: that one."""
 
     def __init__(self, body: Body) -> None:
+        self.body = body = as_in_file(body)
         self.height = body.height
         self.low, self.high = body.template.min(axis=0), body.template.max(axis=0)
         self.skin = Obstacle(body.template, body.faces)

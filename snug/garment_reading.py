@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.material import Material, MaterialError
 from reference_sim.mesh_io import METRES, Surface, read_mesh, to_metres_y_up
-from reference_sim.uv_chart import join_seams, rest_chart, stretches
+from reference_sim.uv_chart import flattened, join_seams, rest_chart, stretches
 from snug.body import Body
 from snug.garment_file import OPTION, GarmentFile
-from snug.garment_fit import Wearer, find_mend
+from snug.garment_fit import Wearer, as_in_file, file_pose, find_mend
 from snug.garment_weights import Carried, authored_weights, carried_by
-from snug.garments import Garment, GarmentError
+from snug.garments import Garment, GarmentError, smooth_weights
 from snug.openings import named_openings
 from snug.remeshing import corner_angles
 
@@ -30,6 +30,7 @@ SHARP = 5.0  # [degrees] below which an angle slows the simulation down
 SLIVERS = "slivers slow the simulation down: remesh"
 LOOSE = "what is not sewn on falls off: merge the vertices along its seams"
 NOTED = ("ok", "note")
+UNPOSED_SMOOTHING = 20  # rounds over borrowed weights at 1000 vertices, as recipes have it
 OUTWARD = 0.5  # share of the area that looks away from the skin, below which a garment is inside out
 
 
@@ -121,7 +122,7 @@ def _of_place(reading: Reading, file: GarmentFile, wearer: Wearer, raw: Surface)
         shift = ",".join(f"{value:g}" for value in mend.shift)
         words = {"units": (mend.units, file.units), "up": (mend.up, file.up)}
         given = [f"{OPTION}{name} {found}" for name, (found, was) in words.items() if found != was]
-        given += [f"{OPTION}shift {shift}"] if mend.shift != file.shift else []
+        given += [f"{OPTION}shift={shift}"] if mend.shift != file.shift else []
         remedy = " ".join(given)
     reading.find("place", f"does not lie on the body ({size} m, {problem})", remedy, "unusable")
     return False
@@ -134,7 +135,8 @@ def _of_rest(reading: Reading, file: GarmentFile, surface: Surface) -> Array | N
         reading.find("rest", "the mesh itself; the file has no UV")
         return None
     try:
-        chart = rest_chart(surface, file.uv_scale or METRES[file.units], prefix=OPTION)
+        scale = METRES[file.units] if file.uv_scale is None else file.uv_scale
+        chart = rest_chart(surface, scale, prefix=OPTION)
     except MeshError as error:
         says, _, remedy = str(error).partition(": ")
         if asked:
@@ -143,11 +145,9 @@ def _of_rest(reading: Reading, file: GarmentFile, surface: Surface) -> Array | N
             reading.find("rest", f"the mesh itself; {says}")
         return None
     off = np.abs(stretches(surface.positions[surface.faces], chart) - 1).max(axis=1)
-    strain = (
-        f"on the mesh stretched by {np.median(off):.1%} (median), {np.quantile(off, 0.99):.0%} (99 % of it)"
-    )
-    reading.find("rest", f"{'the UV chart' if asked else 'the mesh itself; the UV chart is'}, {strain}"
-                 .replace("is,", "is"))  # fmt: skip
+    most = f"99 % of it by less than {np.quantile(off, 0.99):.0%}"
+    strain = f"stretched by {np.median(off):.1%} on the mesh (median; {most})"
+    reading.find("rest", f"the UV chart, {strain}" if asked else f"the mesh itself; its UV chart is {strain}")
     return chart if asked else None
 
 
@@ -208,10 +208,14 @@ def _dressed(
     material: Material,
     authored: Array | None,
 ) -> Garment | None:
-    """The garment, its openings and what carries it; None where it has no opening."""
-    positions, faces = surface.positions, surface.faces
+    """The garment, its openings and what carries it; None where it has no opening.
+
+    body: in T pose. The surface lies on it as its file has it: there openings and weights are found, and from
+    there vertices are brought to the T pose by the inverse of their blended transforms. Its rest shape stays.
+    """
+    positions, faces, filed = surface.positions, surface.faces, as_in_file(body)
     try:
-        loops = named_openings(body, positions, faces)
+        loops = named_openings(filed, positions, faces)
     except ValueError as error:
         reading.find("openings", str(error), "separate them", "unusable")
         return None
@@ -222,11 +226,15 @@ def _dressed(
         return None
     reading.find("openings", ", ".join(f"{name} ({len(loop)} vertices)" for name, loop in loops.items()))
     legs = "left_leg" in loops or "right_leg" in loops
-    carried: Carried = carried_by(body, positions, faces, legs=legs, authored=authored)
+    carried: Carried = carried_by(filed, positions, faces, legs=legs, authored=authored)
     how = "as they came with it" if carried.authored else "of the closest skin"
     reading.find("weights", f"{how}; encloses {', '.join(carried.followed)}")
+    if body.arms_lowered is not None:
+        chart = flattened(positions, faces) if chart is None else chart
+        positions = _in_t_pose(body, positions, faces, carried)
+        reading.find("pose", "made for lowered arms, brought to the T pose; its rest shape is as it was made")
     # What has no neck and no sleeves hangs from its waist, and contact without friction does not hold that.
-    hangs = "neck" in loops or "left_sleeve" in loops or "right_sleeve" in loops
+    hangs = any(name in loops for name in ("neck", "left_sleeve", "right_sleeve"))
     pins = np.empty(0, dtype=np.int64) if hangs else np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
     if len(pins):
         reading.find("held", f"{len(pins)} vertices of the waist are carried by the body")
@@ -235,3 +243,13 @@ def _dressed(
         skinning_weights=carried.weights, loops=loops, pins=pins, material=material, rest_uv=chart,
         authored_weights=carried.authored,
     )  # fmt: skip
+
+
+def _in_t_pose(body: Body, positions: Array, faces: Index, carried: Carried) -> Array:
+    """Positions (V,3) [m], made for the body as its file has it, on the body in T pose."""
+    weights = carried.weights
+    if not carried.authored:
+        weights = smooth_weights(weights, faces, round(UNPOSED_SMOOTHING * len(positions) / 1000))
+    moved = body.transforms(file_pose(body)[None], np.zeros((1, 3)))[0]
+    blended = np.einsum("vj,jab->vab", weights, moved)
+    return np.linalg.solve(blended[..., :3], (positions - blended[..., 3])[..., None])[..., 0]

@@ -14,7 +14,6 @@ import numpy as np
 from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices, sole_points
 
 # Upper arm to the spine's direction: on the default body this leaves about 2 cm between arm and chest.
-LONGEST_NAME = 100  # bytes of a motion's name
 ARMS_CLEAR = np.deg2rad(25.0)
 
 
@@ -40,11 +39,6 @@ class Motion:
     def __post_init__(self) -> None:
         poses = np.ascontiguousarray(self.poses, dtype=np.float64)
         translations = np.ascontiguousarray(self.translations, dtype=np.float64)
-        if not self.name.isprintable() or len(self.name.encode(errors="replace")) > LONGEST_NAME:
-            raise MotionError(
-                f"motion {self.name[:40]!a}: files are named after it; give its file a name of at most "
-                f"{LONGEST_NAME} printable bytes"
-            )
         if poses.ndim != 3 or poses.shape[1:] != (24, 3) or len(poses) == 0:
             raise MotionError(f"motion {self.name}: poses have shape {poses.shape}; give (frames, 24, 3)")
         if translations.shape != (len(poses), 3):

@@ -18,6 +18,8 @@ from snug.upright import turned_upright
 HAND_DAMPING = 0.1
 HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("wrist", "hand")]
 
+LONGEST_NAME = 100  # bytes of a motion's name
+
 
 def load_motions(
     path: str | Path,
@@ -49,6 +51,11 @@ def load_motions(
 
 def read_motion(file: Path, reading: Reading) -> Motion:
     """One clip as recorded, at the file's rate, upright and without glitches. Raises MotionError."""
+    if not file.stem.isprintable() or len(file.stem.encode(errors="replace")) > LONGEST_NAME:
+        raise MotionError(
+            f"{str(file)[:200]!a}: files are named after a motion; give this one a name of at most "
+            f"{LONGEST_NAME} printable bytes"
+        )
     reader = READERS.get(file.suffix.lower())
     if reader is None:
         remedy = " Give the .amc clips that belong to it." if file.suffix.lower() == ".asf" else ""

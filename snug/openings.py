@@ -12,16 +12,18 @@ from snug.tailoring import joint
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
 MIDDLE = 0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
 
 
 def named_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
     """Name -> boundary vertices in order, from the front-most on, of a garment (V,3) [m] on the unposed body.
 
-    An opening beside the middle is a sleeve above the hips, or far out, and a leg else. In the middle the
-    highest is the neck, above half the way from pelvis to neck, or else the waist, and the lowest the hem;
-    one that is alone there is the hem, unless there are legs. The lowest of all is called hem too where no
-    other is. Others are opening_1 and so on. Raises ValueError where loops touch.
+    An opening beside the middle is a sleeve above the hips, or far out, and a leg else; a sleeve that ends
+    near the shoulder's joint is an armhole. In the middle the highest is the neck, above half the way from
+    pelvis to neck, or else the waist, and the lowest the hem; one that is alone there is the hem, unless
+    there are legs. The lowest of all is called hem too where no other is, but for two legs. Others are
+    opening_1 and so on. Raises ValueError where loops touch.
     """
     loops = [np.roll(loop, -int(np.argmax(positions[loop, 2]))) for loop in boundary_loops(faces)]
     if not loops:
@@ -37,8 +39,8 @@ def named_openings(body: Body, positions: Array, faces: Index) -> dict[str, Inde
         elif side not in found:
             found[side] = loop
     found |= _in_the_middle(body, middle, legs="left_leg" in found or "right_leg" in found)
-    lowest = loops[int(np.argmin([centre[1] for centre in centres]))]
-    found.setdefault("hem", lowest)
+    if not {"left_leg", "right_leg"} <= found.keys():
+        found.setdefault("hem", loops[int(np.argmin([centre[1] for centre in centres]))])
     named = {int(loop[0]) for loop in found.values()}
     rest = (loop for loop in loops if int(loop[0]) not in named)
     return found | {f"opening_{number}": loop for number, loop in enumerate(rest, start=1)}
@@ -51,7 +53,9 @@ def _beside(body: Body, centre: Array) -> str:
     out = abs(centre[0] - middle)
     if out < MIDDLE * (hip[0] - middle):
         return ""
-    limb = "sleeve" if centre[1] > hip[1] or out > shoulder[0] - middle else "leg"
+    arm = float(np.linalg.norm(joint(body, "left_elbow") - shoulder))
+    beyond = out > shoulder[0] - middle + ARMHOLE * arm
+    limb = "sleeve" if beyond else "armhole" if centre[1] > hip[1] else "leg"
     return f"{'left' if centre[0] > middle else 'right'}_{limb}"
 
 

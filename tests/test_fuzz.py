@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from snug.motion import MotionError
+from snug.motion_files import load_motions
+
 HERE = Path(__file__).resolve().parent
 
 
@@ -26,3 +29,12 @@ def test_mutated_files_are_refused_in_one_line(count, tmp_path):
     found = json.loads(done.stdout)
     assert found["problems"] == []
     assert found["refused"] > 0.7 * count and found["peak"] < 2000.0 and found["slowest"] < 10.0
+
+
+@pytest.mark.parametrize("name", [b"a" * 246, b"walk\xff", b"two\nlines"])
+def test_a_motion_that_no_file_can_be_named_after_is_refused(name, tmp_path):
+    path = tmp_path / os.fsdecode(name + b".npz")
+    path.write_bytes(b"")
+    with pytest.raises(MotionError, match="a name of at most 100 printable bytes") as refused:
+        load_motions(path)
+    assert str(refused.value).isascii() and "\n" not in str(refused.value)

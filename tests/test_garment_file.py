@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from dressing import tube_dress
 from garment_files import doubled_along, own_chart, write_obj, z_up
+from other_bodies import lowered, plain_arrays, read_again
 
 from benchmarks import run as run_command
 from benchmarks.assets import embedded_motions, open_assets
@@ -23,8 +24,10 @@ from snug import check
 from snug.body import Body
 from snug.dressed_body import DressedBody
 from snug.garment_file import GarmentFile, add_garment_options, demand_a_file, garment_file
+from snug.garment_fit import file_pose
 from snug.garment_kinds import tailor_skirt, tailor_tshirt
 from snug.garments import GarmentError
+from snug.motion import Motion
 
 
 @pytest.fixture(scope="session")
@@ -137,6 +140,21 @@ def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
     assert np.abs(left - right).max() < 0.2 and min(left.min(), right.min()) > 0.2
 
 
+def test_a_garment_made_for_lowered_arms_is_brought_to_the_t_pose_with_its_rest_shape(tmp_path, body, shirt):
+    filed = lowered(body, 40.0)
+    read_body = read_again(plain_arrays(filed))
+    pose = file_pose(read_body)[None]
+    hanging = Motion("file", np.repeat(pose, 2, axis=0), np.zeros((2, 3)), fps=30.0)
+    made = DressedBody(read_body, shirt).skinned(hanging, smoothing=20)[0]
+    read = GarmentFile(path=saved(tmp_path, shirt, positions=made)).read(read_body)
+    assert read.loops.keys() == shirt.loops.keys()
+    # Skinned into the pose of the file it is what was made, and that is where it has no strain.
+    back = DressedBody(read_body, read).skinned(hanging, smoothing=20)[0]
+    np.testing.assert_allclose(back, made, atol=1e-5)
+    assert StretchStVK(read.cloth()).value_and_gradient(made)[0] < 1e-12
+    np.testing.assert_allclose(read.rest_positions, shirt.rest_positions, atol=0.03)
+
+
 def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
     (tmp_path / "silk.toml").write_text("young_modulus = 5e4\nbending_stiffness = 1e-6\n")
     file = GarmentFile(path=saved(tmp_path, tube), material=tmp_path / "silk.toml")
@@ -176,7 +194,7 @@ def test_the_shift_that_is_said_mends_a_displaced_garment(tmp_path, body, shirt,
     path = saved(tmp_path, shirt, positions=shirt.rest_positions + away)
     with pytest.raises(GarmentError, match=r"mm deep in the body|fits far better") as refused:
         GarmentFile(path=path).read(body)
-    shift = tuple(map(float, str(refused.value).rpartition("--garment-shift ")[2].split(",")))
+    shift = tuple(map(float, str(refused.value).rpartition("--garment-shift=")[2].split(",")))
     np.testing.assert_allclose(np.add(shift, away), 0.0, atol=0.02)
     GarmentFile(path=path, shift=shift).read(body)
 
@@ -220,7 +238,7 @@ def test_wrong_weights_are_refused(tmp_path, body, tube, weights, words):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--garment-shift", "1,2"], "give three numbers"),
+        (["--garment-shift=-1,2"], "give three numbers"),
         (["--garment-uv-scale", "2"], "add --garment-rest uv"),
     ],
 )

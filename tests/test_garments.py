@@ -13,6 +13,7 @@ from snug.body import Body
 from snug.garment_cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
 from snug.garment_kinds import GARMENT_TEMPLATES, find_template, tailor_tshirt, tailor_tunic
 from snug.garments import GarmentError, smooth_weights
+from snug.openings import named_openings
 
 WAIST = "spine1"
 
@@ -48,6 +49,13 @@ def shirt(request, wardrobe):
 def face_normals(points, faces):
     a, b, c = (points[faces[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
+
+
+def test_openings_are_named_by_their_place(body, garment):
+    found = named_openings(body, garment.rest_positions, garment.faces)
+    assert found.keys() == garment.loops.keys()
+    for name, loop in garment.loops.items():
+        np.testing.assert_array_equal(found[name], loop)
 
 
 def waist(body):

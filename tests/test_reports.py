@@ -23,10 +23,11 @@ from report_folder import (
     write_model,
 )
 
-from benchmarks.results import COLUMNS, FORMAT, RunFolder
+from benchmarks.results import COLUMNS, FORMAT, RunFolder, digest_of_file
 from reports import build, render, training
 from reports.data import run_data
 from reports.means import Mean
+from reports.narrative import summary
 from reports.tables import make_tables
 
 
@@ -154,6 +155,32 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     said = capsys.readouterr()
     assert "tshirt-walk/snug.vtkhdf" in said.err and "snug-seed0.safetensors" in said.err
     assert said.out.strip() == str(run.report_path) and run.report_path.is_file()
+
+
+def test_curves_beside_a_trajectory_are_its_own(tmp_path):
+    run = RunFolder(tmp_path)
+    path = run.trajectory_path(SCENES[0], "snug")
+    write_mesh(path, *sheet(0.1), {"energy/strain": np.zeros(FRAMES), "iterations": np.ones(FRAMES)})
+    np.savez(run.curves_path(SCENES[0], "snug"), **{"energy/strain": np.ones(FRAMES)})
+    fields = build.read_trajectory(run, path, []).frame_fields
+    assert fields["energy/strain"].tolist() == fields["iterations"].tolist() == [1.0] * FRAMES
+    run.curves_path(SCENES[0], "snug").write_bytes(b"no archive")
+    problems = []
+    assert build.read_trajectory(run, path, problems) is None and "snug.npz" in problems[0]
+
+
+def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
+    run = RunFolder(tmp_path)
+    run.write_rows(all_rows())
+    digests = {"results.csv": digest_of_file(run.rows_path), "trajectories/gone.vtkhdf": "0"}
+    run.write_config(declaration(all_rows(), digests=digests))
+    assert build.read_run(run).changed == [] and "Changed since" not in dict(summary(build.read_run(run)))
+    run.write_rows(all_rows()[:-1])
+    said = dict(summary(build.read_run(run)))
+    assert (
+        next(iter(said)) == "Changed since"
+        and "Not as the run wrote them: results.csv." in said["Changed since"]
+    )
 
 
 def test_cloth_is_painted_over_the_body_on_white(made, tmp_path):

@@ -83,6 +83,48 @@ def test_an_absent_or_broken_config_is_named(tmp_path):
         folder.read_config()
 
 
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("[" * 100_000, "not readable as JSON"),
+        ('{"format": 3, "a": ' + "[" * 40 + "]" * 40 + "}", "nested more than 30 deep"),
+        ('{"format": 3, "seeds": ' + "9" * 5000 + "}", "not readable as JSON"),
+        ('{"format": 3, "metrics": []}', "'metrics' should be metric -> what it declares"),
+        ('{"format": 3, "metrics": {"a": {"title": 3}}}', "'metrics' should be"),
+        ('{"format": 3, "cases": {"a": {"map_point": ["x"]}}}', "'cases' should be"),
+        ('{"format": 3, "stages": [{"name": "a", "seconds": Infinity}]}', "'stages' should be"),
+        ('{"format": 3, "digests": {"a": 1}}', "'digests' should be file -> digest"),
+        ('{"format": 3, "earlier": 1}', "'earlier' should be a list"),
+    ],
+)
+def test_a_config_of_wrong_types_is_named(tmp_path, text, word):
+    folder = RunFolder(tmp_path)
+    folder.config_path.write_text(text)
+    with pytest.raises(ResultsError, match=word) as refused:
+        folder.read_config()
+    assert "run.json: " in str(refused.value) and len(str(refused.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        (b"strain+gravity", b"\xff\xfe", "not readable as CSV in UTF-8"),
+        (b"strain+gravity", b"x" * 200_000, "not readable as CSV"),
+        (b"snug", b"x" * 200, "line 2: column method: no name of at most 150"),
+        (b"snug", b"a\x00b", "no name of at most 150 printable"),
+        (b",0,", b"," + b"9" * 30 + b",", "column seed: a number beyond 64 bits"),
+    ],
+)
+def test_a_cell_that_is_none_is_named(tmp_path, old, new, word):
+    folder = RunFolder(tmp_path)
+    folder.write_rows(ROWS[:1])
+    data = folder.rows_path.read_bytes()
+    assert old in data
+    folder.rows_path.write_bytes(data.replace(old, new, 1))
+    with pytest.raises(ResultsError, match=word):
+        folder.read_rows()
+
+
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
     folder = RunFolder(tmp_path)
     folder.write_rows(ROWS[:1])

@@ -54,6 +54,8 @@ def test_a_trajectory_is_judged_by_what_is_in_it():
         status="stalled", reason="frame 2: x", frame_fields={"converged": np.array([1, 1, 0, 0.0])}
     )
     assert stalled == ("stalled", "2 of 4 frames did not converge; first frame 2: x")
+    relaxed = judged(status="converged", reason="frame 1: round-off: residual 2e-6 above tolerance 1e-6")
+    assert relaxed == ("ok", "frame 1: round-off: residual 2e-6 above tolerance 1e-6")
 
 
 def test_a_time_that_cannot_be_believed_fails_the_cell():

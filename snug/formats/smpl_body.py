@@ -240,6 +240,7 @@ def _in_t_pose(path: Path, rest: dict[str, Any]) -> dict[str, Any]:
         "shape_directions": points[..., 1:],
         "joint_template": joints[..., 0],
         "joint_directions": joints[..., 1:],
+        "arms_lowered": lowered,
     }
 
 
