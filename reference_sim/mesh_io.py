@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import glob
 import io
+import logging
 import re
 import warnings
 from dataclasses import dataclass
@@ -132,11 +133,18 @@ def _read_with_vtk(path: Path) -> tuple[Any, list[Any]] | None:
     import pyvista
 
     try:
-        with warnings.catch_warnings(), pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
+        with (
+            warnings.catch_warnings(),
+            pyvista.vtk_verbosity("off"),
+            pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False),
+        ):
             warnings.simplefilter("ignore")
+            logging.disable(logging.CRITICAL)  # to which readers of pyvista hand errors on
             surface = pyvista.read(path)
     except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
+    finally:
+        logging.disable(logging.NOTSET)
     if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
         return None
     if not surface.is_all_triangles:
