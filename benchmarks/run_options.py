@@ -107,7 +107,7 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
     add(
         "--body",
         metavar="FILE",
-        help="an own body, .npz in SMPL's layout, in place of the package's; garments are made for it "
+        help="an own body of SMPL's family, .npz or .pkl, in place of the package's; garments are made for it "
         "(extreme cases of single steps keep the package's)",
     )
     add("--garment", metavar="FILE",
