@@ -127,15 +127,17 @@ def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
     return found
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3, 40])
-def test_positions_are_off_by_half_a_step_at_most(frames):
+@pytest.mark.parametrize(
+    ("frames", "far", "least"), [(1, 30.0, 0.0), (3, 30.0, 0.0), (40, 30.0, 0.0), (9, 0.5, 1e-4)]
+)
+def test_positions_are_off_by_half_a_step_at_most(frames, far, least):
     random = np.random.default_rng(1)
-    positions = random.normal(size=(frames, 50, 3)).cumsum(axis=0)
-    positions[-1, 0], positions[0, 1] = 30.0, -30.0  # as far apart as can be, from one frame to the next
+    positions = 0.01 * far * random.normal(size=(frames, 50, 3)).cumsum(axis=0)
+    positions[-1, 0], positions[0, 1] = far, -far  # as far apart as can be, from one frame to the next
     pack = Pack()
     pack.positions("x", positions)
     step = pack.entries["x"]["step"]
-    assert step == pytest.approx(np.ptp(positions.reshape(-1, 3), axis=0).max() / 65535)
+    assert step == pytest.approx(max(2.0 * far / 65535, least))
     error = np.abs(unpacked(pack.entries, pack.text())["x"] - positions)
     assert error.max() <= 0.5 * step * (1.0 + 1e-9)
 
@@ -186,7 +188,7 @@ def test_the_page_holds_the_roll_outs_of_the_run(folder):
     found = arrays_of(folder, WHOLE, "snug")
     cloth, faces = moving(METHODS["snug"])
     assert np.array_equal(found["faces"], faces)
-    assert np.abs(found["positions"] - cloth).max() < 1e-5
+    assert np.abs(found["positions"] - cloth).max() <= 5e-5
     np.testing.assert_allclose(found["times"], np.arange(len(cloth)) / 30.0, rtol=1e-6)
     np.testing.assert_allclose(found["energy/total"], np.linspace(1.0, 2.0, len(cloth)), rtol=1e-6)
     np.testing.assert_allclose(found["distance"], 10.0, rtol=1e-2)

@@ -3,12 +3,13 @@
 const MOST = 4;
 const SEQUENTIAL = [[52, 84, 122], [62, 137, 140], [150, 176, 104], [228, 190, 88], [214, 110, 50], [160, 28, 38]];
 const DIVERGING = [[28, 82, 150], [120, 168, 204], [214, 212, 204], [226, 150, 96], [158, 34, 34]];
+const FROM_ZERO = [[112, 132, 156], [240, 208, 110], [222, 118, 52], [150, 22, 40]]; // most of it is 0
 const COLOURS = {
   plain: { title: 'None' },
   curvature: { title: 'Mean curvature', unit: '1/m', stops: SEQUENTIAL },
   area: { title: 'Change of area from rest', unit: '%', stops: DIVERGING },
   distance: { title: 'Distance to the simulation', unit: 'mm', stops: SEQUENTIAL },
-  depth: { title: 'Depth under the skin', unit: 'mm', stops: SEQUENTIAL, through: true }, // the skin would hide it
+  depth: { title: 'Depth under the skin', unit: 'mm', stops: FROM_ZERO, through: true }, // the skin would hide it
 };
 const BRIGHTEST = 0.98; // share of the values of all panes below the end of the scale
 const HOLD = 500; // at the end, before it starts again [ms]
@@ -285,6 +286,7 @@ async function start() {
     view = new View(byId('canvas'), byId('panes'));
   } catch (error) {
     complain(error);
+    byId('views').hidden = byId('scale').hidden = true;
   }
   listen();
   options(byId('scene'), scenes.map((name) => [name, name]), scenes[0]);
