@@ -77,6 +77,13 @@ function toggle(method) {
   return load();
 }
 
+// The same from the plot, which is drawn anew: the point keeps the focus.
+async function togglePoint(method) {
+  await toggle(method);
+  const points = [...byId('errors').querySelectorAll('[data-method]')];
+  points.find((point) => point.dataset.method === method)?.focus();
+}
+
 // Read what is chosen and show it.
 async function load() {
   const own = ++turn;
@@ -167,7 +174,7 @@ function makeErrors() {
     : '';
   const can = (method) => method in content.scenes[state.scene].methods;
   byId('errors').replaceChildren(
-    panel ? errorPlot(panel, plot, content.methods, state.methods, can, toggle) : 'Nothing was timed in this scene.',
+    panel ? errorPlot(panel, plot, content.methods, state.methods, can, togglePoint) : 'Nothing was timed in this scene.',
   );
 }
 
@@ -217,8 +224,9 @@ function seek(frame) {
 }
 
 function onKey(event) {
-  const own = event.target.closest('select, button, summary, input, [role=button], [role=region]');
-  if (own || event.ctrlKey || event.altKey || event.metaKey) return;
+  const pressed = event.target.closest('select, button, summary, input:not([type=range]), [role=button]');
+  const moved = event.target.closest('select, input[type=range], [role=region]');
+  if ((event.key === ' ' ? pressed : moved) || event.ctrlKey || event.altKey || event.metaKey) return;
   const steps = { ArrowLeft: -1, ArrowRight: 1, Home: -1e9, End: 1e9 };
   if (event.key === ' ') play(!state.playing);
   else if (event.key in steps) seek(state.frame + steps[event.key] * (event.shiftKey ? 10 : 1));
