@@ -8,6 +8,11 @@
   console.error = (...words) => wrong.push(words.join(' '));
   const byId = (id) => document.getElementById(id);
   const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+  // The browser's time is not real and passes faster than frames come.
+  const until = async (holds) => {
+    for (let k = 0; k < 3000 && !holds(); k++) await wait(20);
+    return holds();
+  };
   const frame = () => Number(byId('time').value);
   const panes = () => [...document.querySelectorAll('.pane')].map((pane) => pane.childNodes[1].textContent);
   const key = async (name) => {
@@ -30,8 +35,7 @@
   const column = (k) => [...document.querySelectorAll('#scroll tbody tr:not(.printed)')].map((row) => row.children[k].textContent);
 
   async function act() {
-    for (let k = 0; k < 100 && !panes().length; k++) await wait(50);
-    await wait(300);
+    await until(() => panes().length && byId('clock').textContent && distinct() > 8);
     found.panes = panes();
     found.shades = distinct();
     found.first = frame();
@@ -42,12 +46,7 @@
     await set('speed', '0.1');
     await key(' ');
     found.playing = byId('play').getAttribute('aria-label');
-    const seen = new Set();
-    for (let k = 0; k < 20000 && seen.size < 2; k++) { // the browser's time is not real: frames are few
-      await wait(7);
-      seen.add(frame());
-    }
-    found.played = seen.size;
+    found.played = await until(() => frame() > 0);
     await key(' ');
     found.paused = byId('play').getAttribute('aria-label');
     await set('time', '2', 'input');
@@ -55,17 +54,17 @@
     const unchecked = document.querySelector('#methods input:not(:checked)');
     found.added = unchecked.value;
     unchecked.click();
-    await wait(300);
+    await until(() => panes().length && panes()[3] !== found.panes[3]);
     found.withAdded = panes();
     const point = document.querySelector('#errors [role=button][aria-pressed=false]');
     found.pointed = point?.dataset.method;
     point?.dispatchEvent(new MouseEvent('click', { bubbles: true }));
-    await wait(300);
+    await until(() => document.activeElement.dataset.method === found.pointed);
     found.withPointed = [...document.querySelectorAll('#methods input:checked')].map((box) => box.value);
+    found.focused = document.activeElement.dataset.method;
     const before = picture();
     document.querySelector('[data-turn="180"]').click();
-    await wait(200);
-    found.turned = picture().some((x, k) => x !== before[k]);
+    found.turned = await until(() => picture().some((x, k) => x !== before[k]));
     found.colours = [...byId('colour').options].map((option) => option.value);
     await set('colour', 'curvature');
     found.scale = byId('scale-title').textContent;
@@ -79,6 +78,7 @@
     found.definition = byId('definition').textContent;
     await set('scene', byId('scene').options[byId('scene').options.length - 1].value);
     found.scene = byId('scene').value;
+    await until(() => panes().length === 4 && document.querySelectorAll('#curves path[stroke]').length === 4);
     found.panesThere = panes();
     found.curves = document.querySelectorAll('#curves path[stroke]').length;
     for (const name of byId('table').options) await set('table', name.value);

@@ -127,15 +127,17 @@ def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
     return found
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3, 40])
-def test_positions_are_off_by_half_a_step_at_most(frames):
+@pytest.mark.parametrize(
+    ("frames", "far", "least"), [(1, 30.0, 0.0), (3, 30.0, 0.0), (40, 30.0, 0.0), (9, 0.5, 1e-4)]
+)
+def test_positions_are_off_by_half_a_step_at_most(frames, far, least):
     random = np.random.default_rng(1)
-    positions = random.normal(size=(frames, 50, 3)).cumsum(axis=0)
-    positions[-1, 0], positions[0, 1] = 30.0, -30.0  # as far apart as can be, from one frame to the next
+    positions = 0.01 * far * random.normal(size=(frames, 50, 3)).cumsum(axis=0)
+    positions[-1, 0], positions[0, 1] = far, -far  # as far apart as can be, from one frame to the next
     pack = Pack()
     pack.positions("x", positions)
     step = pack.entries["x"]["step"]
-    assert step == pytest.approx(np.ptp(positions.reshape(-1, 3), axis=0).max() / 65535)
+    assert step == pytest.approx(max(2.0 * far / 65535, least))
     error = np.abs(unpacked(pack.entries, pack.text())["x"] - positions)
     assert error.max() <= 0.5 * step * (1.0 + 1e-9)
 
@@ -186,7 +188,7 @@ def test_the_page_holds_the_roll_outs_of_the_run(folder):
     found = arrays_of(folder, WHOLE, "snug")
     cloth, faces = moving(METHODS["snug"])
     assert np.array_equal(found["faces"], faces)
-    assert np.abs(found["positions"] - cloth).max() < 1e-5
+    assert np.abs(found["positions"] - cloth).max() <= 5e-5
     np.testing.assert_allclose(found["times"], np.arange(len(cloth)) / 30.0, rtol=1e-6)
     np.testing.assert_allclose(found["energy/total"], np.linspace(1.0, 2.0, len(cloth)), rtol=1e-6)
     np.testing.assert_allclose(found["distance"], 10.0, rtol=1e-2)
@@ -277,7 +279,7 @@ def test_names_with_markup_stay_text(folder):
 def test_what_did_not_run_stands_at_the_top(folder):
     page = folder.page_path.read_text(encoding="utf-8")
     head = page[: page.index("<main>")]
-    assert "Not every cell ran to its end: 1 failed, 1 timeout, 1 skipped." in head
+    assert "Not every cell ended well: 1 failed, 1 timeout, 1 skipped." in head
     assert "over 30 s" in head and "no body here" in head and 'class="trouble wrong"' in head
 
 
@@ -336,10 +338,11 @@ def test_a_person_can_use_it(folder, tmp_path):
     assert found["panes"] == ["Simulation", "Skinning alone", "SNUG", "PBNS"]
     assert found["shades"] > 8
     assert (found["first"], found["right"], found["home"]) == (2, 3, 0)
-    assert (found["playing"], found["paused"]) == ("Pause", "Play") and found["played"] == 2
+    assert (found["playing"], found["paused"]) == ("Pause", "Play") and found["played"]
     assert found["clock"] == "0.07 s · 3 of 5"
     assert found["added"] == "newton-4" and found["withAdded"][-1] == "Newton, 4 iterations"
     assert found["pointed"] == "pbns" and "pbns" in found["withPointed"] and len(found["withPointed"]) == 4
+    assert found["focused"] == "pbns"
     assert found["turned"] and found["scale"] == "Mean curvature [1/m]"
     assert found["colours"] == ["plain", "curvature", "area", "distance", "depth"]
     directions, columns = zip(found["up"], found["down"])

@@ -19,6 +19,7 @@ from reports.tables import merged
 from reports.work_precision import error_points
 
 NOT_SHOWN = "metrics"  # the file to plot from: everything that the other tables hold, line by line
+MEANING = {"stalled": "with frames left unconverged"}
 WRONG = ("failed", "timeout", "out-of-memory", "diverged")
 
 
@@ -117,11 +118,11 @@ def trouble_of(run: Run, tables: Mapping[str, Table]) -> tuple[str, bool, list[s
         cells.setdefault((row["suite"], row["scene"], row["method"], row["seed"]), str(row["status"]))
     counts = pd.Series(list(cells.values())).value_counts()
     order = [*(status for status in WRONG if status in counts), *(s for s in counts.index if s not in WRONG)]
-    text = ", ".join(f"{counts[status]} {status}" for status in order)
+    text = ", ".join(f"{counts[status]} {MEANING.get(status, status)}" for status in order)
     lines = []
     for line in merged(tables["unfinished"], ("suite", "scene")).rows:
         own = dict(zip(names, line))
         label = run.label(str(own["method"]))
         lines.append(f"{own['status']}: {label}, seed {own['seed']}, {own['scene']}: {own['reason']}")
     lines.sort(key=lambda said: order.index(said.partition(":")[0]))
-    return f"Not every cell ran to its end: {text}.", any(status in counts for status in WRONG), lines
+    return f"Not every cell ended well: {text}.", any(status in counts for status in WRONG), lines

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 STEPS = 2**16 - 1
+LEAST = 1e-4  # [m] of a step: nothing finer is seen, and noise does not deflate
 LEVELS = 255  # of values that are never negative
 HALF_LEVELS = 127  # on either side of 0, of those that may be
 
@@ -33,7 +34,7 @@ class Pack:
     def positions(self, name: str, positions: np.ndarray) -> None:
         """(T,V,3) [m], finite: low bytes, then high ones, of what linear motion does not foretell."""
         low = positions.reshape(-1, 3).min(axis=0)
-        step = max(float((positions - low).max()) / STEPS, 1e-9)
+        step = max(float((positions - low).max()) / STEPS, LEAST)
         steps = np.rint((positions - low) / step).astype(np.uint16)
         surprise = residuals(steps)
         planes = np.stack([surprise & 255, surprise >> 8]).astype(np.uint8)
@@ -76,4 +77,4 @@ def residuals(steps: np.ndarray) -> np.ndarray:
 
 def deflated(data: bytes) -> str:
     """zlib's format in base64."""
-    return base64.b64encode(zlib.compress(data, 9)).decode("ascii")
+    return base64.b64encode(zlib.compress(data, 6)).decode("ascii")

@@ -3,12 +3,13 @@
 const MOST = 4;
 const SEQUENTIAL = [[52, 84, 122], [62, 137, 140], [150, 176, 104], [228, 190, 88], [214, 110, 50], [160, 28, 38]];
 const DIVERGING = [[28, 82, 150], [120, 168, 204], [214, 212, 204], [226, 150, 96], [158, 34, 34]];
+const FROM_ZERO = [[112, 132, 156], [240, 208, 110], [222, 118, 52], [150, 22, 40]]; // most of it is 0
 const COLOURS = {
   plain: { title: 'None' },
   curvature: { title: 'Mean curvature', unit: '1/m', stops: SEQUENTIAL },
   area: { title: 'Change of area from rest', unit: '%', stops: DIVERGING },
   distance: { title: 'Distance to the simulation', unit: 'mm', stops: SEQUENTIAL },
-  depth: { title: 'Depth under the skin', unit: 'mm', stops: SEQUENTIAL, through: true }, // the skin would hide it
+  depth: { title: 'Depth under the skin', unit: 'mm', stops: FROM_ZERO, through: true }, // the skin would hide it
 };
 const BRIGHTEST = 0.98; // share of the values of all panes below the end of the scale
 const HOLD = 500; // at the end, before it starts again [ms]
@@ -74,6 +75,13 @@ function toggle(method) {
   if (shown && state.methods.length > 1) state.methods = state.methods.filter((name) => name !== method);
   else if (!shown) state.methods = [...state.methods.slice(0, MOST - 1), method];
   return load();
+}
+
+// The same from the plot, which is drawn anew: the point keeps the focus.
+async function togglePoint(method) {
+  await toggle(method);
+  const points = [...byId('errors').querySelectorAll('[data-method]')];
+  points.find((point) => point.dataset.method === method)?.focus();
 }
 
 // Read what is chosen and show it.
@@ -166,7 +174,7 @@ function makeErrors() {
     : '';
   const can = (method) => method in content.scenes[state.scene].methods;
   byId('errors').replaceChildren(
-    panel ? errorPlot(panel, plot, content.methods, state.methods, can, toggle) : 'Nothing was timed in this scene.',
+    panel ? errorPlot(panel, plot, content.methods, state.methods, can, togglePoint) : 'Nothing was timed in this scene.',
   );
 }
 
@@ -216,8 +224,9 @@ function seek(frame) {
 }
 
 function onKey(event) {
-  const own = event.target.closest('select, button, summary, input, [role=button], [role=region]');
-  if (own || event.ctrlKey || event.altKey || event.metaKey) return;
+  const pressed = event.target.closest('select, button, summary, input:not([type=range]), [role=button]');
+  const moved = event.target.closest('select, input[type=range], [role=region]');
+  if ((event.key === ' ' ? pressed : moved) || event.ctrlKey || event.altKey || event.metaKey) return;
   const steps = { ArrowLeft: -1, ArrowRight: 1, Home: -1e9, End: 1e9 };
   if (event.key === ' ') play(!state.playing);
   else if (event.key in steps) seek(state.frame + steps[event.key] * (event.shiftKey ? 10 : 1));
@@ -285,6 +294,7 @@ async function start() {
     view = new View(byId('canvas'), byId('panes'));
   } catch (error) {
     complain(error);
+    byId('views').hidden = byId('scale').hidden = true;
   }
   listen();
   options(byId('scene'), scenes.map((name) => [name, name]), scenes[0]);
