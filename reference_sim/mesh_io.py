@@ -122,7 +122,7 @@ def _read_with_meshio(path: Path) -> tuple[Any, list[Any]]:
         if path.suffix.lower() in (".vtk", ".vtp") and (surface := _read_with_vtk(path)):
             return surface
         message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
-        reason = " ".join(message.split()) or type(error).__name__
+        reason = " ".join(message.split())[:300] or type(error).__name__
         raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY") from None
     kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
     return mesh.points, [polygon for block in kinds for polygon in block.data]
