@@ -95,8 +95,8 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--body",
         metavar="FILE",
-        help="an own body, .npz in SMPL's layout, in place of the package's; garments are made for it "
-        "(extreme cases of single steps keep the package's)",
+        help="an own body of SMPL's family, .npz or .pkl, in place of the package's; garments are made for "
+        "it (extreme cases of single steps keep the package's)",
     )
     add("--garment", metavar="FILE",
         help="an own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; its scenes are "

@@ -40,6 +40,7 @@ TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", 
 SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
 ARM_BONES = ("left_shoulder", "left_elbow")
 LEG_BONES = ("left_hip", "left_knee")
+CROTCH_BONES = ("pelvis", "left_hip", "right_hip")
 
 
 def dominated_by(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
@@ -194,7 +195,9 @@ def legs_part(body: Body, room: float) -> float:
     levels = np.arange(joint(body, "left_knee")[1], joint(body, "left_hip")[1], 0.5 * SPACING)
     inner = _filled(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
     near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
-    return float(levels[near[0]] if len(near) else levels[-1])
+    middle = dominated_by(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, SPACING))
+    crotch = points[middle, 1].min(initial=levels[-1]) - room  # of legs that are apart all the way up
+    return float(min(levels[near[0]], crotch) if len(near) else crotch)
 
 
 def _edges(body: Body, bones: Sequence[str]) -> Index:

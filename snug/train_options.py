@@ -35,10 +35,10 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--recipe", choices=tuple(RECIPES), default="default", help="named options (default: %(default)s)")
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
     add("--garment", metavar="NAME|FILE", action="append", default=[],
-        help="tshirt, tunic or skirt, or a mesh made for the body; repeat for one model each (default: "
-        "tshirt)")  # fmt: skip
+        help="tshirt, tunic, skirt, tank_top, long_sleeves, trousers, shorts, dress, or a mesh made for the "
+        "body; repeat for one model each (default: tshirt)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
-    add("--body", metavar="FILE", help="an own body, .npz in SMPL's layout (default: that of the package)")
+    add("--body", metavar="FILE", help="an own body of SMPL's family, .npz or .pkl (default: the package's)")
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
     add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
     add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
