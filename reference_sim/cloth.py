@@ -66,7 +66,8 @@ class Cloth:
         self._check_elements()
 
     def _check_elements(self) -> None:
-        typical = float(np.median(self.areas))
+        with np.errstate(all="ignore"):  # what overflows is refused by name
+            typical = float(np.median(self.areas))
         if typical > 0 and not self.areas.max() < HUGE * typical:
             face = int(np.argmax(self.areas))
             raise MeshError(

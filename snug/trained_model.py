@@ -122,7 +122,7 @@ class TrainedModel:
         try:
             if data["format"] != FORMAT:
                 known = f"this version reads {FORMAT!r}: train again"
-                raise ModelFileError(f"{path}: format {data['format']!r}, {known}")
+                raise ModelFileError(f"{path}: format {str(data['format'])[:40]!r}, {known}")
             _check(tensors, data)
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(
