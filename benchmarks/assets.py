@@ -74,12 +74,13 @@ def open_assets(
     """
     from snug.body import Body
     from snug.garment_kinds import find_template
+    from snug.garment_reading import read_garment
 
     from .clips import clip
 
     wearer = Body.from_file(body) if body else Body.load()
     tailored = {
-        name: own.read(wearer)
+        name: read_garment(own, wearer)
         if own and name == own.name
         else find_template(name).tailor(wearer, vertices=preset.garment_vertices)
         for name in garments

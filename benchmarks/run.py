@@ -184,8 +184,9 @@ def choose_garment(options: argparse.Namespace) -> OwnGarment | None:
             "letters, digits and '_'"
         )
     from snug.body import Body
+    from snug.garment_reading import read_garment
 
-    file.read(Body.from_file(options.body) if options.body else Body.load())
+    read_garment(file, Body.from_file(options.body) if options.body else Body.load())
     return OwnGarment(file, tuple(map(digest_of_file, file.files)))
 
 

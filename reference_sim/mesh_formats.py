@@ -6,7 +6,7 @@ import contextlib
 import io
 import logging
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -94,7 +94,7 @@ def _read_with_meshio(path: Path) -> Parts:
         if path.suffix.lower() in (".vtk", ".vtp") and (parts := _read_with_vtk(path)):
             return parts
         message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
-        reason = " ".join(message.split()) or type(error).__name__
+        reason = " ".join(message.split())[:300] or type(error).__name__
         raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY") from None
     kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
     data = {name: np.asarray(values) for name, values in mesh.point_data.items()}
@@ -107,10 +107,18 @@ def _read_with_vtk(path: Path) -> Parts | None:
     import pyvista
 
     try:
-        with _silent_vtk(), pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
+        with (
+            warnings.catch_warnings(),
+            pyvista.vtk_verbosity("off"),
+            pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False),
+        ):
+            warnings.simplefilter("ignore")
+            logging.disable(logging.CRITICAL)  # to which readers of pyvista hand errors on
             surface = pyvista.read(path)
     except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
         return None
+    finally:
+        logging.disable(logging.NOTSET)
     if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
         return None
     if not surface.is_all_triangles:
@@ -119,20 +127,3 @@ def _read_with_vtk(path: Path) -> Parts | None:
     if surface.active_texture_coordinates is not None:
         data[UV_OF_VTK] = np.asarray(surface.active_texture_coordinates)
     return Parts(surface.points, list(surface.faces.reshape(-1, 4)[:, 1:]), vertex_data=data)
-
-
-@contextlib.contextmanager
-def _silent_vtk() -> Iterator[None]:
-    """VTK and pyvista print many lines about a damaged file, by two loggers and as warnings."""
-    from vtkmodules.vtkCommonCore import vtkLogger
-
-    told, disabled = vtkLogger.GetCurrentVerbosityCutoff(), logging.root.manager.disable
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    logging.disable(logging.CRITICAL)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logging.disable(disabled)
-        vtkLogger.SetStderrVerbosity(told)

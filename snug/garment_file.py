@@ -1,6 +1,6 @@
 """A garment from a file: a mesh that somebody made for the body, and how to take it.
 
-Light to import: what reading needs is loaded when a garment is read.
+Light to import; snug.garment_reading reads it.
 """
 
 from __future__ import annotations
@@ -9,11 +9,6 @@ import math
 from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from snug.body import Body
-    from snug.garments import Garment
 
 SUFFIXES = (".obj", ".ply", ".vtk", ".vtp", ".vtu", ".stl", ".off")
 OPTION = "--garment-"
@@ -51,12 +46,6 @@ class GarmentFile:
         """All that it is read from."""
         found = [self.path, *([self.weights] if self.weights.is_file() else [])]
         return (*found, self.material) if self.material else tuple(found)
-
-    def read(self, body: Body) -> Garment:
-        """The garment on the unposed body. Raises GarmentError: file, what is wrong, remedy."""
-        from snug.garment_reading import read_garment
-
-        return read_garment(self, body)
 
 
 def is_file_name(word: str) -> bool:

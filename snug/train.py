@@ -79,11 +79,12 @@ def _run(options: argparse.Namespace) -> int:
 def _of_file(path: str, options: argparse.Namespace) -> GarmentTemplate:
     """A garment that is read instead of tailored, whatever number of vertices is asked for."""
     from snug.garment_kinds import GarmentTemplate
+    from snug.garment_reading import read_garment
 
     file = garment_file(path, options)
 
     def tailor(body: Body, *, vertices: int) -> Garment:
-        return file.read(body)
+        return read_garment(file, body)
 
     return GarmentTemplate(file.name, f"garment of {path}", tailor)
 

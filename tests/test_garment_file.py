@@ -26,6 +26,7 @@ from snug.dressed_body import DressedBody
 from snug.garment_file import GarmentFile, add_garment_options, demand_a_file, garment_file
 from snug.garment_fit import file_pose
 from snug.garment_kinds import tailor_skirt, tailor_tshirt
+from snug.garment_reading import read_garment
 from snug.garments import GarmentError
 from snug.motion import Motion
 
@@ -62,7 +63,7 @@ def energies(garment):
 
 
 def test_the_tshirt_written_and_read_is_the_tshirt(tmp_path, body, shirt):
-    read = GarmentFile(path=saved(tmp_path, shirt)).read(body)
+    read = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
     np.testing.assert_array_equal(read.rest_positions, shirt.rest_positions)
     np.testing.assert_array_equal(read.faces, shirt.faces)
     assert read.loops.keys() == shirt.loops.keys() and read.name == "mine" and not len(read.pins)
@@ -77,10 +78,10 @@ def test_the_tshirt_written_and_read_is_the_tshirt(tmp_path, body, shirt):
 def test_a_chart_with_seams_is_its_rest_shape_and_gives_the_same_energies(tmp_path, body, shirt):
     uv = own_chart(shirt.rest_positions, shirt.faces)
     path = saved(tmp_path, shirt, uv=uv)
-    read = GarmentFile(path=path, rest="uv").read(body)
+    read = read_garment(GarmentFile(path=path, rest="uv"), body)
     np.testing.assert_array_equal(read.rest_uv, uv)
     assert energies(read) == pytest.approx(energies(shirt), rel=1e-12)
-    assert GarmentFile(path=path).read(body).rest_uv is None
+    assert read_garment(GarmentFile(path=path), body).rest_uv is None
 
 
 @pytest.mark.parametrize(("units", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254)])
@@ -88,14 +89,14 @@ def test_a_chart_with_seams_is_its_rest_shape_and_gives_the_same_energies(tmp_pa
 def test_units_and_axes_give_the_same_garment(tmp_path, body, tube, units, metres, up):
     positions = tube.rest_positions / metres
     path = saved(tmp_path, tube, positions=z_up(positions) if up == "z" else positions)
-    read = GarmentFile(path=path, units=units, up=up).read(body)
+    read = read_garment(GarmentFile(path=path, units=units, up=up), body)
     np.testing.assert_allclose(read.rest_positions, tube.rest_positions, rtol=0, atol=1e-12)
 
 
 def test_a_garment_that_is_inside_out_is_turned_with_its_chart(tmp_path, body, tube):
     turned = tube.faces[:, ::-1]
     uv = own_chart(tube.rest_positions, turned)
-    read = GarmentFile(path=saved(tmp_path, tube, faces=turned, uv=uv), rest="uv").read(body)
+    read = read_garment(GarmentFile(path=saved(tmp_path, tube, faces=turned, uv=uv), rest="uv"), body)
     np.testing.assert_array_equal(read.faces, tube.faces)
     assert energies(read) == pytest.approx(energies(tube), rel=1e-12)
 
@@ -107,7 +108,7 @@ def test_doubled_vertices_are_joined_and_weights_are_those_of_the_file(tmp_path,
     path = saved(tmp_path, tube, positions=twice, faces=split)
     np.savez(tmp_path / "mine.weights.npz", weights=weights)
     file = GarmentFile(path=path)
-    read = file.read(body)
+    read = read_garment(file, body)
     np.testing.assert_array_equal(read.faces, tube.faces)
     assert len(file.files) == 2 and read.authored_weights and len(front)
     dressed = DressedBody(body, read)
@@ -116,13 +117,13 @@ def test_doubled_vertices_are_joined_and_weights_are_those_of_the_file(tmp_path,
 
 
 def test_borrowed_weights_are_smoothed_as_a_recipe_says(tmp_path, body, tube):
-    dressed = DressedBody(body, GarmentFile(path=saved(tmp_path, tube)).read(body))
+    dressed = DressedBody(body, read_garment(GarmentFile(path=saved(tmp_path, tube)), body))
     assert not np.allclose(dressed.weights(0), dressed.weights(20), atol=1e-3)
 
 
 def test_a_garment_follows_the_limbs_that_it_encloses_and_no_other(tmp_path, body, shirt):
     names = np.array(body.joint_names)
-    own = GarmentFile(path=saved(tmp_path, shirt)).read(body)
+    own = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
     strongest = set(names[np.unique(own.skinning_weights.argmax(axis=1))])
     assert strongest <= {"pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip", "left_collar",
                          "right_collar", "left_shoulder", "right_shoulder"}  # fmt: skip
@@ -131,7 +132,7 @@ def test_a_garment_follows_the_limbs_that_it_encloses_and_no_other(tmp_path, bod
 
 def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
     skirt = tailor_skirt(body, vertices=300)
-    read = GarmentFile(path=saved(tmp_path, skirt)).read(body)
+    read = read_garment(GarmentFile(path=saved(tmp_path, skirt)), body)
     assert set(read.loops) == {"waist", "hem"}
     np.testing.assert_array_equal(read.pins, skirt.pins)
     middle = np.abs(read.rest_positions[read.hem, 0]) < 0.02
@@ -146,7 +147,7 @@ def test_a_garment_made_for_lowered_arms_is_brought_to_the_t_pose_with_its_rest_
     pose = file_pose(read_body)[None]
     hanging = Motion("file", np.repeat(pose, 2, axis=0), np.zeros((2, 3)), fps=30.0)
     made = DressedBody(read_body, shirt).skinned(hanging, smoothing=20)[0]
-    read = GarmentFile(path=saved(tmp_path, shirt, positions=made)).read(read_body)
+    read = read_garment(GarmentFile(path=saved(tmp_path, shirt, positions=made)), read_body)
     assert read.loops.keys() == shirt.loops.keys()
     # Skinned into the pose of the file it is what was made, and that is where it has no strain.
     back = DressedBody(read_body, read).skinned(hanging, smoothing=20)[0]
@@ -186,17 +187,17 @@ def file_scene(file):
 def test_another_unit_or_axis_is_found(tmp_path, body, shirt, spoil, words):
     path = saved(tmp_path, shirt, positions=spoil(shirt.rest_positions))
     with pytest.raises(GarmentError, match=rf"{path}: does not lie on the body .*: {words}$"):
-        GarmentFile(path=path).read(body)
+        read_garment(GarmentFile(path=path), body)
 
 
 @pytest.mark.parametrize("away", [(0.03, -0.1, 0.02), (0.0, -0.95, 0.0)])
 def test_the_shift_that_is_said_mends_a_displaced_garment(tmp_path, body, shirt, away):
     path = saved(tmp_path, shirt, positions=shirt.rest_positions + away)
     with pytest.raises(GarmentError, match=r"mm deep in the body|fits far better") as refused:
-        GarmentFile(path=path).read(body)
+        read_garment(GarmentFile(path=path), body)
     shift = tuple(map(float, str(refused.value).rpartition("--garment-shift=")[2].split(",")))
     np.testing.assert_allclose(np.add(shift, away), 0.0, atol=0.02)
-    GarmentFile(path=path, shift=shift).read(body)
+    read_garment(GarmentFile(path=path, shift=shift), body)
 
 
 def closed(tube):
@@ -217,7 +218,7 @@ def closed(tube):
 def test_a_mesh_that_cannot_be_simulated_is_named(tmp_path, body, tube, spoil, words):
     path = saved(tmp_path, tube, faces=spoil(tube))
     with pytest.raises(GarmentError, match=words):
-        GarmentFile(path=path).read(body)
+        read_garment(GarmentFile(path=path), body)
 
 
 @pytest.mark.parametrize(
@@ -232,7 +233,7 @@ def test_wrong_weights_are_refused(tmp_path, body, tube, weights, words):
     path = saved(tmp_path, tube)
     np.savez(tmp_path / "mine.weights.npz", weights=weights)
     with pytest.raises(GarmentError, match=words):
-        GarmentFile(path=path).read(body)
+        read_garment(GarmentFile(path=path), body)
 
 
 @pytest.mark.parametrize(
