@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from .method import MethodEntry
 
 MODULE = "benchmarks.methods.stored_roll_out"
 PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
@@ -58,32 +56,6 @@ class RollOutOption:
 
     def path_for(self, scene: str) -> str:
         return self.path.replace(PLACE, scene.replace("/", "-"))
-
-    def entry(self, scene: str) -> MethodEntry | None:
-        """The method of that scene, None where it has no file. Raises RollOutError for one that cannot be
-        read.
-        """
-        from .roll_out_files import read_roll_out
-
-        path = self.path_for(scene)
-        if self.places and not Path(path).exists() and not glob.glob(path):
-            return None
-        stored = read_roll_out(path)
-        declared = self.declared_ms is not None
-        return MethodEntry(
-            name=self.name,
-            label=self.name,
-            description=f"roll-out of {Path(path).name}" + ", time as its author says" * declared,
-            module=MODULE,
-            options={"path": path, "digest": digest_of(path), **asdict(self.stated)},
-            dtype=stored.dtype,
-            gives_first_frame=True,
-            conserving=True,
-            timed=False,
-            declared_ms=self.declared_ms,
-            static_known=False,
-            role=self.role,
-        )
 
 
 def parse(text: str) -> RollOutOption:

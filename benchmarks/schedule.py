@@ -17,6 +17,7 @@ from snug.recipes import TRAININGS
 
 from . import provenance
 from .cache import dependencies
+from .method import MethodEntry
 from .methods import find_method
 from .metric import COMPARED_WITH
 from .metrics import names_of
@@ -298,7 +299,7 @@ def _declared(entry: Any) -> dict[str, Any]:
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
     said = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
-    if "files" in said:
+    if isinstance(entry, MethodEntry):
         said["files"] = {path: digest_of_file(Path(path)) for path in said["files"]}
     return said
 

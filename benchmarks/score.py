@@ -129,7 +129,10 @@ def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
         return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
     if options.reference is None:
         return cell
-    entry = RollOutOption("reference", options.reference, Stated(), role="reference").entry(cell.scene.name)
+    from .methods.stored_roll_out import entry_of
+
+    stored = RollOutOption("reference", options.reference, Stated(), role="reference")
+    entry = entry_of(stored, cell.scene.name)
     assert entry is not None
     return replace(cell, entry=replace(entry, label="Reference, from a file"))
 

@@ -108,6 +108,10 @@ def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> l
     """The stored roll-outs in the scenes of these cells, and in their suites. Raises PlanError, and
     RollOutError for a file that cannot be read.
     """
+    if not roll_outs:
+        return []
+    from .methods.stored_roll_out import entry_of
+
     scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
     suites = {name: tuple(dict.fromkeys(s for c in cells if c.scene.name == name for s in c.suites))
               for name in scenes}  # fmt: skip
@@ -122,7 +126,7 @@ def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> l
                 f"--rollout {option.name}={option.path}: is of one scene, and {len(scenes)} are asked for: "
                 "name it with --scenes, or put {scene} into the path"
             )
-        own = [(scene, entry) for scene in scenes.values() if (entry := option.entry(scene.name))]
+        own = [(scene, entry) for scene in scenes.values() if (entry := entry_of(option, scene.name))]
         if not own:
             raise PlanError(f"--rollout {option.name}={option.path}: no file for {', '.join(scenes)}")
         found += [Cell(scene, entry, 0, suites[scene.name]) for scene, entry in own]

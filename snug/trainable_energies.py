@@ -17,7 +17,7 @@ from reference_sim.energies import Energy
 def find_energy(name: str) -> Callable[..., Energy]:
     """What makes the energy of that name from a Cloth, its options at their defaults.
 
-    Raises ValueError for an unknown name, and for what cannot be trained.
+    Raises ValueError for an unknown name, for one that two have, and for what cannot be trained.
     That is what is made of more than a cloth, what must be prepared for each step of a simulation (see
     Energy.prepare), and what finds its stencils anew as vertices move (Energy.dynamic).
     """
@@ -30,9 +30,12 @@ def find_energy(name: str) -> Callable[..., Energy]:
         raise ValueError(
             f"unknown energy {name!r}: use one of {', '.join(known)}, or import the file of your own"
         )
-    for term in named:
-        if not _reason_against(term):
-            return term
+    fit = {(term.__module__, term.__qualname__): term for term in named if not _reason_against(term)}
+    if len(fit) > 1:
+        places = " and ".join(module for module, _ in fit)
+        raise ValueError(f"energy {name!r} is defined in {places}: give yours a name of its own")
+    if fit:
+        return next(iter(fit.values()))
     raise ValueError(f"energy {name!r} cannot be trained: {_reason_against(named[0])}")
 
 

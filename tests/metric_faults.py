@@ -37,7 +37,7 @@ METRIC_FAULTS = {
         Fault("terms copied one by one", STEP,
               "vars(twin).update({name: twins[id(v)] for name, v in vars(twin).items() if id(v) in twins})",
               "pass"),
-        Fault("the step before not prepared", STEP, "if frame > 1:", "if frame < 0:"),
+        Fault("the step before not prepared", STEP, "if frame > 1 and", "if frame < 0 and"),
     ),
     "test_metrics": (
         Fault("curvature areas of the wrong surface", CURVATURE, "reference.curvature), reference.area",

@@ -12,7 +12,7 @@ from tasks_by_hand import small_scene
 
 from benchmarks.mesh_match import same_topology
 from benchmarks.methods import find_method
-from benchmarks.methods.stored_roll_out import Stored
+from benchmarks.methods.stored_roll_out import Stored, entry_of
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.roll_out_files import read_roll_out
 from benchmarks.roll_out_option import RollOutError, RollOutOption, Stated, parse
@@ -67,7 +67,7 @@ def write(kind: str, folder: Path, positions: np.ndarray = X, faces: np.ndarray 
 def rows(path: str, **stated) -> dict:
     """Every number that is measured of the file, in suite speed."""
     option = RollOutOption("mine", path, Stated(**stated))
-    entry = option.entry(SCENE.name)
+    entry = entry_of(option, SCENE.name)
     method = entry.make(models=Path(), seed=0)
     method.prepare(SCENE)
     return rows_of(method.run(), entry)
@@ -270,7 +270,7 @@ def test_an_option_says_everything_of_a_roll_out():
     option = parse("mine=out/{scene}.pc2,units=cm,up=z,fps=60,match-vertices,ms=2.2")
     assert option == RollOutOption("mine", "out/{scene}.pc2", Stated("cm", "z", 60.0, True), 2.2)
     assert option.path_for("tshirt/kick") == "out/tshirt-kick.pc2"
-    assert option.entry("tshirt/kick") is None  # there is no file for that scene
+    assert entry_of(option, "tshirt/kick") is None  # there is no file for that scene
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from misbehaving import interrupt_at
 
-from benchmarks import methods, run
+from benchmarks import methods, run, selection
 from benchmarks.methods import METHODS
 from benchmarks.plan import Motions, PlanError
 from benchmarks.presets import PRESETS
@@ -158,6 +158,7 @@ def misbehaving(monkeypatch):
     wrong = {"module": "misbehaving", "options": {"how": "raise"}}
     entries = tuple(dataclasses.replace(m, **wrong) if m.name == "newton-1" else m for m in METHODS)
     monkeypatch.setattr(methods, "METHODS", entries)
+    monkeypatch.setattr(selection, "METHODS", entries)
 
 
 def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, capsys):

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import glob
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from reference_sim import Trajectory
 
-from ..method import Method
+from ..method import Method, MethodEntry
 from ..roll_out_files import StoredRollOut, read_roll_out
 from ..roll_out_fit import fitted
-from ..roll_out_option import RollOutError, Stated
+from ..roll_out_option import MODULE, RollOutError, RollOutOption, Stated, digest_of
 from ..scene import BuiltScene
 
 
@@ -58,3 +59,26 @@ class Stored(Method):
 def make(*, models: Path, seed: int, path: str, digest: str, **stated: object) -> Stored:
     """The roll-out of that file; digest is of its content, for the cache. It has no seed and no model."""
     return Stored(path, Stated(**stated))  # type: ignore[arg-type]
+
+
+def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
+    """The method of that scene; None where it has no file. Raises RollOutError for one that is not read."""
+    path = option.path_for(scene)
+    if option.places and not Path(path).exists() and not glob.glob(path):
+        return None
+    stored = read_roll_out(path)
+    declared = option.declared_ms is not None
+    return MethodEntry(
+        name=option.name,
+        label=option.name,
+        description=f"roll-out of {Path(path).name}" + ", time as its author says" * declared,
+        module=MODULE,
+        options={"path": path, "digest": digest_of(path), **asdict(option.stated)},
+        dtype=stored.dtype,
+        gives_first_frame=True,
+        conserving=True,
+        timed=False,
+        declared_ms=option.declared_ms,
+        static_known=False,
+        role=option.role,
+    )
