@@ -133,7 +133,9 @@ class TrainedModel:
         except ModelFileError:
             raise
         except (KeyError, ValueError, RuntimeError, TypeError) as error:
-            raise ModelFileError(f"{path}: broken model file ({error})") from error
+            raise ModelFileError(
+                f"{path}: broken model file ({' '.join(str(error).split())[:200]})"
+            ) from error
         return cls(data["kind"], network.eval(), recipe, **rest)
 
 

@@ -11,6 +11,7 @@ import faulthandler
 import io
 import json
 import os
+import pickle
 import random
 import re
 import resource
@@ -24,14 +25,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from cmu_clips import amc_frame, cmu_like
+from motion_forms import bvh
 from report_folder import all_rows, declaration
 
 from benchmarks.json_file import ResultsError
 from benchmarks.results import RunFolder
+from benchmarks.roll_out_files import read_roll_out
+from benchmarks.roll_out_option import RollOutError
 from reference_sim import Trajectory, TrajectoryError
 from reference_sim.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.mesh_io import read_mesh
+from reference_sim.point_cache import read_point_cache, write_point_cache
 from reference_sim.resume import recover
 from snug.body import Body
 from snug.motion import MotionError
@@ -101,6 +106,32 @@ def amass_arrays() -> dict[str, np.ndarray]:
     poses = np.random.default_rng(0).normal(0.0, 0.1, (6, 72))
     poses[:, :3] = [np.pi / 2, 0.0, 0.0]
     return {"poses": poses, "trans": np.tile([0.0, 0.0, 0.9], (6, 1)), "mocap_framerate": np.array(60.0)}
+
+
+def roll_out() -> dict[str, np.ndarray]:
+    return {"positions": np.stack([CORNERS, CORNERS + 0.1]), "faces": FACES, "fps": np.array(30.0)}
+
+
+def hood_arrays() -> dict[str, np.ndarray]:
+    body = {"obstacle": roll_out()["positions"], "obstacle_faces": FACES}
+    return {"pred": roll_out()["positions"], "cloth_faces": FACES} | body
+
+
+def pickled(arrays: Callable[[], dict[str, np.ndarray]]) -> Callable[[], bytes]:
+    return lambda: pickle.dumps(arrays())
+
+
+def bvh_text() -> bytes:
+    clip = amass_arrays()
+    poses = clip["poses"].reshape(-1, 24, 3)
+    poses[:, 0] = 0.0  # y up
+    return bvh(poses, clip["trans"], 60.0).encode()
+
+
+def point_cache() -> bytes:
+    positions = roll_out()["positions"]
+    made = Trajectory(positions, FACES, np.array([0.0, 0.1]), np.zeros(2), "ok")
+    return write_point_cache("made.pc2", made)[0].read_bytes()
 
 
 def trajectory() -> bytes:
@@ -239,6 +270,12 @@ READERS: tuple[Reader, ...] = (
     Reader("arrays", ".npz", arrays(a=CORNERS, b=FACES), read_arrays, (ArrayFileError,), bytes_of),
     Reader("body", ".npz", arrays(**smpl_arrays()), Body.from_file, (BodyError,), bytes_of),
     Reader("AMASS", ".npz", arrays(**amass_arrays()), read_clip, (MotionError,), bytes_of),
+    Reader("body pickle", ".pkl", pickled(smpl_arrays), Body.from_file, (BodyError,), bytes_of),
+    Reader("motion pickle", ".pkl", pickled(amass_arrays), read_clip, (MotionError,), bytes_of),
+    Reader("BVH", ".bvh", lambda: bvh_text(), read_clip, (MotionError,), bytes_of),
+    Reader("roll-out", ".npz", arrays(**roll_out()), read_roll_out, (RollOutError,), bytes_of),
+    Reader("roll-out pickle", ".pkl", pickled(hood_arrays), read_roll_out, (RollOutError,), bytes_of),
+    Reader("PC2", ".pc2", lambda: point_cache(), read_point_cache, (TrajectoryError,), bytes_of),
     Reader("amc", ".amc", lambda: clip_text(), read_amc, (MotionError,), bytes_of),
     Reader("asf", ".asf", lambda: cmu_like().encode(), read_asf, (MotionError,), bytes_of),
     Reader("OBJ", ".obj", mesh(".obj"), read_cloth, MESH, bytes_of),
