@@ -7,7 +7,7 @@ from typing import Any
 
 from .performance.microbenchmark import SUITE
 from .results import Row
-from .rows import NOT_FALLING, SPREAD
+from .rows import DECLARED, NOT_FALLING, SPREAD
 
 COLUMNS = (
     ("energy/total", "total J"),
@@ -51,6 +51,9 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
     wide = [f"{cell} ({percent:.0f} %)" for cell, percent in spreads.items() if percent > 100.0 * SPREAD]
     if wide:
         lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {', '.join(wide)}")
+    declared = dict.fromkeys(row.method for row in rows if row.reason == DECLARED)
+    if declared:
+        lines.append(f"run time {DECLARED}: {', '.join(declared)}")
     rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(NOT_FALLING)]
     if rising:
         lines.append(f"more iterations or a smaller tolerance, and a larger gap: {', '.join(rising)}")

@@ -16,6 +16,7 @@ from .console import remarks, summary
 from .executor import LocalExecutor
 from .plan import Plan, runs
 from .results import Row, RunFolder, digest_of_file, with_provenance
+from .roll_out_option import MODULE
 from .rows import described, rows_of
 from .runner import Runner
 from .schedule import tasks_of
@@ -62,6 +63,32 @@ def execute(plan: Plan) -> int:
     if made:
         print(log.folder.report_path.resolve(), flush=True)
     return 0 if made and not (failed or broken) else 1
+
+
+def assets_of(plan: Plan) -> Assets:
+    """Body, garments and motions of the plan's scenes. Raises ValueError where one cannot be made."""
+    from .assets import embedded_motions, open_assets
+
+    names = [name for garment in plan.garments for name in plan.motions_of(garment)]
+    names += [name for network in plan.networks for name in plan.motions.train_of(network.garment)]
+    names, files = list(dict.fromkeys(names)), plan.motions.files
+    motions = [files[name] for name in names if name in files]
+    motions += embedded_motions(name for name in names if name not in files)
+    own = plan.garment.file if plan.garment else None
+    return open_assets(plan.preset, motions, plan.garments, body=plan.body_file, own=own)
+
+
+def check_roll_outs(plan: Plan) -> None:
+    """Compare every stored roll-out with its scene before anything is written. Raises RollOutError."""
+    stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
+    if not stored:
+        return
+    try:
+        assets = assets_of(plan) if plan.garments else None
+    except ValueError:
+        return  # the run says so itself, of all dressed scenes
+    for cell in stored:
+        cell.entry.make(models=plan.folder, seed=0).prepare(cell.scene.build(assets))
 
 
 def accepted(row: Row) -> bool:
@@ -137,18 +164,8 @@ class RunLog:
 
     def open_assets(self) -> Assets:
         """Body, garments and motions of the dressed scenes. Raises ValueError where one cannot be made."""
-        plan = self.plan
-        from .assets import embedded_motions, open_assets
-
-        names = [name for garment in plan.garments for name in plan.motions_of(garment)]
-        names += [name for network in plan.networks for name in plan.motions.train_of(network.garment)]
-        names = list(dict.fromkeys(names))
-        files = plan.motions.files
         with self.stage("body, garments and motions"):
-            motions = [files[name] for name in names if name in files]
-            motions += embedded_motions(name for name in names if name not in files)
-            own = plan.garment.file if plan.garment else None
-            assets = open_assets(plan.preset, motions, plan.garments, body=plan.body_file, own=own)
+            assets = assets_of(self.plan)
         self.config["garments"] = {
             garment.name: {
                 "vertices": len(garment.rest_positions),
@@ -158,8 +175,9 @@ class RunLog:
             }
             for garment in assets.garments.values()
         }
-        self.config["motions"]["frames"] = {name: assets.motions[name].frames for name in names}
-        self.note("motion_sources", {name: assets.motions[name].source for name in names})
+        motions = assets.motions
+        self.config["motions"]["frames"] = {name: motion.frames for name, motion in motions.items()}
+        self.note("motion_sources", {name: motion.source for name, motion in motions.items()})
         return assets
 
     def note_outcomes(self, runner: Runner) -> None:
@@ -191,7 +209,7 @@ class RunLog:
         self.folder.write_config(self.config)
 
     def make_report(self) -> bool:
-        """tables/, figures/ and report.pdf from the files; a failure is said and leaves the results."""
+        """tables/, figures/, report.html and report.pdf; a failure is said and leaves the results."""
         self.note("finished", now())
         try:
             with self.stage("report"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from . import outside
 from .method import MethodEntry
 from .methods import METHODS
 from .performance.microbenchmark import SUITE
@@ -45,6 +46,11 @@ def listing() -> str:
         ("presets", ((p.name, p.description) for p in PRESETS)),
         *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
         (f"microbenchmarks of suite {SUITE}", {b.name: b.description for b in MICROBENCHMARKS}.items()),
+        *(
+            (f"{kind.word} of installed packages", rows)
+            for kind in outside.KINDS
+            if (rows := outside.described(kind))
+        ),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
 

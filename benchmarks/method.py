@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .registry import DeclarationError
+from .registry import DeclarationError, load
 from .results import ROLES
 
 if TYPE_CHECKING:
     import numpy as np
 
     from reference_sim import Trajectory
+    from snug.recipes import Training
 
     from .scene import BuiltScene, Dressed, Scene
 
@@ -74,25 +74,34 @@ def posed_body(dressed: Dressed) -> Callable[[int], tuple[np.ndarray, np.ndarray
 class MethodEntry:
     """The declaration of a method: cheap to list. Its module is imported when a cell needs it.
 
-    label: its name for people. module: has make(*, models, seed, **options), which gives a Method.
-    needs_body: whether it works on dressed scenes alone. trained: the kind of network it needs, if any.
+    label: its name for people. module: has make(*, models, seed, **options), which gives a Method; where it
+    is left out, that is the file that declares the entry. declared_in: that file, or module of an installed
+    package; empty for those of the project, and filled in where it is read. files: what it reads besides,
+    beside that file, so that a run knows when one has changed.
+    needs_body: whether it works on dressed scenes alone. trained: the name of the network it needs, if any;
+    training: how that is trained, where snug.recipes.TRAININGS does not have it.
     seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
     dtype: the numbers it computes with; trajectories and metrics are float64 in any case.
     needs_no_obstacle: whether it knows no contact. package: what it needs installed besides this project.
     truncated: whether it stops before the minimum on purpose, so that running out of iterations is its end.
     batched: whether it computes many bodies at once. gives_first_frame: whether it computes frame 0 too; a
     simulator is given it. conserving: whether conservation laws are asked of it. timed: whether its costs are
-    asked for where those of the scene are. role, family, level, base, pairing_group: see
-    benchmarks.results.Row.
+    asked for where those of the scene are. declared_ms: [ms] a frame, as its author says, where no clock of
+    ours can measure it; what a trajectory says as provenance counts as well. static_known: whether its answer
+    to poses held still is what quasi_static() says. left_out: why it is not run, where somebody wants it so.
+    role, family, level, base, pairing_group: see benchmarks.results.Row.
     """
 
     name: str
     description: str
-    module: str
+    module: str = ""
     label: str = ""
+    declared_in: str = ""
+    files: tuple[str, ...] = ()
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     needs_body: bool = False
     trained: str | None = None
+    training: Training | None = None
     seeded: bool = False
     dtype: str = "float64"
     truncated: bool = False
@@ -102,6 +111,9 @@ class MethodEntry:
     gives_first_frame: bool = False
     conserving: bool = False
     timed: bool = True
+    declared_ms: float | None = None
+    static_known: bool = True
+    left_out: str = ""
     role: str = "baseline"
     family: str = ""
     level: float | None = None
@@ -121,6 +133,8 @@ class MethodEntry:
 
     def skip(self, scene: Scene) -> str | None:
         """Why this method cannot do that scene, or None."""
+        if self.left_out:
+            return self.left_out
         if self.needs_body and not scene.dressed:
             return f"{self.name} moves a garment with a body's joints; this scene has no body"
         if self.needs_no_obstacle and (scene.dressed or scene.obstacle):
@@ -131,8 +145,9 @@ class MethodEntry:
 
     def make(self, *, models: Path, seed: int) -> Method:
         """A fresh method for one cell; `models` is the folder of trained networks."""
-        module = importlib.import_module(self.module)
-        return module.make(models=models, seed=seed, **self.options)
+        if self.declared_in:
+            load(self.declared_in)  # an energy of its own is then known by name
+        return load(self.module).make(models=models, seed=seed, **self.options)
 
 
 def installed(package: str) -> bool:

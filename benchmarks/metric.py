@@ -18,8 +18,8 @@ and where a roll-out that ended well by itself may still have failed
 
     judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None     status and reason
 
-Its name in the tuple of benchmarks/metrics/__init__.py is all that it takes to have it measured, written,
-tabulated and defined in the report.
+Its name in the tuple of benchmarks/metrics/__init__.py, or that of its file behind --metrics, is all that it
+takes to have it measured, written, tabulated and defined in the report.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ class Metric:
     """The declaration of a metric.
 
     title: the head of its column; table: the table that has this column, or empty. reference_tolerance: how
-    far from zero the value of the reference simulation may be; its row is then judged.
+    far from zero the value of the reference simulation may be; its row is then judged. declared_in: as of a
+    MethodEntry.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Metric:
     table: str = ""
     lower_is_better: bool | None = None
     reference_tolerance: float | None = None
+    declared_in: str = ""
 
 
 class Kept:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snug.recipes import learns_from_simulation
+from snug.recipes import TRAININGS, Training
 
 from .presets import Preset
 from .scene import Scene
@@ -27,15 +27,30 @@ class PlanError(ValueError):
 
 @dataclass(frozen=True)
 class Network:
-    """A network that some cell needs: its name in snug.recipes.TRAININGS, its seed, the garment it is for."""
+    """A network that some cell needs: its name, its seed, the garment it is for.
+
+    own: how it is trained, where snug.recipes.TRAININGS does not have it; declared_in: where that is said.
+    """
 
     name: str
     seed: int
     garment: str
+    own: Training | None = None
+    declared_in: str = ""
 
     @property
     def label(self) -> str:
         return f"{self.name} seed {self.seed} ({self.garment})"
+
+    @property
+    def training(self) -> Training | None:
+        """How it is trained; None: not at all."""
+        return self.own or TRAININGS.get(self.name)
+
+    @property
+    def learns_from_simulation(self) -> bool:
+        """Whether it needs simulated motions to be trained."""
+        return self.training is not None and self.training.simulated
 
 
 @dataclass(frozen=True)
@@ -103,6 +118,7 @@ class Plan:
 
     body, garment: own ones; None: the package's. only: states of what the folder holds in which a task is
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
+    metrics: modules of metrics that are not the project's, see benchmarks.outside.
     """
 
     preset: Preset
@@ -110,6 +126,7 @@ class Plan:
     cells: tuple[Cell, ...]
     cases: tuple[Case, ...]
     microbenchmarks: tuple[Microbenchmark, ...] = ()
+    metrics: tuple[str, ...] = ()
     motions: Motions = Motions()
     body: OwnBody | None = None
     garment: OwnGarment | None = None
@@ -144,7 +161,7 @@ class Plan:
     @property
     def simulated(self) -> tuple[str, ...]:
         """Garments whose training motions have to be simulated."""
-        learning = (network for network in self.networks if learns_from_simulation(network.name))
+        learning = (network for network in self.networks if network.learns_from_simulation)
         return tuple(dict.fromkeys(network.garment for network in learning))
 
     @property
@@ -160,5 +177,8 @@ def runs(cell: Cell) -> bool:
 
 def network_of(cell: Cell) -> Network | None:
     """The network that a cell needs, where it is computed at all."""
-    trained = cell.entry.trained
-    return Network(trained, cell.seed, cell.scene.garment) if trained and runs(cell) else None
+    entry = cell.entry
+    if not entry.trained or not runs(cell):
+        return None
+    home = entry.declared_in if entry.training else ""
+    return Network(entry.trained, cell.seed, cell.scene.garment, entry.training, home)

@@ -1,8 +1,15 @@
-"""What the visible tuples of scenes, methods and metrics have in common: each name stands once."""
+"""What the visible tuples of scenes, methods and metrics have in common: each name stands once, and names a
+module that is loaded when it is needed.
+"""
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import sys
 from collections.abc import Iterable
+from pathlib import Path
+from types import ModuleType
 from typing import Protocol, TypeVar
 
 
@@ -26,6 +33,37 @@ def by_name(what: str, entries: Iterable[Entry]) -> dict[str, Entry]:
     found: dict[str, Entry] = {}
     for entry in entries:
         if entry.name in found:
-            raise DeclarationError(f"{what} '{entry.name}' is declared twice: give each a name of its own")
+            homes = (
+                getattr(e, "declared_in", "") or "the project itself" for e in (found[entry.name], entry)
+            )
+            raise DeclarationError(
+                f"{what} '{entry.name}' is declared twice, by {' and by '.join(homes)}: "
+                "give each a name of its own"
+            )
         found[entry.name] = entry
     return found
+
+
+def load(module: str) -> ModuleType:
+    """The module of that dotted name, or of that file: an absolute path that ends with ".py".
+
+    A file is imported by its stem. Its folder is put behind all others from which modules are imported, so
+    that it finds what lies beside it, and nothing of ours is hidden. Raises DeclarationError where its stem
+    means another module, and whatever its import raises.
+    """
+    if not module.endswith(".py"):
+        return importlib.import_module(module)
+    path = Path(module)
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    importlib.invalidate_caches()  # it may have been written a moment ago
+    demand_that_it_is(path.stem, path)
+    return importlib.import_module(path.stem)
+
+
+def demand_that_it_is(name: str, path: Path) -> None:
+    """Raises DeclarationError unless the module of that name is imported from that file."""
+    spec = importlib.util.find_spec(name) if name.replace(".", "_").isidentifier() else None
+    if spec is None or spec.origin is None or not path.samefile(spec.origin):
+        known = f"Python knows {name} as {spec.origin or 'another'}" if spec else "no module has such a name"
+        raise DeclarationError(f"{path}: {known}: give the file another name")

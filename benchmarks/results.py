@@ -188,6 +188,10 @@ class RunFolder:
         return self.path / "report.pdf"
 
     @property
+    def page_path(self) -> Path:
+        return self.path / "report.html"
+
+    @property
     def tables(self) -> Path:
         return self.path / "tables"
 
@@ -231,6 +235,10 @@ class RunFolder:
     def start_path(self, scene: str) -> Path:
         """The settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")
+
+    def rest_areas_path(self, scene: str) -> Path:
+        """Areas (F,) [m^2] at rest of the faces of a dressed scene's garment."""
+        return self.trajectory_path(scene, "rest_areas").with_suffix(".npy")
 
     def body_path(self, scene: str) -> Path:
         """The posed body (T,B,3) [m] of a dressed scene: a process that simulates then needs no torch."""

@@ -8,9 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from snug.recipes import learns_from_simulation
-
 from .methods import find_method
+from .metric import Metric
 from .metrics import declared, find_metric
 from .plan import Plan, network_of
 from .results import REFERENCE_TOLERANCE, Row, as_right
@@ -21,6 +20,7 @@ from .tasks.task import Outcome, Task, TaskId
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
 GAP = "gap/energy"
+DECLARED = "declared by its author, not measured"
 NOT_FALLING = "the error does not fall here"  # how the reason of a gap above that of a coarser method begins
 ROUND_OFF = 1e-6  # [J] a gap below it counts as none: who is called lower there is chance
 
@@ -59,16 +59,24 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
                 costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
                 metrics |= {**costs, **model_costs(cell, schedule, outcomes)}
                 reason = reason or remark
+            elif (declared_ms := cell.entry.declared_ms or outcome.result.get("declared_ms")) is not None:
+                metrics["cost/frame"] = declared_ms
             reason = reason or not_learned(cell, schedule, outcomes)
     batch = outcomes.get(("batch", cell.name), Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
     for suite in cell.suites:
-        yield from _rows(cell, suite, outcome, status, reason, metrics)
+        yield from _rows(cell, suite, outcome, status, reason, metrics, schedule.plan.metrics)
 
 
 def _rows(
-    cell: Cell, suite: str, outcome: Outcome, status: str, reason: str, metrics: Mapping[str, Any]
+    cell: Cell,
+    suite: str,
+    outcome: Outcome,
+    status: str,
+    reason: str,
+    metrics: Mapping[str, Any],
+    outside: tuple[str, ...],
 ) -> Iterator[Row]:
     scene, entry = cell.scene, cell.entry
     base = Row(
@@ -82,7 +90,9 @@ def _rows(
         yield base
     for name, found in metrics.items():
         value, uncertainty = found if isinstance(found, (tuple, list)) else (found, None)
-        metric, why, ended = find_metric(name), reason, status
+        metric, why, ended = find_metric(name, outside), reason, status
+        if name == "cost/frame" and not entry.timed:
+            why = DECLARED
         if name == "cost/spread" and value > 100.0 * SPREAD:
             why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
         judged: dict[str, Any] = {}
@@ -142,7 +152,7 @@ def model_costs(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str,
         return {}
     names = {"cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes"}
     costs = {metric: trained.result[name] for metric, name in names.items()}
-    if not learns_from_simulation(network.name):
+    if not network.learns_from_simulation:
         return {"cost/data": 0.0} | costs
     motions = plan.motions.train_of(network.garment)
     data = [outcomes.get(schedule.data(motion, network.garment).id, Outcome()) for motion in motions]
@@ -245,15 +255,23 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
     methods = {cell.method: cell.entry for cell in plan.cells}
     methods |= {benchmark.method: find_method(benchmark.method) for benchmark in plan.microbenchmarks}
-    measured = dict.fromkeys(row.metric for row in rows if row.method in methods and _is_declared(row.metric))
-    order = {name: place for place, name in enumerate(declared())}
-    ordered = sorted(measured, key=lambda name: order.get(name, len(order)))
-    metrics = {name: _fields(find_metric(name), "name", "reference_tolerance") for name in ordered}
-    scenes = {
-        scene.name: _fields(scene, "name", "module", "sizes", "options", "metrics") for scene in plan.scenes
+    found = {
+        name: _metric(name, plan) for name in dict.fromkeys(r.metric for r in rows if r.method in methods)
     }
+    order = {name: place for place, name in enumerate(declared(plan.metrics))}
+    ordered = sorted(found, key=lambda name: order.get(name, len(order)))
+    metrics = {
+        name: _fields(metric, "name", "reference_tolerance", "declared_in")
+        for name in ordered
+        if (metric := found[name]) is not None
+    }
+    without = ("name", "module", "declared_in", "files", "sizes", "options", "metrics")
+    scenes = {scene.name: _fields(scene, *without) for scene in plan.scenes}
     words = ("label", "description", "role", "family", "level", "base", "seeded", "dtype")
     said = {name: {word: getattr(entry, word) for word in words} for name, entry in methods.items()}
+    for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:
+        if name in methods and not methods[name].timed:
+            said[name]["label"] = f"{methods[name].label or name} (declared time)"
     cases = {
         case.name: {
             "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
@@ -264,12 +282,12 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     return {"metrics": metrics, "methods": said, "scenes": scenes, "cases": cases}
 
 
-def _is_declared(metric: str) -> bool:
-    """Cases describe their rows themselves."""
+def _metric(name: str, plan: Plan) -> Metric | None:
+    """Its declaration; None of a case, which describes its rows itself."""
     try:
-        return bool(find_metric(metric))
+        return find_metric(name, plan.metrics)
     except KeyError:
-        return False
+        return None
 
 
 def _fields(entry: Any, *without: str) -> dict[str, Any]:

@@ -16,105 +16,27 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from snug.garment_file import add_garment_options, demand_a_file, garment_file
+from snug.garment_file import demand_a_file, garment_file
+from snug.motion_options import reading_of
 
+from . import outside
 from .cache import DEFAULT_ONLY, STATES
+from .methods import METHODS
 from .performance.microbenchmark import SUITE
 from .plan import Motions, OwnBody, OwnGarment, Plan, PlanError
-from .presets import PRESETS, find_preset
+from .presets import find_preset
 from .provenance import usable_cores
 from .registry import DeclarationError
 from .results import ResultsError, RunFolder, digest_of_file
+from .roll_out_option import RollOutError
+from .roll_out_option import parse as parse_roll_out
+from .run_options import PROGRAM, make_parser
 from .scenes import GARMENT_SCENES, all_scenes
-from .selection import Request, choose, choose_motions, choose_suites, names_no_motion
+from .selection import MEASURED, Request, choose, choose_motions, choose_suites, names_no_motion
 from .tasks.task import RunStopped
 from .timing import one_thread
 
-PROGRAM = "benchmarks.run"
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
-EXAMPLES = """examples:
-  python -m benchmarks.run                                    the quick run: every suite's quick subset
-  python -m benchmarks.run --preset smoke                     everything once, tiny, about 3 minutes
-  python -m benchmarks.run --suite garments -o reports/runs/mine
-  python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
-  python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2
-  python -m benchmarks.run --motions clips/ --test-motions 01_01
-  python -m benchmarks.run --suite garments --methods 'simulation,skinning,snug,snug-without-*' \\
-      --test-motions brisk_walk,torso_twist,lunge               what each choice of the recipe does
-  python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
-  python -m benchmarks.run --motions library --motions mine.amc
-  python -m benchmarks.run --body mine.npz --suite garments
-  python -m benchmarks.run --garment shirt.obj --garment-units cm --body mine.npz --suite garments
-
-motions: without --motions the embedded library, which has its own test set. With --motions the files
-  replace the library; "library" among the paths keeps it. --test-motions names those to test on, all
-  others train, but for the library's own test motions, which never do. Without it the library's test
-  set tests; of files alone the first by name tests and the others train; a single file tests and the
-  library trains. Files are brought to 30 frames per second, placed on the floor, arms spread clear of
-  the torso, and cut to the preset's length.
-
-a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
-  as it is, the rest is done. A run that was killed is so taken up again. --only failed does again what
-  failed, --fresh everything.
-
-exit status: 0 when every cell ended as ok or as an explained skip (in extremes a failure reported with
-  its reason is an accepted outcome); 1 when a cell, a training or a simulation failed: a line says why
-  and the rest went on; 2 when the request cannot be met, also where another run is going on in the
-  folder: one line says why and nothing is left behind; 130 when it was interrupted: what had ended is
-  in the folder, whole, and the same command goes on from there."""
-
-
-class _Parser(argparse.ArgumentParser):
-    """One clear line for a wrong word, in place of the whole usage."""
-
-    def error(self, message: str):
-        raise PlanError(f"{message}; see --help")
-
-
-def make_parser() -> argparse.ArgumentParser:
-    """The options of the command."""
-    parser = _Parser(
-        prog=f"python -m {PROGRAM}",
-        description="Dress a body, simulate the ground truth, train the networks, compare all of them "
-        "and write tables, figures and a PDF.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
-    add = parser.add_argument
-    names = ", ".join(preset.name for preset in PRESETS)
-    add("--preset", default="quick", metavar="NAME", help=f"how much of everything: {names} (default quick)")
-    add("--suite", action="append", default=[], metavar="NAME",
-        help="garments, speed, validation, extremes, performance or all, in full; repeat or separate by "
-        "commas (default: the quick subset of each but performance)")  # fmt: skip
-    add("--scenes", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
-    add("--methods", action="append", default=[], metavar="NAME,...", help="only these; patterns allowed")
-    add("--motions", action="append", default=[], metavar="PATH",
-        help="motion file or folder (.amc with its .asf, .npz), or the word library; repeatable")  # fmt: skip
-    add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
-    add(
-        "--body",
-        metavar="FILE",
-        help="an own body of SMPL's family, .npz or .pkl, in place of the package's; garments are made for "
-        "it (extreme cases of single steps keep the package's)",
-    )
-    add("--garment", metavar="FILE",
-        help="an own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; its scenes are "
-        "<name of the file>/<motion>. What will work says python -m snug.check FILE")  # fmt: skip
-    add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
-    add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
-    add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
-    add("--only", action="append", default=[], metavar="STATE,...",
-        help="of what the folder holds already, do again what is failed, stale or missing (default "
-        "stale,missing; the finished is reused)")  # fmt: skip
-    add("--fresh", action="store_true", help="reuse nothing from the folder")
-    add("--workers", type=int, metavar="N",
-        help="processes side by side for ground truth, training, metrics and cases (default 2, or the "
-        "cores there are); cells that are timed run alone")  # fmt: skip
-    add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
-    add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
-    add_garment_options(parser)
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -132,20 +54,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    return carry_out(plan, dry_run=options.dry_run)
+
+
+def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> int:
+    """Run the plan, or say what would be run; returns the exit status."""
+    for motion in plan.motions.files.values():
+        print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     from .lock import HeldError, held
 
     try:
-        if options.dry_run:
+        if dry_run:
             from .dry_run import describe
 
             print(describe(plan))
             return 0
-        with held(plan.folder):
-            from .execution import execute
+        from .execution import check_roll_outs, execute
 
+        check_roll_outs(plan)
+        with held(plan.folder):
             return execute(plan)
-    except (HeldError, DeclarationError) as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+    except (HeldError, DeclarationError, RollOutError) as error:
+        print(f"{program}: {error}", file=sys.stderr)
         return 2
     except (RunStopped, OSError) as error:
         from reference_sim.whole_file import disk_full
@@ -156,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: {line}; the same command goes on from there", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
+        print(f"{program}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
         return 130
 
 
@@ -171,16 +101,21 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     workers = min(WORKERS, usable_cores()) if options.workers is None else options.workers
     if workers < 1:
         raise PlanError(f"--workers {workers}: give a whole number, 1 or more")
-    scenes, methods = tuple(split(options.scenes)), tuple(split(options.methods))
-    motions = Motions()
-    if options.motions or options.test_motions or not names_no_motion(scenes):
-        motions = choose_motions(options.motions, split(options.test_motions), preset)
+    known_scenes = {*all_scenes((), ()), *(entry.name for entry in MEASURED)}
+    scenes, own_scenes = outside.resolved(outside.SCENES, split(options.scenes), known_scenes)
+    methods, own_methods = outside.resolved(
+        outside.METHODS, split(options.methods), {entry.name for entry in METHODS}
+    )
+    motions, reading = Motions(), reading_of(options)
+    if options.motions or options.test_motions or not names_no_motion(scenes, own_scenes):
+        motions = choose_motions(options.motions, split(options.test_motions), preset, reading)
     garment = choose_garment(options)
     if garment:
         motions = replace(motions, worn=(garment.scenes, *motions.worn[1:]))
     request = Request(
-        suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=scenes,
-        methods=methods, seeds=seeds,
+        suites=suites, full=bool(options.suite), preset=preset, motions=motions, scenes=tuple(scenes),
+        methods=tuple(methods), seeds=seeds, own_scenes=tuple(own_scenes), own_methods=tuple(own_methods),
+        roll_outs=tuple(map(parse_roll_out, options.rollout)),
     )  # fmt: skip
     cells, cases, microbenchmarks = choose(request)
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
@@ -191,6 +126,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         cells=cells,
         cases=cases,
         microbenchmarks=microbenchmarks,
+        metrics=choose_metrics(split(options.metrics)),
         motions=motions,
         body=choose_body(options.body),
         garment=garment,
@@ -202,6 +138,23 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         workers=workers,
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
+
+
+def choose_metrics(words: Sequence[str]) -> tuple[str, ...]:
+    """Modules of metrics that are not the project's. Raises ValueError."""
+    if not words:
+        return ()
+    from .metrics import declared
+
+    names, metrics = outside.resolved(outside.METRICS, words, ())
+    for name in names:
+        if name not in {metric.name for metric in metrics}:
+            raise PlanError(
+                f"--metrics {name}: no such file or entry point; those of the project are measured"
+            )
+    homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
+    declared(homes)  # each name stands once
+    return homes
 
 
 def choose_body(path: str | None) -> OwnBody | None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from .registry import DeclarationError, by_name
+from .registry import DeclarationError, by_name, load
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,7 +26,8 @@ if TYPE_CHECKING:
 class Scene:
     """The declaration of a scene: cheap to list. Its module is imported when it is built.
 
-    sizes: values of the preset that build() of the module takes as options; options: further ones.
+    module: has build(scene, assets, **options), which gives a BuiltScene. module, declared_in, files: as of a
+    MethodEntry. sizes: values of the preset that build() takes as options; options: further ones.
     garment: what a body wears in it; it then needs the assets, and networks work on no other. motion: its
     name, and part, whether it is "whole" or a "clip". obstacle: whether there is another thing to touch.
     metrics: names of the modules of benchmarks.metrics that are measured here; None for all that apply.
@@ -39,7 +39,9 @@ class Scene:
 
     name: str
     description: str
-    module: str
+    module: str = ""
+    declared_in: str = ""
+    files: tuple[str, ...] = ()
     sizes: tuple[str, ...] = ()
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     garment: str = ""
@@ -87,7 +89,7 @@ class Scene:
         """Make everything the scene declares. Deterministic. A dressed scene needs the assets."""
         if self.dressed and assets is None:
             raise ValueError(f"scene {self.name} needs assets: a body, a garment and the motion")
-        return importlib.import_module(self.module).build(self, assets, **self.options)
+        return load(self.module).build(self, assets, **self.options)
 
 
 @dataclass(frozen=True)

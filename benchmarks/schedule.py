@@ -17,6 +17,7 @@ from snug.recipes import TRAININGS
 
 from . import provenance
 from .cache import dependencies
+from .method import MethodEntry
 from .methods import find_method
 from .metric import COMPARED_WITH
 from .metrics import names_of
@@ -69,7 +70,7 @@ class Schedule:
         yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and self._has_reference(s))
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
         for network in dict.fromkeys(network_of(c) for c in plan.cells if SUITE in c.suites):
-            if network and network.garment == plan.motions.first_garment and network.name in TRAININGS:
+            if network and network.garment == plan.motions.first_garment and network.training:
                 yield self.windows(network)
         yield from map(self.case, plan.cases)
         yield from map(self.microbenchmark, plan.microbenchmarks)
@@ -92,7 +93,7 @@ class Schedule:
         )  # fmt: skip
 
     def network(self, network: Network) -> TrainNetwork:
-        chosen, motions = TRAININGS.get(network.name), self._train(network.garment)
+        chosen, motions = network.training, self._train(network.garment)
         steps = self.preset.steps_of(network.name, chosen.kind if chosen else network.name)
         inputs = self._inputs(self.plan.device) | self._of_body(network.garment) | {
             "training": [network.name, chosen],
@@ -103,11 +104,13 @@ class Schedule:
         simulated: dict[str, TaskId] = {}
         if chosen and chosen.simulated:
             simulated = {motion: self.data(motion, network.garment).id for motion in motions}
-        energies = _modules_of(chosen.recipe.terms) if chosen else ()
+        further = _modules_of(chosen.recipe.terms) if chosen else ()
+        further = (*further, network.declared_in) if network.declared_in else further
         return _keyed(TrainNetwork(
             name=f"{network.garment}/{network.name}-seed{network.seed}", label=network.label,
-            inputs=inputs, modules=(f"{TASKS}.training", ASSETS, *energies), reads=tuple(simulated.values()),
-            units=max(steps, 1), training=network.name, chosen=chosen, seed=network.seed,
+            inputs=inputs, modules=(f"{TASKS}.training", ASSETS, *further), reads=tuple(simulated.values()),
+            units=max(steps, 1), training=network.name, chosen=chosen, home=network.declared_in,
+            seed=network.seed,
             garment=network.garment, steps=steps, motions=motions, simulated=simulated,
             device=self.plan.device,
         ))  # fmt: skip
@@ -132,7 +135,7 @@ class Schedule:
                 )
 
     def cell(self, cell: Cell) -> RunCell:
-        of_scene = self._of_scene(cell.scene, f"{TASKS}.cell", cell.entry.module)
+        of_scene = self._of_scene(cell.scene, f"{TASKS}.cell", *_modules_behind(cell.entry))
         inputs = of_scene["inputs"] | {"method": _declared(cell.entry)}
         if cell.timed:
             inputs["least"] = self._least(cell)
@@ -179,29 +182,38 @@ class Schedule:
             quasi_static = self.quasi_static(scene).id
             reads = (*reads, quasi_static)
         if scene.counterpart:
-            same = (c for c in plan.cells if (c.scene.name, c.entry, c.seed) ==
-                    (scene.counterpart, cell.entry, cell.seed))  # fmt: skip
+            same = (c for c in plan.cells if (c.scene.name, c.method, c.seed) ==
+                    (scene.counterpart, cell.method, cell.seed))  # fmt: skip
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, ("cell", counterpart.name))
-        modules = (f"benchmarks.metrics.{name}" for name in names_of(scene.metrics))
+        modules = [f"benchmarks.metrics.{name}" for name in names_of(scene.metrics)] + list(plan.metrics)
         of_scene = self._of_scene(scene, f"{TASKS}.metrics", *modules)
         inputs = {
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,
-            "method": [cell.entry.role, cell.entry.family, cell.entry.level, cell.entry.conserving],
+            "method": [
+                cell.entry.role,
+                cell.entry.family,
+                cell.entry.level,
+                cell.entry.conserving,
+                cell.entry.static_known,
+            ],
             "metrics": scene.metrics,
         }
         return MeasureCell(
             name=cell.name, label=cell.label, cell=cell, cells=cells,
             gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
-            counterpart=counterpart, needs=(("cell", cell.name),), reads=reads, batch=scene.name,
+            counterpart=counterpart, outside=plan.metrics,
+            needs=(("cell", cell.name),), reads=reads, batch=scene.name,
             **of_scene | {"inputs": of_scene["inputs"] | inputs},
         )  # fmt: skip
 
     def windows(self, network: Network) -> CompareWindows:
         training = self.network(network)
+        own = (cell.entry for cell in self.plan.cells if network_of(cell) == network)
         return CompareWindows(
-            name=training.name, label=training.label, training=training, entry=find_method(network.name),
+            name=training.name, label=training.label, training=training,
+            entry=find_method(network.name) if network.name in TRAININGS else next(own),
             inputs=training.inputs,
             modules=(f"{TASKS}.training_windows", *training.modules), needs=(training.id,),
         )  # fmt: skip
@@ -245,12 +257,13 @@ class Schedule:
         said = _declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
         del said["metrics"], said["counterpart"]
         inputs = self._inputs() | {"scene": said}
+        modules = (*modules, *_modules_behind(scene))
         if not scene.dressed:
-            return {"inputs": inputs, "modules": (*modules, scene.module)}
+            return {"inputs": inputs, "modules": modules}
         inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
         if scene.part == "clip":
             inputs["clip_frames"] = self.preset.clip_frames
-        return {"inputs": inputs, "modules": (*modules, scene.module, ASSETS)}
+        return {"inputs": inputs, "modules": (*modules, ASSETS)}
 
     def _of_body(self, garment: str) -> dict[str, Any]:
         """What the assets are made from."""
@@ -273,17 +286,27 @@ class Schedule:
         return self.plan.motions.train_of(garment)
 
     def _settled_in(self, scene: Scene) -> Scene:
-        return find_scene(scene.start_of, self.plan.motions.first_garment).at(self.preset)
+        planned = next((s for s in self.plan.scenes if s.name == scene.start_of), None)
+        return planned or find_scene(scene.start_of, self.plan.motions.first_garment).at(self.preset)
 
     def _has_reference(self, scene: Scene) -> bool:
-        return any(cell.scene == scene and cell.entry.role == "reference" for cell in self.plan.cells)
+        of_scene = (cell for cell in self.plan.cells if cell.scene == scene)
+        return any(cell.entry.role == "reference" and runs(cell) for cell in of_scene)
 
 
 def _declared(entry: Any) -> dict[str, Any]:
-    """What a scene, a method or a case declares, but for the words about it."""
+    """What a scene, a method or a case declares, but for the words about it; of files their content."""
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
-    return {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
+    said = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
+    if isinstance(entry, MethodEntry):
+        said["files"] = {path: digest_of_file(Path(path)) for path in said["files"]}
+    return said
+
+
+def _modules_behind(entry: Any) -> tuple[str, ...]:
+    """Of a scene or a method: its module, and what declares it where that is outside."""
+    return tuple(dict.fromkeys(filter(None, (entry.module, entry.declared_in))))
 
 
 def _content(path: Path, garment: str) -> str:

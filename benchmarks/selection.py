@@ -6,13 +6,16 @@ import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-from .methods import METHODS, find_method
+from .method import MethodEntry
+from .methods import METHODS
 from .performance.microbenchmark import SUITE, Microbenchmark
 from .performance.registry import MICROBENCHMARKS
 from .plan import Motions, PlanError
 from .presets import PRESETS, Preset
+from .registry import DeclarationError, by_name
 from .scene import Scene
 from .scenes import GARMENT_SCENES, all_scenes
 from .suites import SUITE_NAMES, SUITES, Extent, Suite
@@ -22,7 +25,9 @@ from .validation.registry import CASES
 
 if TYPE_CHECKING:
     from snug.motion import Motion
+    from snug.motion_options import Reading
 
+    from .roll_out_option import RollOutOption
     from .validation.case import Case
 
 FEWEST = 3  # frames of a motion: inertia needs two before the one that is judged
@@ -32,7 +37,8 @@ MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what
 @dataclass(frozen=True, kw_only=True)
 class Request:
     """The words of a request. full: whether suites are named; scenes and methods: names or patterns; empty
-    means all that the suites list.
+    means all that the suites list. own_scenes, own_methods: entries that are not the project's, named among
+    these. roll_outs: stored ones, which meet each scene that is asked for.
     """
 
     suites: tuple[str, ...]
@@ -42,6 +48,27 @@ class Request:
     scenes: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()
     seeds: tuple[int, ...] = (0,)
+    own_scenes: tuple[Scene, ...] = ()
+    own_methods: tuple[MethodEntry, ...] = ()
+    roll_outs: tuple[RollOutOption, ...] = ()
+
+    @cached_property
+    def declared_scenes(self) -> dict[str, Scene]:
+        """Name -> scene, of all that could be asked for. Raises DeclarationError where two have one name."""
+        declared = all_scenes(self.motions.test, self.motions.dynamic_test, self.motions.worn)
+        taken = {entry.name for entry in MEASURED}
+        for scene in self.own_scenes:
+            if scene.name in taken:
+                raise DeclarationError(
+                    f"{scene.declared_in}: scene '{scene.name}': a case of the project has this name: "
+                    "give it another"
+                )
+        return by_name("scene", (*declared.values(), *self.own_scenes))
+
+    @cached_property
+    def declared_methods(self) -> dict[str, MethodEntry]:
+        """The same of methods."""
+        return by_name("method", (*METHODS, *self.own_methods))
 
     @property
     def extent(self) -> Extent:
@@ -52,35 +79,69 @@ class Request:
 
 def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Microbenchmark, ...]]:
     """What the request names. Raises PlanError for a word that names nothing."""
-    declared = all_scenes(request.motions.test, request.motions.dynamic_test, request.motions.worn)
+    declared, methods = request.declared_scenes, request.declared_methods
     _check_words("scene", request.scenes, [*declared, *(entry.name for entry in MEASURED)])
-    _check_words("method", request.methods, [entry.name for entry in METHODS])
+    _check_words("method", request.methods, list(methods))
     found: dict[tuple[str, str, int], Cell] = {}
-    for suite, scene, method in _pairs(request, declared):
-        entry = find_method(method)
+    for suite, scene, method in _pairs(request):
+        entry = methods[method]
         for seed in request.seeds if entry.seeded else (0,):
             key = (scene, method, seed)
             before = found[key].suites if key in found else ()
             found[key] = Cell(declared[scene].at(request.preset), entry, seed, (*before, suite))
+    stored = stored_cells(request.roll_outs, tuple(found.values()))
     cases, microbenchmarks = tuple(_cases(request)), tuple(_microbenchmarks(request))
     if not (found or cases or microbenchmarks):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
     # The reference first: an error against it can be said as soon as another cell is done.
-    order = {entry.name: place for place, entry in enumerate(METHODS)}
+    order = {name: place for place, name in enumerate(methods)}
     places = {name: place for place, name in enumerate(declared)}
-    cells = sorted(found.values(), key=lambda c: (places[c.scene.name], order[c.method], c.seed))
+    last = len(order)
+    cells = sorted(
+        (*found.values(), *stored),
+        key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
+    )
     return tuple(cells), cases, microbenchmarks
 
 
-def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, str, str]]:
+def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:
+    """The stored roll-outs in the scenes of these cells, and in their suites. Raises PlanError, and
+    RollOutError for a file that cannot be read.
+    """
+    if not roll_outs:
+        return []
+    from .methods.stored_roll_out import entry_of
+
+    scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
+    suites = {name: tuple(dict.fromkeys(s for c in cells if c.scene.name == name for s in c.suites))
+              for name in scenes}  # fmt: skip
+    taken = {entry.name for entry in METHODS} | {cell.method for cell in cells}
+    found: list[Cell] = []
+    for option in roll_outs:
+        if option.name in taken:
+            raise PlanError(f"--rollout {option.name}: a method has that name; give another")
+        taken.add(option.name)
+        if len(scenes) != 1 and not option.places:
+            raise PlanError(
+                f"--rollout {option.name}={option.path}: is of one scene, and {len(scenes)} are asked for: "
+                "name it with --scenes, or put {scene} into the path"
+            )
+        own = [(scene, entry) for scene in scenes.values() if (entry := entry_of(option, scene.name))]
+        if not own:
+            raise PlanError(f"--rollout {option.name}={option.path}: no file for {', '.join(scenes)}")
+        found += [Cell(scene, entry, 0, suites[scene.name]) for scene, entry in own]
+    return found
+
+
+def _pairs(request: Request) -> Iterator[tuple[str, str, str]]:
     """(suite, scene, method), suite by suite.
 
     A scene that no suite lists is met where its whole name is given: a body in a whole motion in garments,
     all else in speed. A method that no suite lists takes part in each suite where its whole name is given.
     """
-    extent = request.extent
-    unlisted = _unlisted_scenes(request, declared)
-    own_methods = set(request.methods) & {entry.name for entry in METHODS} - _listed_methods()
+    extent, declared = request.extent, request.declared_scenes
+    unlisted = _unlisted_scenes(request)
+    own_methods = set(request.methods) & set(request.declared_methods) - _listed_methods()
     for suite in SUITES:
         listed = suite.scenes(extent)
         if suite.name not in request.suites or not suite.methods(extent):
@@ -94,7 +155,7 @@ def _pairs(request: Request, declared: dict[str, Scene]) -> Iterator[tuple[str, 
             for method in methods:
                 if not (named(scene, request.scenes) and named(method, request.methods)):
                     continue
-                entry = find_method(method)
+                entry = request.declared_methods[method]
                 if entry.meant_for(declared[scene]) and not (plain and entry.trained):
                     yield suite.name, scene, method
 
@@ -130,13 +191,13 @@ def default_suites(method: str, preset: Preset) -> list[str]:
     return [suite.name for suite in SUITES if method in suite.methods(Extent(preset, Motions()))]
 
 
-def _unlisted_scenes(request: Request, declared: dict[str, Scene]) -> dict[str, str]:
+def _unlisted_scenes(request: Request) -> dict[str, str]:
     """Scenes called by their whole names that no suite lists -> the suite that takes them."""
     everything = Extent(request.preset, request.motions, full=True, further=True)
     listed = {name for suite in SUITES for name in suite.scenes(everything)}
     return {
         name: "garments" if scene.part == "whole" else "speed"
-        for name, scene in declared.items()
+        for name, scene in request.declared_scenes.items()
         if name in request.scenes and name not in listed
     }
 
@@ -166,20 +227,22 @@ def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in SUITE_NAMES if "all" in chosen or name in chosen)
 
 
-def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Preset) -> Motions:
+def choose_motions(
+    paths: Sequence[str], test_names: Sequence[str], preset: Preset, reading: Reading | None = None
+) -> Motions:
     """Which motions train and which test. Raises PlanError (or the reader's own error) for a bad request.
 
     Without paths: the embedded library with its own division. With paths: the files alone, plus the library
     where "library" is among the paths. test_names moves motions to the test set; without it the test
     motions of the library test, and of files alone the first in order of names. A single file tests, and the
-    library trains. The test motions of the library never train, whichever motions test.
+    library trains. The test motions of the library never train, whichever motions test. reading: what the
+    files do not say.
     """
-    from snug.motion_files import load_motions
     from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, LIBRARY, TEST, TRAIN
 
     files: dict[str, Motion] = {}
     for path in paths:
-        for motion in load_motions(path) if path != "library" else ():
+        for motion in _motions_in(path, reading) if path != "library" else ():
             if motion.name in files or motion.name in LIBRARY:
                 raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             if motion.frames < FEWEST:
@@ -203,10 +266,16 @@ def choose_motions(paths: Sequence[str], test_names: Sequence[str], preset: Pres
     return Motions(train[:few], test, files, DYNAMIC_TRAIN[:few], DYNAMIC_TEST[:fewer])
 
 
-def names_no_motion(scenes: Sequence[str]) -> bool:
-    """Whether a choice of scenes names scenes without a body, cases and
+def _motions_in(path: str, reading: Reading | None) -> list[Motion]:
+    from snug.motion_files import load_motions  # its readers are slow to load
+
+    return load_motions(path, reading=reading)
+
+
+def names_no_motion(scenes: Sequence[str], own: Sequence[Scene] = ()) -> bool:
+    """Whether a choice of scenes, some of them a user's own, names scenes without a body, cases and
     microbenchmarks alone; no motion is looked at then."""
-    known = {name for name, scene in all_scenes((), ()).items() if not scene.dressed}
+    known = {scene.name for scene in (*all_scenes((), ()).values(), *own) if not scene.dressed}
     known |= {entry.name for entry in MEASURED}
     return bool(scenes) and known.issuperset(scenes)
 

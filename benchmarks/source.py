@@ -3,6 +3,9 @@
 All three are found from the syntax tree of the modules that a task names, imports inside functions included,
 so that a change in one method leaves the results of the others as they are. Comments, formatting and
 docstrings do not count.
+
+Of a user's file, or of an installed package that declares methods, scenes or metrics, the modules of its own
+package and those beside it count by their source too. What other distributions install counts by its version.
 """
 
 from __future__ import annotations
@@ -56,8 +59,8 @@ def code_of(*modules: str) -> dict[str, str]:
 
 
 def find_module(module: str) -> str:
-    """The file of a module, ours or a user's. Raises DeclarationError."""
-    return _file_of(module) or _elsewhere(module)
+    """The file of a module, ours or a user's, which may be named by its path. Raises DeclarationError."""
+    return module if module.endswith(".py") else _file_of(module) or _elsewhere(module)
 
 
 def packages_of(code: Iterable[str]) -> dict[str, str]:
@@ -130,12 +133,18 @@ def _source(path: str) -> _Source:
         tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
     except SyntaxError as error:
         raise DeclarationError(f"{path}: line {error.lineno}: {error.msg}") from None
-    imports = [pair for node in _running(tree) for pair in _imported(node, path)]
+    except (OSError, UnicodeDecodeError) as error:
+        raise DeclarationError(f"{path}: cannot be read: {error}") from None
+    top, package = place_of(path)
+    imports = [pair for node in _running(tree) for pair in _imported(node, package)]
     roots = {base.split(".")[0] for base, _ in imports}
-    files = (
-        f for base, name in imports if base.split(".")[0] in LAYERS for f in _files_behind(base, name, path)
-    )
-    found = tuple(dict.fromkeys(files))
+    tops = {root: _top_of(root, top, package) for root in roots}
+    found = tuple(dict.fromkeys(
+        file
+        for base, name in imports
+        if (where := tops[base.split(".")[0]]) is not None
+        for file in _files_behind(base, name, path, where)
+    ))  # fmt: skip
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list) and body and _is_text(body[0]):
@@ -144,18 +153,36 @@ def _source(path: str) -> _Source:
     return _Source(digest(ast.dump(tree).encode()), found, others)
 
 
+@cache
+def place_of(path: str) -> tuple[str, list[str]]:
+    """The folder from which a file is imported, "" for that of the project; its package below that folder."""
+    if not Path(path).is_absolute():
+        return "", path.split("/")[:-1]
+    top = Path(path).parent
+    while (top / "__init__.py").is_file():
+        top = top.parent
+    return f"{top.as_posix()}/", list(Path(path).parent.relative_to(top).parts)
+
+
+def _top_of(root: str, top: str, package: list[str]) -> str | None:
+    """The folder in which the files of a top-level module lie whose source counts; None: it does not."""
+    if root in LAYERS:
+        return ""
+    installed = root in sys.stdlib_module_names or root in _distributions()
+    return top if top and (root in package[:1] or not installed) else None
+
+
 def _is_text(node: ast.AST) -> bool:
     constant = node.value if isinstance(node, ast.Expr) else None
     return isinstance(constant, ast.Constant) and isinstance(constant.value, str)
 
 
-def _imported(node: ast.AST, path: str) -> list[tuple[str, str]]:
-    """(module, name in it or empty) of everything that an import statement of that file names."""
+def _imported(node: ast.AST, package: list[str]) -> list[tuple[str, str]]:
+    """(module, name in it or empty) of everything that an import statement in that package names."""
     if isinstance(node, ast.Import):
         return [(alias.name, "") for alias in node.names]
     if not isinstance(node, ast.ImportFrom):
         return []
-    package = path.split("/")[:-1]
     above = package[: len(package) - node.level + 1] if node.level else []
     base = ".".join([*above, *(node.module or "").split(".")]).strip(".")
     return [(base, alias.name) for alias in node.names]
@@ -169,13 +196,13 @@ def _running(node: ast.AST) -> Iterator[ast.AST]:
             yield from _running(child)
 
 
-def _files_behind(base: str, name: str, importer: str) -> Iterator[str]:
-    """The files that `from base import name` needs.
+def _files_behind(base: str, name: str, importer: str, top: str) -> Iterator[str]:
+    """The files below the folder `top` that `from base import name` needs.
 
     A package that has the name neither as a module nor in its own text gives it when it is first used: then
     that of its modules counts which defines the name, and where none does, all of them.
     """
-    path, inner = _file_of(base), _file_of(f"{base}.{name}") if name else None
+    path, inner = _file_of(base, top), _file_of(f"{base}.{name}", top) if name else None
     package = path is not None and path.endswith("/__init__.py") and bool(name)
     if path is None or not package:
         yield from filter(None, [inner or path])
@@ -185,8 +212,8 @@ def _files_behind(base: str, name: str, importer: str) -> Iterator[str]:
         return
     yield path
     if name not in _bound(path):
-        folder = sorted((ROOT / path).parent.glob("*.py"))
-        modules = [p.relative_to(ROOT).as_posix() for p in folder if p.name != "__init__.py"]
+        files = sorted(p.name for p in (ROOT / path).parent.glob("*.py"))
+        modules = [f"{path.rpartition('/')[0]}/{file}" for file in files if file != "__init__.py"]
         yield from [module for module in modules if name in _defined(module)] or modules
 
 
@@ -222,6 +249,6 @@ def _top_level(path: str) -> Iterator[ast.stmt]:
 
 
 @cache
-def _file_of(module: str) -> str | None:
-    stem = module.replace(".", "/")
+def _file_of(module: str, top: str = "") -> str | None:
+    stem = top + module.replace(".", "/")
     return next((p for p in (f"{stem}.py", f"{stem}/__init__.py") if (ROOT / p).is_file()), None)

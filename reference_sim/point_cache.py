@@ -1,7 +1,7 @@
 """A trajectory as a PC2 point cache beside an OBJ: what Blender's Mesh Cache modifier reads.
 
 A 32-byte header (signature, version 1, number of points, first frame, frames per sample, number of samples),
-then float32 positions, sample by sample.
+then float32 positions, sample by sample. PC16 is the same in float16.
 """
 
 from __future__ import annotations
@@ -9,10 +9,14 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-from .trajectory import Trajectory
+import numpy as np
+
+from .trajectory import Trajectory, TrajectoryError
 from .whole_file import replacing
 
 SIGNATURE = b"POINTCACHE2\0"
+HEADER = len(SIGNATURE) + 20
+TYPES = {".pc2": "<f4", ".pc16": "<f2"}
 
 
 def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, Path]:
@@ -36,3 +40,27 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
     with replacing(mesh) as temporary:
         temporary.write_text("".join(["# metres, y up\n", *lines]), encoding="utf-8")
     return path, mesh
+
+
+def read_point_cache(path: str | Path) -> np.ndarray:
+    """Positions (T, V, 3) of a .pc2 (float32) or .pc16 (float16) file, in its own unit and axes.
+
+    Raises:
+        TrajectoryError: no such file, no point cache, or not as long as its header says.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise TrajectoryError(f"{path}: no such file")
+    kind, length = np.dtype(TYPES[path.suffix.lower()]), path.stat().st_size
+    with path.open("rb") as file:
+        header = file.read(HEADER)
+        if len(header) < HEADER or not header.startswith(SIGNATURE):
+            raise TrajectoryError(f"{path}: is no point cache: it does not begin with POINTCACHE2")
+        version, points, _, _, frames = struct.unpack("<iiffi", header[len(SIGNATURE) :])
+        due = HEADER + frames * points * 3 * kind.itemsize
+        if version != 1 or points < 1 or frames < 1 or due != length:
+            raise TrajectoryError(
+                f"{path}: version {version}, {frames} samples of {points} points take {due} bytes, the file "
+                f"has {length}: write it again"
+            )
+        return np.fromfile(file, kind).reshape(frames, points, 3)

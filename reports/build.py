@@ -1,7 +1,8 @@
 """python -m reports.build RUN_DIR: the tables, figures and PDF of a finished run.
 
 Reads run.json, results.csv, trajectories and histories of trainings in RUN_DIR, and nothing else; writes
-tables/*.csv, figures/*.svg and *.png, and report.pdf there. Run twice, it writes the same bytes twice.
+tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same bytes
+twice.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     folder = RunFolder(run_dir)
     run = read_run(folder)
     from reports.document import document
+    from reports.page.write import write_page
     from reports.tables import make_tables
 
     tables = make_tables(run)
@@ -48,6 +50,8 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
         table.write_csv(folder.tables)
     problems: list[str] = []
     pictures = draw(folder, run, problems)
+    write_page(folder, run, tables, problems, lambda path: read_trajectory(folder, path, problems))
+    problems = list(dict.fromkeys(problems))  # the page reads again what was drawn
     typeset(folder, document(run, tables, pictures, problems))
     return folder.report_path, problems
 
@@ -177,7 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status: 0 made; 1 made, but some file of the run could not be read; 2 no run folder."""
     parser = argparse.ArgumentParser(
         prog="python -m reports.build",
-        description="Make tables/*.csv, figures/* and report.pdf of a finished run from its result files.",
+        description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run.",
         epilog="Exit status: 0 when all is made, 1 when some file of the run could not be read (the report "
         "names it), 2 when RUN_DIR is no run folder.",
     )

@@ -52,7 +52,7 @@ def _block(run: Run, table: Table) -> Block:
     cells = []
     for number_, (place, column) in enumerate(zip(places, columns)):
         printed = [label if number_ == 0 else own.get(column.name, DASH) for label, own in references]
-        cells.append(_column_texts(run, column, [row[place] for row in table.rows], printed))
+        cells.append(column_texts(run, column, [row[place] for row in table.rows], printed))
     lines = [list(line) for line in zip(*cells)]
     groups: dict[str, list[list[dict[str, str]]]] = {}
     for row, line in zip(table.rows, lines):
@@ -60,7 +60,7 @@ def _block(run: Run, table: Table) -> Block:
     return {
         "kind": "table",
         "caption": table.caption,
-        "note": _note(table, lines),
+        "note": remarks_of(table, lines),
         "columns": [
             {"title": column.title, "unit": column.unit, "left": column.text, "width": width}
             for column, width in zip(columns, _widths(columns))
@@ -71,7 +71,7 @@ def _block(run: Run, table: Table) -> Block:
     }
 
 
-def _note(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
+def remarks_of(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
     """What the table says of itself, of its spreads and of the marks in it."""
     remarks = [table.note] if table.note else []
     means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
@@ -96,7 +96,7 @@ def _widths(columns: Sequence[Column]) -> list[str]:
     return [column.width for column in columns]
 
 
-def _column_texts(
+def column_texts(
     run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]
 ) -> list[dict[str, str]]:
     """Text, spread or interval, and marks for each cell of a column; `printed` are rows of others below."""

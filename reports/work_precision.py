@@ -63,7 +63,7 @@ def error_against_time(folder: Path, run: Run) -> list[Picture]:
     for scene in sorted(dict.fromkeys(frame["scene"]), key=lambda s: (s not in first, -int(ran.get(s, 0)))):
         rows = frame[frame["scene"] == scene]
         panels = [
-            (run.metrics[name], points) for name in ERRORS if len(points := _errors(run, rows, name)) > 1
+            (run.metrics[name], points) for name in ERRORS if len(points := error_points(run, rows, name)) > 1
         ]
         if panels:
             if not pictures:
@@ -100,7 +100,7 @@ def metric_against_metric(folder: Path, run: Run, x: str, y: str, scenes: Sequen
     return save(figure, folder, file_name(f"{y}_against_{x}"), caption=caption, kind="axes")
 
 
-def _errors(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
+def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """The points of one panel. The reference's own error is zero by construction: it is drawn as a line."""
     points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric)
     # Smaller steps have errors of the garment, but none of the reference's own step.

@@ -119,7 +119,7 @@ def resample(motion: Motion, fps: float = 30.0) -> Motion:
     at = np.linspace(0.0, motion.frames - 1.0, intervals + 1)
     left = np.minimum(at.astype(int), motion.frames - 2)
     share = at - left
-    poses = _slerp(motion.poses[left], motion.poses[left + 1], share[:, None])
+    poses = slerp(motion.poses[left], motion.poses[left + 1], share[:, None])
     low, high = motion.translations[left], motion.translations[left + 1]
     return replace(motion, poses=poses, translations=low + share[:, None] * (high - low), fps=fps)
 
@@ -135,7 +135,7 @@ def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarra
     s = np.linspace(0.0, 1.0, frames)[:, None]
     ease = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     shape = (frames, 24, 3)
-    return _slerp(np.broadcast_to(pose_a, shape), np.broadcast_to(pose_b, shape), ease)
+    return slerp(np.broadcast_to(pose_a, shape), np.broadcast_to(pose_b, shape), ease)
 
 
 def place(motion: Motion) -> Motion:
@@ -179,8 +179,8 @@ def arm_clearance(motion: Motion) -> np.ndarray:
     return np.stack(angles, axis=1)
 
 
-def _slerp(poses_a: np.ndarray, poses_b: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Interpolate along the shortest arc: (T, 24, 3), (T, 24, 3), (T, 1) in [0, 1] -> (T, 24, 3)."""
+def slerp(poses_a: np.ndarray, poses_b: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Interpolate along the shortest arc: twice (..., 3) [rad], a share in [0, 1] for (...) -> (..., 3)."""
     start = rotation_matrices(poses_a)
     arc = axis_angles(np.swapaxes(start, -1, -2) @ rotation_matrices(poses_b))
     return axis_angles(start @ rotation_matrices(arc * share[..., None]))

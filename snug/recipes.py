@@ -124,11 +124,6 @@ TRAININGS = {
 }
 
 
-def learns_from_simulation(model: str) -> bool:
-    """Whether the model of that name needs simulated motions to be trained."""
-    return model in TRAININGS and TRAININGS[model].simulated
-
-
 def find_recipe(name: str) -> Recipe:
     """The recipe of that name. Raises RecipeError naming the known ones."""
     if name not in RECIPES:

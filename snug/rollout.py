@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,7 @@ def ready_to_roll_out(
     frames = predictions(model, dressed, motion, betas, before=before)
     held = np.arange(motion.frames) if kept is None else kept
 
+    @one_thread()
     def run() -> Trajectory:
         positions, seconds = collected(frames(), held)
         return _trajectory(model, dressed, motion, positions, held, seconds)
@@ -247,12 +249,31 @@ def _one_by_one(
     def frames() -> Iterator[np.ndarray]:
         state = start
         for frame, origin in enumerate(pelvis):
-            vertices, state = step(frame, state)
+            with one_thread():
+                vertices, state = step(frame, state)
             yield vertices.numpy().astype(np.float64) + origin
 
-    for frame in range(min(WARM_UP, len(pelvis))):
-        step(frame, None)
+    with one_thread():
+        for frame in range(min(WARM_UP, len(pelvis))):
+            step(frame, None)
     return frames
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """torch with one thread inside, and as many as before afterwards.
+
+    A frame is too little work to be shared: handing it out to threads takes longer than the work.
+    """
+    before = torch.get_num_threads()
+    if before == 1:
+        yield
+        return
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 @torch.inference_mode()

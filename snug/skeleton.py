@@ -41,7 +41,8 @@ _SOLE = (
     ("left_ankle", (0.17, 0.0, 0.13)),
     ("left_foot", (0.17, 0.0, 0.19)),
 )
-LEG_LENGTH = 0.81  # [m] thigh plus shank of REST_JOINTS
+# [m] thigh plus shank of REST_JOINTS
+LEG_LENGTH = float(np.linalg.norm(np.diff(REST_JOINTS[[1, 4, 7]], axis=0), axis=1).sum())
 
 
 class BodyError(ValueError):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snug.garment_file import demand_a_file, garment_file, is_file_name
+from snug.motion_options import reading_of
 from snug.recipes import find_recipe
 from snug.train_options import check, parse
 
@@ -58,6 +59,9 @@ def _run(options: argparse.Namespace) -> int:
     motions, held_out = _motions(options)
     stop = _StopRequest()
     group, device = join_group(device)
+    if options.motions and group.writes:
+        for motion in [*motions, *held_out]:
+            print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     try:
         body = Body.from_file(options.body) if options.body else Body.load()
         for template, out in zip(templates, outs):
@@ -104,7 +108,10 @@ def _motions(options: argparse.Namespace) -> tuple[list[Any], list[Any]]:
     from snug.motion_files import load_motions
     from snug.motion_library import TRAIN, make_motion
 
-    motions = load_motions(options.motions) if options.motions else [make_motion(name) for name in TRAIN]
+    reading = reading_of(options)
+    motions = [make_motion(name) for name in TRAIN]
+    if options.motions:
+        motions = load_motions(options.motions, reading=reading)
     names = [motion.name for motion in motions]
     for word in ("hold_out", "validation"):
         for name in getattr(options, word):

@@ -7,6 +7,7 @@ import os
 from collections.abc import Sequence
 
 from snug.garment_file import add_garment_options
+from snug.motion_options import add_motion_options
 from snug.recipes import RECIPES
 
 EXAMPLES = """examples:
@@ -40,6 +41,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
     add("--body", metavar="FILE", help="an own body of SMPL's family, .npz or .pkl (default: the package's)")
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
+    add_motion_options(add)
     add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
     add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
     add("-o", "--out", metavar="FILE",

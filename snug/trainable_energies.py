@@ -1,14 +1,14 @@
 """Energies of the simulator as terms of the training loss, found by the name that each gives itself.
 
-Whatever stands in the registry `reference_sim.energies.MODULE_OF` can be named in `Recipe.terms`, if the rest
-state of the garment is all that it needs. No other list has to be edited: a term without a kernel is trained
-by its definition in torch and automatic gradients.
+Whatever stands in the registry `reference_sim.energies.MODULE_OF`, and every other subclass of Energy that
+has been imported, can be named in `Recipe.terms`, if the rest state of the garment is all that it needs. No
+list has to be edited: a term without a kernel is trained by its definition in torch and automatic gradients.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from reference_sim import energies
 from reference_sim.energies import Energy
@@ -17,20 +17,32 @@ from reference_sim.energies import Energy
 def find_energy(name: str) -> Callable[..., Energy]:
     """What makes the energy of that name from a Cloth, its options at their defaults.
 
-    Raises ValueError for an unknown name, and for what cannot be trained.
+    Raises ValueError for an unknown name, for one that two have, and for what cannot be trained.
     That is what is made of more than a cloth, what must be prepared for each step of a simulation (see
     Energy.prepare), and what finds its stencils anew as vertices move (Energy.dynamic).
     """
-    classes = [getattr(energies, class_name) for class_name in energies.MODULE_OF]
-    terms = [term for term in classes if issubclass(term, Energy) and term is not Energy]
+    for class_name in energies.MODULE_OF:
+        getattr(energies, class_name)  # imported by it
+    terms = [term for term in _subclasses(Energy) if hasattr(term, "name")]
     named = [term for term in terms if term.name == name]
     if not named:
         known = sorted({term.name for term in terms if not _reason_against(term)})
-        raise ValueError(f"unknown energy {name!r}: use one of {', '.join(known)}")
-    for term in named:
-        if not _reason_against(term):
-            return term
+        raise ValueError(
+            f"unknown energy {name!r}: use one of {', '.join(known)}, or import the file of your own"
+        )
+    fit = {(term.__module__, term.__qualname__): term for term in named if not _reason_against(term)}
+    if len(fit) > 1:
+        places = " and ".join(module for module, _ in fit)
+        raise ValueError(f"energy {name!r} is defined in {places}: give yours a name of its own")
+    if fit:
+        return next(iter(fit.values()))
     raise ValueError(f"energy {name!r} cannot be trained: {_reason_against(named[0])}")
+
+
+def _subclasses(of: type[Energy]) -> Iterator[type[Energy]]:
+    for term in of.__subclasses__():
+        yield term
+        yield from _subclasses(term)
 
 
 def _reason_against(term: type[Energy]) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from faults import Fault
 
-OPTIMALITY, STEP, ENERGY, CURVATURE, GEOMETRY, HEM, DYNAMICS, EXCESS, CONSERVATION = (
+OPTIMALITY, STEP, ENERGY, CURVATURE, GEOMETRY, BODY, HEM, DYNAMICS, EXCESS, CONSERVATION = (
     f"benchmarks/metrics/{name}.py"
     for name in (
-        "optimality", "step", "energy", "curvature", "geometry", "hem", "dynamics", "excess", "conservation",
+        "optimality", "step", "energy", "curvature", "geometry", "body", "hem", "dynamics", "excess",
+        "conservation",
     )
 )  # fmt: skip
 FRICTION = "reference_sim/energies/contact_friction.py"
@@ -36,7 +37,7 @@ METRIC_FAULTS = {
         Fault("terms copied one by one", STEP,
               "vars(twin).update({name: twins[id(v)] for name, v in vars(twin).items() if id(v) in twins})",
               "pass"),
-        Fault("the step before not prepared", STEP, "if frame > 1:", "if frame < 0:"),
+        Fault("the step before not prepared", STEP, "if frame > 1 and", "if frame < 0 and"),
     ),
     "test_metrics": (
         Fault("curvature areas of the wrong surface", CURVATURE, "reference.curvature), reference.area",
@@ -45,6 +46,8 @@ METRIC_FAULTS = {
               "scene.origin_heights[0] - term.origin_height"),
         Fault("inertia of half the velocity", ENERGY, "velocity=(previous - before) / scene.dt",
               "velocity=(previous - before) / (2 * scene.dt)"),
+        Fault("inside by the skin itself", BODY, "x + OFF * vertex_normals", "x - OFF * vertex_normals"),
+        Fault("inside at rest too", BODY, "& ~at_rest", ""),
         Fault("depth outside too", GEOMETRY, "share=(depth > 0.0).mean(1)", "share=(depth >= 0.0).mean(1)"),
         Fault("histogram of equal weights", CURVATURE, "area / area.sum(), -area_ref / area_ref.sum()",
               "area / area.sum(), -np.full(len(area_ref), 1 / len(area_ref))"),

@@ -12,7 +12,7 @@ from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment
 from benchmarks.tasks.task import Context
 from benchmarks.tasks.training import TrainNetwork
-from snug.recipes import TRAININGS, learns_from_simulation
+from snug.recipes import TRAININGS
 
 
 def small_scene(name: str, *, cells: int = 6, frames: int = 10) -> BuiltScene:
@@ -37,7 +37,7 @@ def training(name: str, *motions: str, steps: int, key: str = "0", device: str =
     return TrainNetwork(
         name=name, label=name, inputs={}, modules=(), training=name, seed=0, garment="tshirt", steps=steps,
         chosen=TRAININGS.get(name), motions=motions, device=device, key=key,
-        simulated={m: ("data", m) for m in motions if learns_from_simulation(name)},
+        simulated={m: ("data", m) for m in motions if name in TRAININGS and TRAININGS[name].simulated},
     )  # fmt: skip
 
 

@@ -64,7 +64,7 @@ def test_an_array_of_objects_is_refused_only_where_it_is_asked_for(tmp_path):
     ("shape", "descr", "reason"),
     [
         ("(10**30,)", "'<f8'", "Header|malformed"),
-        (f"({10**30},)", "'<f8'", "1e[+]30 of float64, and 1074 MB"),
+        (f"({10**30},)", "'<f8'", "1e[+]30 of float64, and"),
         ("(40000, 40000)", "'<f8'", "at most"),
         ("(-1, 3)", "'<f8'", "shape -1 x 3"),
         ("(3,)", "'<f8'", "24 bytes, and has 16"),

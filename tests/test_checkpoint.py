@@ -12,7 +12,7 @@ import pytest
 import torch
 from dressing import swaying, tube_dress
 
-from reference_sim import Material
+from reference_sim import Material, whole_file
 from snug import tensor_file, training_run
 from snug.dressed_body import DressedBody
 from snug.recipe import DEFAULT
@@ -141,7 +141,7 @@ def test_a_kill_while_writing_leaves_the_older_checkpoint(tmp_path, monkeypatch)
     def killed(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(tensor_file.os, "replace", killed)
+    monkeypatch.setattr(whole_file.os, "replace", killed)
     with pytest.raises(KeyboardInterrupt):
         short(saving=Saving(path=path, resume=True, steps=2))
     assert path.read_bytes() == before

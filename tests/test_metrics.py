@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tasks_by_hand import small_scene
 
 from benchmarks.methods import METHODS, find_method
+from benchmarks.metrics import body as body_metrics
 from benchmarks.metrics import declared, find_metric
+from benchmarks.metrics.body import inside_itself
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
     boundary_mask,
@@ -220,6 +223,33 @@ def test_intersections_are_those_of_two_crossing_strips():
     assert intersecting_share(crossing[None], both) == pytest.approx([hit.mean()])
     tent = flat + np.abs(flat[:, [0]] - 0.5) * [0.0, 0.0, 2.0]  # folded, and nowhere through itself
     assert not intersecting(tent, faces).any()
+
+
+def two_spheres(apart):
+    """Two spheres of radius 1 as one surface, their centres that far apart."""
+    x, faces = icosphere(4, 1.0)
+    return np.concatenate([x, x + np.array([apart, 0.0, 0.0])]), np.concatenate([faces, faces + len(x)])
+
+
+def test_a_body_in_itself_is_counted_by_its_vertices_in_its_other_parts():
+    # The cap of a sphere inside the other one has (1 - apart / 2) / 2 of its area.
+    for apart, share in ((2.5, 0.0), (1.5, 0.125), (0.5, 0.375)):
+        assert inside_itself(*two_spheres(apart)).mean() == pytest.approx(share, abs=0.012)
+
+
+def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_references_rows_alone():
+    faces = two_spheres(1.5)[1]
+    obstacle = Obstacle(np.stack([two_spheres(apart)[0] for apart in (0.2, 1.5, 0.5, 1.0)]), faces)
+    body = SimpleNamespace(shaped=lambda betas: two_spheres(1.5)[0])
+    scene = SimpleNamespace(obstacle=obstacle, dressed=SimpleNamespace(body=body, betas=None), warm_up=1)
+    roll_out = SimpleNamespace(
+        scene=scene, positions=np.zeros((4, 1, 3)), entry=SimpleNamespace(role="reference")
+    )
+    found = body_metrics.measure(roll_out)
+    assert found["body/self_intersection"] == pytest.approx(100 * (0.375 - 0.125), abs=2.0)
+    assert found["body/self_intersection_frame"] == 2.0
+    roll_out.entry.role = "learned"
+    assert body_metrics.measure(roll_out) == {}
 
 
 def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():

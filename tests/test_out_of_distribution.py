@@ -256,13 +256,15 @@ def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_pat
     assert starts[splits].needs == (("start", ordinary),) and not starts["out_of_distribution-girth_+5"].needs
     settled = []
     monkeypatch.setattr(
-        out_of_distribution, "settled", lambda cloth, *_: settled.append(1) or cloth.rest_positions + 1.0
+        out_of_distribution, "settled", lambda cloth, *_: settled.append(cloth) or cloth.rest_positions + 1.0
     )
     context = Context(RunFolder(tmp_path), assets)
     for task in starts.values():
         task.run(context, {})
     one, other, fitted = (np.load(context.folder.start_path(n.replace("-", "/", 1))) for n in starts)
     assert len(settled) == 1 and np.array_equal(one, other) and not np.allclose(one, fitted)
+    areas = np.load(context.folder.rest_areas_path("out_of_distribution/ordinary"))
+    assert np.array_equal(areas, settled[0].areas)
 
 
 def test_cells_that_nobody_times_run_beside_others(tmp_path):

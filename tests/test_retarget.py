@@ -1,18 +1,20 @@
-"""Recorded motion put on the body: retargeting, repair of glitches, and recorded clips where they are."""
+"""Recorded motion put on the body: retargeting, glitches of a bone, and recorded clips where they are."""
 
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cmu_clips import METRES, amc_frame, write_clip
+from cmu_clips import amc_frame, write_clip
 from scipy.spatial.transform import Rotation
 
 from snug.body import Body
 from snug.formats.asf_amc import read_amc, read_asf
-from snug.formats.retarget import CMU_RATE, GLITCH, JOINT_BONES, LIMBS, read_asf_amc, repair
-from snug.motion_files import load_motions
-from snug.skeleton import JOINT, global_rotations, joint_positions, rotation_matrices, sole_points
+from snug.formats.retarget import CMU_RATE, JOINT_BONES, LIMBS, read_asf_amc
+from snug.motion import MotionError
+from snug.motion_files import load_motions, read_motion
+from snug.motion_options import Reading
+from snug.skeleton import JOINT, LEG_LENGTH, global_rotations, joint_positions, rotation_matrices, sole_points
 
 CLIPS = Path(os.environ.get("CMU_MOTIONS", Path(__file__).parents[2] / "shared/data/cmu"))
 
@@ -24,7 +26,7 @@ class TestRetargeting:
         return arm / np.linalg.norm(arm)
 
     def test_the_zero_pose_has_the_files_limb_directions(self, tmp_path):
-        motion = read_asf_amc(write_clip(tmp_path, [amc_frame(1)]))
+        motion = read_asf_amc(write_clip(tmp_path, [amc_frame(1)]), Reading())
         s, c = np.sin(np.radians(20)), np.cos(np.radians(20))
         expected = {
             "left_hip": (s, -c, 0),
@@ -47,7 +49,7 @@ class TestRetargeting:
             amc_frame(1, lfemur=(-90, 0, 0), rtibia=(60,), lradius=(90,)),
             amc_frame(2, lfemur=(0, 0, -20), rradius=(90,), lhumerus=(0, 0, 70)),
         ]
-        motion = read_asf_amc(write_clip(tmp_path, frames))
+        motion = read_asf_amc(write_clip(tmp_path, frames), Reading())
         assert self.limb(motion, "left_hip")[2] == pytest.approx(1.0, abs=0.01)
         assert self.limb(motion, "right_knee")[2] < -0.8  # the shin goes back
         assert self.limb(motion, "left_elbow")[2] > 0.8  # the forearm comes forward
@@ -59,40 +61,26 @@ class TestRetargeting:
 
     def test_root_path_is_scaled_to_our_legs(self, tmp_path):
         frames = [amc_frame(1), amc_frame(2, root=(0, 0, 10, 0, 0, 0))]
-        motion = read_asf_amc(write_clip(tmp_path, frames))
+        motion = read_asf_amc(write_clip(tmp_path, frames), Reading())
         step = motion.translations[1] - motion.translations[0]
-        np.testing.assert_allclose(step, [0, 0, 10 * METRES * 0.81 / (14.4 * METRES)], atol=1e-12)
+        np.testing.assert_allclose(step, [0, 0, 10 * LEG_LENGTH / 14.4], atol=1e-12)
         assert motion.fps == CMU_RATE
 
     def test_hands_are_damped(self, tmp_path):
-        motion = read_asf_amc(write_clip(tmp_path, [amc_frame(1, lhand=(50,))]))
+        motion = read_motion(write_clip(tmp_path, [amc_frame(1, lhand=(50,))]), Reading())
         assert np.linalg.norm(motion.poses[0, JOINT["left_wrist"]]) == pytest.approx(np.radians(5))
 
 
-class TestGlitches:
-    def test_a_spike_is_bridged_and_named(self, tmp_path):
-        angles = np.linspace(0, 30, 61)
-        angles[30] = 150
-        frames = [amc_frame(k + 1, rradius=(a,)) for k, a in enumerate(angles)]
-        motion = read_asf_amc(write_clip(tmp_path, frames))
-        assert "rradius in frames 28-34" in motion.source
-        turned = np.linalg.norm(motion.poses[:, JOINT["right_elbow"]], axis=1)
-        np.testing.assert_allclose(np.degrees(turned), np.linspace(0, 30, 61), atol=1e-6)
-
-    def test_fast_but_human_turning_is_left_alone(self):
-        time = np.arange(120) / CMU_RATE
-        turned = rotation_matrices(np.outer(0.5 * np.sin(40 * time), [0, 1, 0]))  # 20 rad/s
-        copy = turned.copy()
-        assert repair(turned, CMU_RATE) == []
-        np.testing.assert_array_equal(turned, copy)
-
-    @pytest.mark.parametrize("at", [0, 1, 58, 59])
-    def test_a_spike_at_an_end_is_held(self, at):
-        turned = np.tile(np.eye(3), (60, 1, 1))
-        turned[at] = rotation_matrices(np.array([0.0, 2.0, 0.0]))
-        assert len(repair(turned, CMU_RATE)) == 1
-        np.testing.assert_allclose(turned, np.tile(np.eye(3), (60, 1, 1)), atol=1e-12)
-        assert 2.0 * CMU_RATE > GLITCH
+def test_a_spike_of_a_bone_is_bridged_and_named(tmp_path):
+    angles = np.linspace(0, 30, 61)
+    angles[30] = 150
+    clip = write_clip(tmp_path, [amc_frame(k + 1, rradius=(a,)) for k, a in enumerate(angles)])
+    with pytest.raises(MotionError, match="right_elbow jumps in frames 28-32; give --repair"):
+        read_motion(clip, Reading())
+    motion = read_motion(clip, Reading(repair=True))
+    assert "repaired: right_elbow jumps in frames 28-32" in motion.source
+    turned = np.linalg.norm(motion.poses[:, JOINT["right_elbow"]], axis=1)
+    np.testing.assert_allclose(np.degrees(turned), np.linspace(0, 30, 61), atol=1e-6)
 
 
 @pytest.mark.skipif(not CLIPS.is_dir(), reason="no CMU clips here; set CMU_MOTIONS to a folder of them")
@@ -102,7 +90,7 @@ class TestRecordedClips:
         chosen = [p for p in CLIPS.iterdir() if p.suffix == ".asf" or p.stat().st_size < largest]
         for path in chosen:
             (tmp_path / path.name).symlink_to(path.resolve())
-        motions = {motion.name: motion for motion in load_motions(tmp_path)}
+        motions = {motion.name: motion for motion in load_motions(tmp_path, reading=Reading(repair=True))}
         assert len(motions) == sum(path.suffix == ".amc" for path in chosen)
         for motion in motions.values():
             assert motion.fps == 30.0
@@ -134,7 +122,7 @@ class TestRecordedClips:
             turned[bone.name] = (
                 (turned[bone.parent] if bone.parent else Rotation.identity()) * own * turn * own.inv()
             )
-        motion = read_asf_amc(CLIPS / f"{name}.amc")
+        motion = read_motion(CLIPS / f"{name}.amc", Reading(repair=True))
         positions = joint_positions(motion.poses, motion.translations, Body.load().joints())
         for near, far in LIMBS.items():
             limb = positions[:, JOINT[far]] - positions[:, JOINT[near]]

@@ -9,10 +9,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from misbehaving import interrupt_at
 
-from benchmarks import methods, run
+from benchmarks import methods, run, selection
 from benchmarks.methods import METHODS
 from benchmarks.plan import Motions, PlanError
 from benchmarks.presets import PRESETS
@@ -107,6 +108,8 @@ def test_the_list_names_every_scene_that_a_suite_has(preset, capsys):
         (["--motions", "empty.amc"], "empty.amc"),
         (["--motions", "broken.npz"], "broken.npz"),
         (["--motions", "folder"], "folder"),
+        (["--motions", "back.npz", "--motion-up", "z"], "on its back or side: it stands along y"),
+        (["--repair"], "say of which files by --motions"),
         (["--test-motions", "wlak"], "did you mean walk"),
         (["--seeds", "one"], "--seeds"),
         (["--seeds", "-1"], "--seeds"),
@@ -125,6 +128,7 @@ def test_the_list_names_every_scene_that_a_suite_has(preset, capsys):
 def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monkeypatch, capsys):
     (tmp_path / "empty.amc").write_text("")
     (tmp_path / "broken.npz").write_bytes(b"PK no zip")
+    np.savez(tmp_path / "back.npz", poses=np.zeros((3, 72)), trans=np.zeros((3, 3)), fps=30)
     (tmp_path / "folder").mkdir()
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "note.txt").write_text("mine")
@@ -154,6 +158,7 @@ def misbehaving(monkeypatch):
     wrong = {"module": "misbehaving", "options": {"how": "raise"}}
     entries = tuple(dataclasses.replace(m, **wrong) if m.name == "newton-1" else m for m in METHODS)
     monkeypatch.setattr(methods, "METHODS", entries)
+    monkeypatch.setattr(selection, "METHODS", entries)
 
 
 def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, capsys):

@@ -41,10 +41,10 @@ def test_an_energy_that_a_recipe_names_is_part_of_the_training(tmp_path, monkeyp
     assert not any(module.startswith("reference_sim") for module in network(plan).modules)
 
 
-def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path, monkeypatch):
+def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path):
     mesh = tmp_path / "cape.obj"
-    monkeypatch.setattr("benchmarks.scenes.GARMENT_SCENES", (GarmentScenes("cape", "", files=(str(mesh),)),))
-    schedule = Schedule(plan_of(tmp_path, motions=MOTIONS))
+    motions = dataclasses.replace(MOTIONS, worn=(GarmentScenes("cape", "", files=(str(mesh),)),))
+    schedule = Schedule(plan_of(tmp_path, motions=motions))
     with pytest.raises(ValueError, match=r"cape\.obj"):
         schedule.data("walk", "cape")
     seen = []

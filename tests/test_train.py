@@ -306,6 +306,12 @@ def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
     assert main(["--motions", str(tmp_path / "nowhere"), "-o", str(out)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "nowhere" in error and not out.exists()
+    assert main(["--repair", "-o", str(out)]) == 2
+    assert "say of which files by --motions" in capsys.readouterr().err
+    np.savez(tmp_path / "a.npz", poses=np.zeros((9, 72)), trans=np.zeros((9, 3)))
+    words = ["--motions", str(tmp_path), "--motion-fps", "30", "--hold-out", "b", "-o", str(out)]
+    assert main(words) == 2  # the motion itself was read
+    assert "--hold-out b: no such motion among a" in capsys.readouterr().err
     assert Recipe() == DEFAULT and isinstance(swaying(), Motion)
 
 

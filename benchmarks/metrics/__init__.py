@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from types import ModuleType
 
 from ..metric import Metric
-from ..registry import DeclarationError, by_name
+from ..registry import DeclarationError, by_name, load
 
 MODULES = (
     "energy",
+    "printed_bending",
     "excess",
     "curvature",
     "shape",
     "geometry",
+    "body",
     "optimality",
     "solver",
     "exact",
@@ -36,13 +37,12 @@ def names_of(chosen: Sequence[str] | None) -> tuple[str, ...]:
 @cache
 def modules() -> dict[str, ModuleType]:
     """Name -> module, of all there are; loads them."""
-    names = (*MODULES, *WHERE_NAMED)
-    return {name: importlib.import_module(f"{__name__}.{name}") for name in names}
+    return {name: load(f"{__name__}.{name}") for name in (*MODULES, *WHERE_NAMED)}
 
 
 @cache
-def declared() -> dict[str, Metric]:
-    """Name -> metric, of all modules, and of microbenchmarks. Raises DeclarationError."""
+def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
+    """Name -> metric, of all modules, of microbenchmarks, and of modules outside. Raises DeclarationError."""
     from ..performance.metrics import METRICS
 
     own: list[Metric] = []
@@ -53,18 +53,22 @@ def declared() -> dict[str, Metric]:
     for metric in own:
         if not metric.unit:
             raise DeclarationError(f"metric '{metric.name}' has no unit: say 1 where it has no dimension")
-    return by_name("metric", (*own, *METRICS))
+    others = [replace(metric, declared_in=home) for home in outside for metric in load(home).METRICS]
+    return by_name("metric", (*own, *METRICS, *others))
 
 
-def find_metric(name: str) -> Metric:
-    """The declaration of a metric, also by a pattern such as "energy/*". Raises KeyError."""
-    metrics = declared()
+def find_metric(name: str, outside: tuple[str, ...] = ()) -> Metric:
+    """The declaration of a metric, also by a pattern such as "energy/*". Raises KeyError.
+
+    outside: modules, or paths of files, of metrics that are not the project's.
+    """
+    metrics = declared(outside)
     if name in metrics:
         return metrics[name]
     family, _, last = name.rpartition("/")
     metric = metrics.get(f"{family}/*")
     if metric is None:
         raise KeyError(
-            f"no module of benchmarks.metrics declares {name}: name it in METRICS of the one that measures it"
+            f"no module of metrics declares {name}: name it in METRICS of the one that measures it"
         )
     return replace(metric, name=name, title=metric.title.format(last.replace("_", " ").capitalize()))

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ..presets import PRESETS
-from ..registry import by_name
+from ..registry import DeclarationError, by_name
 from ..scene import Scene
 from .further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
 
@@ -105,8 +105,11 @@ GARMENT_SCENES = (
 
 
 def of_garment(garment: str, worn: tuple[GarmentScenes, ...] = GARMENT_SCENES) -> GarmentScenes:
-    """The scenes of that garment. Raises KeyError."""
-    return {scenes.garment: scenes for scenes in worn}[garment]
+    """The scenes of that garment. Raises DeclarationError."""
+    known = {scenes.garment: scenes for scenes in worn}
+    if garment not in known:
+        raise DeclarationError(f"no garment is called '{garment}'; there are {', '.join(known)}")
+    return known[garment]
 
 
 def all_scenes(

@@ -166,6 +166,8 @@ class RunCell(CellTask):
             "peak": peak,
             "terms": "+".join(scene.terms),
         }
+        if "declared_ms" in trajectory.provenance:
+            result["declared_ms"] = trajectory.provenance["declared_ms"]
         if cell.timed and not reading.complaint:
             if reading.seconds < self.least:
                 _, again, further = self.timed(method, self.least - reading.seconds)

@@ -41,12 +41,17 @@ class SettleStart(Task):
         write_body(run, scene)
         with replacing(run.start_path(scene.name)) as temporary:
             write_array(temporary, read_array(run.start_path(shared)) if shared else scene.start_state)
+        with replacing(run.rest_areas_path(scene.name)) as temporary:
+            write_array(temporary, scene.cloth.areas)
         context.tell(self.units)
         return Outcome(files=tuple(map(run.relative, self._paths(run))))
 
     def _paths(self, folder: RunFolder) -> tuple[Path, ...]:
         name = self.scene.name
-        return folder.start_path(name), folder.body_path(name), folder.trajectory_path(name, "body")
+        return (
+            folder.start_path(name), folder.body_path(name), folder.trajectory_path(name, "body"),
+            folder.rest_areas_path(name),
+        )  # fmt: skip
 
 
 def write_body(run: RunFolder, scene: BuiltScene) -> None:

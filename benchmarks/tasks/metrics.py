@@ -11,9 +11,10 @@ import numpy as np
 
 from ..metric import Estimate, RollOut, SceneRollOuts
 from ..metrics import find_metric, modules, names_of
+from ..registry import load
 from ..results import RunFolder, replacing
 from .cell import Cell, built
-from .task import Context, Outcome, Task, TaskId
+from .task import Context, Outcome, Task, TaskId, one_line
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -22,6 +23,7 @@ class MeasureCell(Task):
 
     cells: all of the scene, in the order of their roll-outs; those that `reads` names are compared with.
     quasi_static: the simulator's answer to poses held still; counterpart: the same method in another scene.
+    outside: modules of metrics that are not the project's, measured in every scene.
     """
 
     kind = "metrics"
@@ -32,6 +34,7 @@ class MeasureCell(Task):
     gap_samples: int
     quasi_static: TaskId | None = None
     counterpart: Cell | None = None
+    outside: tuple[str, ...] = ()
 
     def clear(self, folder: RunFolder) -> None:
         self.cell.curves(folder).unlink(missing_ok=True)
@@ -43,7 +46,7 @@ class MeasureCell(Task):
         roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
         if self.counterpart is not None and ("cell", self.counterpart.name) in needed:
             roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
-        metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics)
+        metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)
         path = self.cell.curves(folder)
         write_curves(path, curves, roll_out.trajectory.frames)
         context.tell(self.units)
@@ -71,24 +74,31 @@ class MeasureCell(Task):
 
 
 def measured(
-    roll_out: RollOut, chosen: Sequence[str] | None = None
+    roll_out: RollOut, chosen: Sequence[str] | None = None, outside: tuple[str, ...] = ()
 ) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
-    """Metrics and curves of a roll-out by all modules that apply, or by those chosen; and status and reason
-    where one of them says that it has failed. Empty where no frame is left after the warm-up.
+    """Metrics and curves of a roll-out by all modules that apply, or by those chosen, and by those outside;
+    and status and reason where one of them says that it has failed. Empty where no frame is left after the
+    warm-up.
     """
     metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}
     ended = ("ok", "")
     judged = len(roll_out.positions) > roll_out.scene.warm_up
-    for module in (modules()[name] for name in names_of(chosen) if judged):
-        suites = getattr(module, "SUITES", roll_out.suites)
-        if any(suite in suites for suite in roll_out.suites):
-            values = module.measure(roll_out)
-            if hasattr(module, "compare"):
-                values |= compared(roll_out, module.compare)
-            metrics |= {find_metric(name).name: value for name, value in values.items()}
-            curves |= module.series(roll_out) if hasattr(module, "series") else {}
-            ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
+    for name in (*names_of(chosen), *outside) if judged else ():
+        try:
+            module = load(name) if name in outside else modules()[name]
+            suites = getattr(module, "SUITES", roll_out.suites)
+            if any(suite in suites for suite in roll_out.suites):
+                values = module.measure(roll_out)
+                if hasattr(module, "compare"):
+                    values |= compared(roll_out, module.compare)
+                metrics |= {find_metric(metric, outside).name: value for metric, value in values.items()}
+                curves |= module.series(roll_out) if hasattr(module, "series") else {}
+                ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
+        except Exception as error:
+            if name in outside:
+                raise RuntimeError(f"{name}: {one_line(error)}") from error
+            raise
     return metrics, curves, ended
 
 

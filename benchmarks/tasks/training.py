@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..registry import load
 from ..results import RunFolder, model_path
 from ..source import digest
 from .task import Context, Outcome, Task, TaskId
@@ -22,10 +23,11 @@ CHECKPOINT_MINUTES = 5.0  # between two checkpoints: a training of preset quick 
 class TrainNetwork(Task):
     """A network, or an untrained one, in the folder of its garment's networks.
 
-    training: its name in snug.recipes.TRAININGS, or "untrained"; chosen: what stands there. motions: what it
-    learns from; simulated: motion -> the task that simulates it, where it learns from simulations. device:
-    cpu or cuda, for every part of a step. key: with equal simulations, a training of the same key that was
-    killed goes on from its last checkpoint, and ends as it would have.
+    training: its name; chosen: how it is trained, None: not at all; home: what has to be loaded before, as
+    the file that declares an energy of its recipe. motions: what it learns from; simulated: motion -> the
+    task that simulates it, where it learns from simulations. device: cpu or cuda, for every part of a step.
+    key: with equal simulations, a training of the same key that was killed goes on from its last checkpoint,
+    and ends as it would have.
     """
 
     kind = "network"
@@ -34,6 +36,7 @@ class TrainNetwork(Task):
     unit = "step"
     training: str
     chosen: Training | None
+    home: str = ""
     seed: int
     garment: str
     steps: int
@@ -57,6 +60,8 @@ class TrainNetwork(Task):
         from snug.training_run import Saving
 
         torch.set_num_threads(1)
+        if self.home:
+            load(self.home)
         assets, run = context.assets, context.folder
         assert assets is not None
         path = self.path(run)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from snug.recipe import DEFAULT
 
 from ..method import MethodEntry
+from ..registry import load
 from ..results import Row
 from .task import Context, Outcome, Task, TaskId, one_line
 from .training import TrainNetwork
@@ -49,6 +50,8 @@ class CompareWindows(Task):
 
         training, assets = self.training, context.assets
         assert assets is not None
+        if training.home:
+            load(training.home)
         model = TrainedModel.load(training.path(context.folder))
         how = find_kind(model.kind)
         context.tell(self.units)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from snug.motion import MotionError
+from snug.recording import check_length, open_text
 
 INCH = 0.0254  # [m]
 _ROTATIONS = ("rx", "ry", "rz")
@@ -43,7 +44,7 @@ class Skeleton:
     degrees: bool = True
 
 
-@dataclass
+@dataclass(slots=True)
 class _Line:
     """One line of a file: its words, and where it stands for messages."""
 
@@ -122,6 +123,7 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
             frames[-1][word] = values
     if not frames:
         raise MotionError(f"{path}: holds no frame; give a whole .amc file")
+    check_length(path, len(frames))
     _check_whole(lines[-1], frames, moving)
     channels = {}
     for name in moving:
@@ -145,11 +147,7 @@ def turns(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
 
 
 def _lines(path: Path) -> list[_Line]:
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as problem:
-        raise MotionError(f"{path}: cannot be read ({problem.strerror}); check the path") from None
-    numbered = ((number, line.split("#")[0].split()) for number, line in enumerate(text.splitlines(), 1))
+    numbered = ((number, line.split("#")[0].split()) for number, line in enumerate(open_text(path), 1))
     lines = [_Line(path, number, words) for number, words in numbered if words]
     if not lines:
         raise MotionError(f"{path}: the file is empty; fetch it again")
@@ -201,13 +199,15 @@ def _bones(lines: list[_Line], skeleton: Skeleton) -> dict[str, Bone]:
         if word == "begin":
             bone = Bone("")
         elif word == "name" and len(line.words) > 1:
+            if bone.name or line.words[1] in bones:
+                raise line.error(f"second name, or bone: '{line.words[1]}'; is a 'begin' missing?")
             bone.name = line.words[1]
             bones[bone.name] = bone
         elif word == "direction":
             bone.direction = np.array(line.numbers(1, 4))
             norm = float(np.linalg.norm(bone.direction))
-            if norm == 0.0:
-                raise line.error("a bone's direction cannot be zero")
+            if not 1e-6 < norm < 1e6:
+                raise line.error("a bone's direction cannot be zero, nor so long")
             bone.direction /= norm
         elif word == "length":
             bone.length = line.numbers(1, 2)[0] * skeleton.metres

@@ -1,4 +1,4 @@
-"""From an Acclaim skeleton's motion to ours: same limb directions, same hinge axes, glitches repaired.
+"""From an Acclaim skeleton's motion to ours: same limb directions, same hinge axes.
 
 Our joint j is driven by bone b: G_j = G_b A_j, where A_j turns our rest pose's limb into the bone's zero
 pose. A limb's far end then points along G_b A_j t_j = G_b d_b, the recorded direction.
@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from snug.formats.asf_amc import Skeleton, read_amc, read_asf, turns
-from snug.motion import Motion, MotionError
+from snug.motion import MotionError
+from snug.motion_options import Reading
+from snug.recording import Recording, rate
 from snug.skeleton import JOINT, JOINT_NAMES, LEG_LENGTH, PARENTS, REST_JOINTS, axis_angles, rotation_matrices
 
 CMU_RATE = 120.0  # [1/s] the .amc format has no field for it
@@ -36,19 +38,10 @@ _HINGES = {
     "left_shoulder": ("left_elbow", (0, -1, 0)), "left_elbow": ("left_elbow", (0, -1, 0)),
     "right_shoulder": ("right_elbow", (0, 1, 0)), "right_elbow": ("right_elbow", (0, 1, 0)),
 }  # fmt: skip
-# As the authors of SNUG did: recorded hands are noisy and drive nothing.
-HAND_DAMPING = 0.1
-# 30 degrees in 1/120 s: twice the fastest joint of a kick or a sprint. A swapped or lost marker does it.
-GLITCH = np.deg2rad(30.0) * 120.0  # [rad/s]
-GLITCH_SECONDS = 0.25  # two jumps closer than this bound one glitch
-GLITCH_MARGIN = 2  # frames on either side of a jump that are not trusted
 
 
-def read_asf_amc(path: Path, *, fps: float = CMU_RATE) -> Motion:
-    """One .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf) -> Motion, y up, in metres.
-
-    Glitches are repaired and named in the motion's source. Raises MotionError.
-    """
+def read_asf_amc(path: Path, reading: Reading) -> Recording:
+    """One .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf). Raises MotionError."""
     stem = path.stem
     names = (stem, stem.split("_")[0])
     candidates = [path.with_name(name + end) for name in names for end in (".asf", ".ASF")]
@@ -56,16 +49,17 @@ def read_asf_amc(path: Path, *, fps: float = CMU_RATE) -> Motion:
     if skeleton_file is None:
         raise MotionError(f"{path}: its skeleton {stem.split('_')[0]}.asf is missing; put it beside the clip")
     skeleton = read_asf(skeleton_file)
-    channels = read_amc(path, skeleton)
-    poses, translations, repairs = retarget(skeleton, channels, skeleton_file, fps)
-    source = "; ".join([f"{path.name} with {skeleton_file.name}", *repairs])
-    return Motion(stem, poses, translations, fps, "recorded", source)
+    poses, translations = retarget(skeleton, read_amc(path, skeleton), skeleton_file)
+    return Recording(
+        path=path, poses=poses, translations=translations, fps=rate(path, None, reading, CMU_RATE),
+        source=f"{path.name} with {skeleton_file.name}",
+    )  # fmt: skip
 
 
 def retarget(
-    skeleton: Skeleton, channels: dict[str, np.ndarray], skeleton_file: Path, fps: float
-) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """-> poses (T, 24, 3) [rad], translations (T, 3) [m], a line for every repaired glitch.
+    skeleton: Skeleton, channels: dict[str, np.ndarray], skeleton_file: Path
+) -> tuple[np.ndarray, np.ndarray]:
+    """-> poses (T, 24, 3) [rad], translations (T, 3) [m] in the axes of the file.
 
     Translations are scaled by the ratio of leg lengths, so that steps and legs agree.
     Raises MotionError when the skeleton lacks a bone that drives a joint.
@@ -75,39 +69,30 @@ def retarget(
         raise MotionError(
             f"{skeleton_file}: no bone '{missing[0]}'; only skeletons with CMU's bone names are read"
         )
+    leg = skeleton.bones["lfemur"].length + skeleton.bones["ltibia"].length
+    if leg <= 0.0:
+        raise MotionError(f"{skeleton_file}: the left leg has no length; fetch the skeleton again")
     frames = len(channels["root"])
-    local = {name: local_turns(skeleton, channels, name, frames) for name in skeleton.bones}
-    repairs = []
-    for name in _driving(skeleton):
-        spans = [f"{first}-{last}" for first, last in repair(local[name], fps)]
-        if spans:
-            more = f" and {len(spans) - 5} more" if len(spans) > 5 else ""
-            repairs.append(f"repaired jumps of {name} in frames {', '.join(spans[:5])}{more}")
-    turned = world_turns(skeleton, local)
+    turned = world_turns(
+        skeleton, {name: local_turns(skeleton, channels, name, frames) for name in skeleton.bones}
+    )
     rotations = np.empty((frames, 24, 3, 3))
     for joint, name in enumerate(JOINT_NAMES):
-        rotations[:, joint] = turned[JOINT_BONES[name]] @ alignment(skeleton, name)
+        turn = alignment(skeleton, name)
+        if not np.isfinite(turn).all():
+            bone = JOINT_BONES[name]
+            raise MotionError(f"{skeleton_file}: bone '{bone}' lies along its own hinge; fetch it again")
+        rotations[:, joint] = turned[JOINT_BONES[name]] @ turn
+    return relative_poses(rotations), LEG_LENGTH / leg * root_positions(skeleton, channels)
+
+
+def relative_poses(rotations: np.ndarray) -> np.ndarray:
+    """Rotations of our joints in the world (T, 24, 3, 3) -> relative to their parents (T, 24, 3) [rad]."""
     relative = rotations.copy()
     for joint, parent in enumerate(PARENTS):
         if parent >= 0:
             relative[:, joint] = np.swapaxes(rotations[:, parent], -1, -2) @ rotations[:, joint]
-    poses = axis_angles(relative)
-    for name in ("left_wrist", "right_wrist", "left_hand", "right_hand"):
-        poses[:, JOINT[name]] *= HAND_DAMPING
-    leg = skeleton.bones["lfemur"].length + skeleton.bones["ltibia"].length
-    if leg <= 0.0:
-        raise MotionError(f"{skeleton_file}: the left leg has no length; fetch the skeleton again")
-    return poses, LEG_LENGTH / leg * root_positions(skeleton, channels), repairs
-
-
-def _driving(skeleton: Skeleton) -> list[str]:
-    """The bones that drive a joint of ours, with the half bones above them, parents first."""
-    wanted = set()
-    for name in JOINT_BONES.values():
-        while name:
-            wanted.add(name)
-            name = skeleton.bones[name].parent
-    return [name for name in skeleton.bones if name in wanted]
+    return axis_angles(relative)
 
 
 def local_turns(skeleton: Skeleton, channels: dict[str, np.ndarray], name: str, frames: int) -> np.ndarray:
@@ -145,10 +130,7 @@ def alignment(skeleton: Skeleton, joint: str) -> np.ndarray:
     if joint.endswith(("wrist", "hand")):
         return alignment(skeleton, f"{side}_elbow")
     if joint.endswith(("ankle", "foot")):
-        ours = REST_JOINTS[JOINT[f"{side}_foot"]] - REST_JOINTS[JOINT[f"{side}_ankle"]]
-        theirs = skeleton.bones[JOINT_BONES[f"{side}_ankle"]].direction
-        yaw = np.arctan2(theirs[0], theirs[2]) - np.arctan2(ours[0], ours[2])
-        return rotation_matrices(np.array([0.0, yaw, 0.0]))
+        return foot_alignment(side, skeleton.bones[JOINT_BONES[f"{side}_ankle"]].direction)
     if joint not in LIMBS:
         return np.eye(3)
     limb = REST_JOINTS[JOINT[LIMBS[joint]]] - REST_JOINTS[JOINT[joint]]
@@ -158,45 +140,16 @@ def alignment(skeleton: Skeleton, joint: str) -> np.ndarray:
     return _frame(direction, hinge_axis) @ _frame(limb, np.array(hinge, dtype=float)).T
 
 
+def foot_alignment(side: str, theirs: np.ndarray) -> np.ndarray:
+    """The turn about the vertical of our resting foot to one along theirs (3,), y up. -> (3, 3)."""
+    ours = REST_JOINTS[JOINT[f"{side}_foot"]] - REST_JOINTS[JOINT[f"{side}_ankle"]]
+    yaw = np.arctan2(theirs[0], theirs[2]) - np.arctan2(ours[0], ours[2])
+    return rotation_matrices(np.array([0.0, yaw, 0.0]))
+
+
 def _frame(along: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     """Orthonormal columns: along, the part of hinge across it, and their cross product."""
     first = along / np.linalg.norm(along)
     second = hinge - first * (first @ hinge)
     second /= np.linalg.norm(second)
     return np.stack((first, second, np.cross(first, second)), axis=1)
-
-
-def repair(turned: np.ndarray, fps: float) -> list[tuple[int, int]]:
-    """Replace glitches of one bone, in place, by the shortest arc between the good frames around them.
-
-    turned: (T, 3, 3). A glitch is a jump faster than GLITCH, or all between two such jumps in quick
-    succession. -> its (first, last) frames, counted from 1 as in the file.
-    """
-    steps = np.linalg.norm(axis_angles(np.swapaxes(turned[:-1], -1, -2) @ turned[1:]), axis=-1)
-    jumps = np.flatnonzero(steps * fps > GLITCH)
-    runs: list[list[int]] = []
-    for jump in jumps:
-        if runs and jump - runs[-1][1] <= GLITCH_SECONDS * fps:
-            runs[-1][1] = int(jump)
-        else:
-            runs.append([int(jump), int(jump)])
-    spans = []
-    for first_jump, last_jump in runs:
-        # Jump k is between frames k and k + 1; `before` and `after` are the frames still trusted.
-        before, after = first_jump - GLITCH_MARGIN, last_jump + 1 + GLITCH_MARGIN
-        if before < 0 or after >= len(turned):
-            _hold(turned, before, after)
-        else:
-            arc = axis_angles(turned[before].T @ turned[after])
-            share = np.linspace(0.0, 1.0, after - before + 1)[:, None]
-            turned[before : after + 1] = turned[before] @ rotation_matrices(share * arc)
-        spans.append((max(before, 0) + 1, min(after, len(turned) - 1) + 1))
-    return spans
-
-
-def _hold(turned: np.ndarray, before: int, after: int) -> None:
-    """A glitch at an end of the clip: hold the nearest trusted frame, if there is one."""
-    if before >= 0:
-        turned[before:] = turned[before]
-    elif after < len(turned):
-        turned[:after] = turned[after]

@@ -1,0 +1,94 @@
+"""python -m benchmarks.export: a scene as plain files, to be simulated elsewhere and scored here."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .one_scene import plan_of_scene, words_of_scene
+from .plan import Plan, PlanError
+from .run_options import Parser, add_scene_options
+from .timing import one_thread
+
+if TYPE_CHECKING:
+    from .assets import Assets
+    from .scene import BuiltScene
+
+PROGRAM = "benchmarks.export"
+EXAMPLES = """examples:
+  python -m benchmarks.export tshirt/kick -o kick
+  python -m benchmarks.export hanging_sheet --preset smoke -o sheet --reference
+  python -m benchmarks.export tshirt/01_01 --motions clips/ --test-motions 01_01 --body mine.npz -o out
+  python -m benchmarks.score mine.npz --scene tshirt/kick        what came of it, judged
+
+The folder's README.txt says what each file holds: units, axes, order of vertices.
+exit status: 0 written; 2 the scene is not known or cannot be made, or the folder is not empty: one line says
+  why and nothing is written; 130 interrupted."""
+
+
+def make_export_parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    parser = Parser(
+        prog=f"python -m {PROGRAM}",
+        description="Write a scene as plain files: rest mesh, weights, material, motion, posed body, start.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add("scene", metavar="SCENE", help="as in benchmarks.run --list")
+    add("-o", "--out", required=True, metavar="DIR", help="a new or empty folder")
+    add("--reference", action="store_true", help="simulate the scene, and write the trajectory too")
+    add_scene_options(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    one_thread()
+    try:
+        options = make_export_parser().parse_args(words)
+        folder = Path(options.out)
+        if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+            raise PlanError(f"--out {folder}: is there already; name a new folder")
+        plan = plan_of(options)
+        scene, assets = built(plan)
+        from .export_files import write_scene
+
+        chosen = ["--scene", options.scene, *words_of_scene(options)]
+        command = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
+        write_scene(folder, plan, scene, assets, score=command, reference=options.reference)
+    except (ValueError, RuntimeError) as error:
+        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"{PROGRAM}: interrupted; nothing was written", file=sys.stderr)
+        return 130
+    print(f"{scene.name}: {scene.frames} frames of {scene.cloth.vertex_count} vertices in {folder}")
+    return 0
+
+
+def plan_of(options: argparse.Namespace) -> Plan:
+    """A plan of that scene and its simulation alone. Raises ValueError, one line."""
+    # Nobody simulates scenes for networks alone: the network is there to find them, and taken out again.
+    plan = plan_of_scene(options, options.scene, ["simulation", "untrained", "snug"])
+    first = plan.cells[0]
+    return replace(plan, cells=(replace(first, entry=replace(first.entry, trained=None)),))
+
+
+def built(plan: Plan) -> tuple[BuiltScene, Assets | None]:
+    """The scene of the plan, made. Raises ValueError where a garment or a motion cannot be."""
+    from .execution import assets_of
+
+    assets = assets_of(plan) if plan.garments else None
+    return plan.scenes[0].build(assets), assets
+
+
+if __name__ == "__main__":
+    sys.exit(main())

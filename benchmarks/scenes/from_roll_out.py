@@ -1,0 +1,73 @@
+"""A scene that a roll-out brings itself: its cloth at rest from a mesh, the body that it moves on, its start.
+
+So the pickles of HOOD and ContourCraft are judged, which name neither a motion nor a garment of this project.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference_sim import Cloth, Material, MeshError, Obstacle
+from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
+from reference_sim.mesh_io import read_mesh, to_metres_y_up
+
+from ..roll_out_files import StoredRollOut, read_roll_out
+from ..roll_out_option import RollOutError, RollOutOption, digest_of
+from ..scene import BuiltScene, Scene
+
+FPS = 30.0  # where neither the file nor the user says another rate
+FEWEST = 4  # frames: two are not judged, and a mean is of more than one
+
+
+def declared(option: RollOutOption, rest_mesh: str) -> Scene:
+    """The scene of that roll-out. Raises RollOutError for a file that cannot be read."""
+    stated = option.stated
+    return Scene(
+        name=f"file/{option.name}",
+        description=f"the cloth and the body of {option.name}'s own roll-out",
+        module=__name__,
+        options={
+            "path": option.path, "rest_mesh": rest_mesh, "units": stated.units, "up": stated.up,
+            "fps": stated.fps, "digests": (digest_of(option.path), digest_of(rest_mesh)),
+        },
+        obstacle=read_roll_out(option.path).obstacle_faces is not None,
+    )  # fmt: skip
+
+
+def build(
+    scene: Scene, assets: object = None, *, path: str, rest_mesh: str, units: str, up: str, fps: float | None,
+    digests: tuple[str, str],
+) -> BuiltScene:  # fmt: skip
+    """The built scene; it starts at rest in the file's first frame. Raises RollOutError."""
+    stored = read_roll_out(path)
+    positions = to_metres_y_up(stored.positions, units=units, up=up)
+    if len(positions) < FEWEST:
+        raise RollOutError(f"{path}: {len(positions)} frames; at least {FEWEST} are needed")
+    try:
+        rest = read_mesh(rest_mesh)
+        if len(rest.positions) != positions.shape[1]:
+            raise RollOutError(
+                f"{rest_mesh}: {len(rest.positions)} vertices, {path} has {positions.shape[1]}: give the "
+                "mesh that the roll-out was made with"
+            )
+        cloth = Cloth(to_metres_y_up(rest.positions, units=units, up=up), rest.faces, Material())
+        obstacle = _obstacle(stored, units, up)
+    except MeshError as error:
+        raise RollOutError(f"{path} with {rest_mesh}: {error}") from None
+    energies: list[Energy] = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
+    return BuiltScene(
+        name=scene.name,
+        cloth=cloth,
+        energies=(*energies, *([] if obstacle is None else [ContactPenalty(cloth)])),
+        dt=1.0 / (fps or stored.fps or FPS),
+        frames=len(positions),
+        settle=lambda: np.ascontiguousarray(positions[0]),
+        obstacle=obstacle,
+    )
+
+
+def _obstacle(stored: StoredRollOut, units: str, up: str) -> Obstacle | None:
+    """What the file says that the cloth touches; cloth may touch all of it."""
+    if stored.obstacle is None or stored.obstacle_faces is None:
+        return None
+    return Obstacle(to_metres_y_up(stored.obstacle, units=units, up=up), stored.obstacle_faces)

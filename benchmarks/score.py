@@ -1,0 +1,169 @@
+"""python -m benchmarks.score: judge a roll-out that another program has written, in a scene of this project.
+
+A thin command: the roll-out is a method of an ordinary run, beside the simulation of the same scene.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from .one_scene import plan_of_scene
+from .plan import Plan
+from .results import RunFolder
+from .roll_out_option import RollOutOption, Stated, checked_ms
+from .run import carry_out
+from .run_options import Parser, add_scene_options
+from .selection import stored_cells
+from .tasks.cell import Cell
+from .timing import one_thread
+
+PROGRAM = "benchmarks.score"
+JUDGED_BY_STEP = "speed"  # the suite in which steps are solved again: gaps and one-step errors
+ANY_SCENE = "hanging_sheet"  # whose place the scene of a file takes
+NO_REFERENCE = "left out by --no-reference: curvature error and histogram, distances, dynamics, relative gap"
+EXAMPLES = """examples:
+  python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
+  python -m benchmarks.score mine.npz --scene tshirt/kick -o scored
+  python -m benchmarks.score mine.pc2 --scene tshirt/kick --units cm --up z --match-vertices
+  python -m benchmarks.score frames/ --scene hanging_sheet --fps 60 --declared-ms 2.2
+  python -m benchmarks.score 'out/cloth_*.obj' --scene flag --reference simulated.vtkhdf
+  python -m benchmarks.score pred.pkl --rest-mesh shirt.obj --no-reference      cloth and body of a pickle
+
+ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi_static; .pkl with pred,
+  cloth_faces, obstacle, obstacle_faces; .pc2 and .pc16 with their .obj; a folder or a quoted pattern of
+  meshes, one a frame. In world coordinates, the scene's first frame first. Other units, axes, rates and
+  orders of vertices are refused with the option that mends them.
+
+exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cannot be read or does not belong
+  to the scene: one line says why and nothing is written; 130 interrupted."""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    parser = Parser(
+        prog=f"python -m {PROGRAM}",
+        description="Energies, gap to the minimum of each step, curvature, depth, conservation, dynamics of "
+        "a roll-out of another program: rows, a report, one line.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add("roll_out", metavar="ROLLOUT", help="file, folder or pattern")
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--scene", metavar="NAME", help="as in benchmarks.run --list")
+    where.add_argument("--rest-mesh", metavar="FILE",
+        help="no scene of this project: the cloth at rest, in the roll-out's unit, axes and order; the file "
+        "brings its own body (obstacle, obstacle_faces) and starts at rest in its first frame")  # fmt: skip
+    add_scene_options(parser)
+    add("--name", default="", metavar="NAME", help="of the method in tables (default: the file's)")
+    add("--units", default="m", metavar="m|cm|mm|in", help="of the roll-out (default m)")
+    add("--up", default="y", metavar="y|z", help="its up axis (default y)")
+    add("--fps", type=float, metavar="N", help="its frames per second; other than the scene's are re-timed")
+    add("--match-vertices", action="store_true", help="its vertices are the scene's in another order")
+    add("--declared-ms", type=float, metavar="X",
+        help="milliseconds a frame, as its author says: marked so, nothing is timed here")  # fmt: skip
+    reference = parser.add_mutually_exclusive_group()
+    reference.add_argument("--reference", metavar="FILE",
+        help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
+    reference.add_argument("--no-reference", action="store_true", help="leave out what needs a reference")
+    add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    one_thread()
+    try:
+        options = make_parser().parse_args(words)
+        plan = make_plan(options, words)
+    except ValueError as error:
+        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    with contextlib.redirect_stdout(sys.stderr):
+        status = carry_out(plan, program=PROGRAM)
+    if status in (0, 1):
+        print(summary(plan))
+    return status
+
+
+def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
+    """A run of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
+    stated = Stated(options.units, options.up, options.fps, options.match_vertices)
+    name = options.name or f"{Path(options.roll_out.rstrip('/')).stem.strip('*_-. ') or 'roll-out'}"
+    option = RollOutOption(name, options.roll_out, stated, checked_ms(options.declared_ms))
+    plan = plan_of_scene(options, options.scene or ANY_SCENE, ["simulation"], out=options.out)
+    if options.rest_mesh:
+        plan, option = _of_file(plan, option, options.rest_mesh)
+    cells = [_with_steps(_reference(cell, options)) for cell in plan.cells]
+    return replace(
+        plan,
+        cells=(*cells, *stored_cells((option,), cells)),
+        suites=tuple(dict.fromkeys((*plan.suites, JUDGED_BY_STEP))),
+        command=shlex.join(["python", "-m", PROGRAM, *words]),
+    )
+
+
+def _of_file(plan: Plan, option: RollOutOption, rest_mesh: str) -> tuple[Plan, RollOutOption]:
+    """The plan with the scene that the roll-out brings in place of another; what is said of the file has then
+    been said of the scene, but for unit and axis.
+    """
+    from .scenes.from_roll_out import declared
+
+    scene = declared(option, rest_mesh)
+    cells = tuple(replace(cell, scene=scene, suites=(JUDGED_BY_STEP,)) for cell in plan.cells)
+    same_rate = replace(option.stated, fps=None)
+    return replace(plan, cells=cells), replace(option, stated=same_rate)
+
+
+def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
+    """The simulation's cell, or what takes its place."""
+    if options.no_reference:
+        return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
+    if options.reference is None:
+        return cell
+    from .methods.stored_roll_out import entry_of
+
+    stored = RollOutOption("reference", options.reference, Stated(), role="reference")
+    entry = entry_of(stored, cell.scene.name)
+    assert entry is not None
+    return replace(cell, entry=replace(entry, label="Reference, from a file"))
+
+
+def _with_steps(cell: Cell) -> Cell:
+    return replace(cell, suites=tuple(dict.fromkeys((*cell.suites, JUDGED_BY_STEP))))
+
+
+SHOWN = (
+    ("energy/total", "total", "J"),
+    ("energy/strain", "strain", "J"),
+    ("energy/bending", "bending", "J"),
+    ("energy/bending_printed", "bending as printed", "J"),
+    ("gap/energy", "gap", "J"),
+    ("curvature/mean", "curvature", "1/m"),
+    ("curvature/error", "curvature error", "1/m"),
+    ("penetration/vertices", "below the skin", "%"),
+    ("distance/rms", "distance", "mm"),
+)
+
+
+def summary(plan: Plan) -> str:
+    """One line of what came out, and where the rest is."""
+    folder, name = RunFolder(plan.folder), plan.cells[-1].method
+    rows = [row for row in folder.read_rows() if row.method == name]
+    values = {row.metric: row.value for row in rows if row.value is not None}
+    shown = [f"{word} {values[metric]:.4g} {unit}" for metric, word, unit in SHOWN if metric in values]
+    bad = next((f"{row.status}: {row.reason}" for row in rows if row.status != "ok"), "")
+    found = ", ".join(filter(None, (bad, *shown)))
+    return f"{name} in {plan.scenes[0].name}: {found}; {folder.report_path}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

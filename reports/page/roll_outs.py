@@ -1,0 +1,177 @@
+"""The roll-outs that the page carries: cloths, their colours and curves, and a coarser body."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.results import RunFolder
+from reports.data import Run
+from reports.page.choice import groups
+from reports.page.pack import Pack
+from reports.page.vertex_values import area_change, depth, distance, mean_curvature
+
+if TYPE_CHECKING:
+    from reference_sim.trajectory import Trajectory
+
+SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one
+BLOCK = 32  # frames at a time, to bound memory
+ROOM = 1500  # bytes beside a text: its tags, and what the content says of it
+NOTE = 400  # bytes to say that roll-outs of a scene were left out
+Reader = Callable[[Path], "Trajectory | None"]
+
+
+@dataclass
+class Embedded:
+    """scenes: scene -> its body and methods, each the id of a text and what lies in it. texts: id -> text.
+    missing: scene -> how many roll-outs did not fit.
+    """
+
+    scenes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+    missing: dict[str, int] = field(default_factory=dict)
+
+    def left_out(self, rule: str) -> str:
+        """How many roll-outs are there, by what rule, and which are not."""
+        have = sum(len(scene["methods"]) for scene in self.scenes.values())
+        lack = sum(self.missing.values())
+        if not lack:
+            return f"All {have} roll-outs that this run kept can be shown: the first seed of each method."
+        names = ", ".join(f"{scene} ({count})" for scene, count in self.missing.items())
+        return (
+            f"{have} of {have + lack} roll-outs can be shown: {rule}. Left out for size, by scene: {names}."
+        )
+
+
+def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
+    """Roll-outs in the order of groups() until the next would exceed the budget [bytes].
+
+    read: gives the trajectory of a file, None where there is none to be had.
+    """
+    found, references = Embedded(), {}
+    wanted = list(groups(folder, run))
+    budget -= NOTE * len(wanted)
+    for group in wanted:
+        if found.missing:
+            found.missing[group.scene] = found.missing.get(group.scene, 0) + len(group.paths)
+            continue
+        read_ones = {method: read(path) for method, path in group.paths.items()}
+        whole = {method: _finite(cloth) for method, cloth in read_ones.items() if cloth is not None}
+        cloths = {method: cloth for method, cloth in whole.items() if cloth.frames}
+        if run.reference in cloths:
+            references[group.scene] = cloths[run.reference]
+        body = read(folder.trajectory_path(group.scene, "body"))
+        depths = _depths(cloths, body) if body else {}
+        rest = _rest_areas(folder.rest_areas_path(group.scene))
+        for method, cloth in cloths.items():
+            scene = dict(found.scenes.get(group.scene) or {"body": None, "methods": {}})
+            texts: dict[str, str] = {}
+            if body and scene["body"] is None:
+                scene["body"] = _kept(texts, _body(body))
+            pack = _cloth(cloth, rest, references.get(group.scene), depths.get(method), run.metrics)
+            scene["methods"] = {**scene["methods"], method: _kept(texts, pack) | {"ending": _ending(cloth)}}
+            new = {name: text for name, text in texts.items() if name not in found.texts}
+            budget -= sum(ROOM + len(text) for text in new.values())
+            if budget < 0:
+                found.missing[group.scene] = found.missing.get(group.scene, 0) + 1
+            else:
+                found.texts |= new
+                found.scenes[group.scene] = scene
+    return found
+
+
+def _kept(texts: dict[str, str], pack: Pack) -> dict[str, Any]:
+    """Where it lies; what is the same, as the body of two garments in one motion, is kept once."""
+    text = pack.text()
+    name = "b" + hashlib.sha256(text.encode()).hexdigest()[:16]
+    texts[name] = text
+    return {"text": name, "arrays": pack.entries}
+
+
+def _finite(cloth: Trajectory) -> Trajectory:
+    """Its frames before the first that is not finite."""
+    whole = np.isfinite(cloth.positions).all(axis=(1, 2))
+    if whole.all():
+        return cloth
+    end = int(np.argmin(whole))
+    fields = {name: values[:end] for name, values in cloth.frame_fields.items()}
+    return replace(
+        cloth, positions=cloth.positions[:end], times=cloth.times[:end],
+        frame_seconds=cloth.frame_seconds[:end], frame_fields=fields,
+    )  # fmt: skip
+
+
+def _ending(cloth: Trajectory) -> str:
+    """In words, of one that did not end well."""
+    return "" if cloth.status in ("ok", "converged") else f"{cloth.status}: {cloth.reason}"
+
+
+def _cloth(
+    cloth: Trajectory, rest: np.ndarray | None, reference: Trajectory | None, depths: np.ndarray | None,
+    curves: Container[str],
+) -> Pack:  # fmt: skip
+    """Positions, times, colours, and those numbers per frame that `curves` holds, of a roll-out."""
+    pack, faces = Pack(), cloth.faces
+    pack.indices("faces", faces)
+    pack.numbers("times", cloth.times)
+    pack.positions("positions", cloth.positions)
+    blocks = [cloth.positions[k : k + BLOCK] for k in range(0, cloth.frames, BLOCK)]
+    pack.values("curvature", np.concatenate([mean_curvature(block, faces) for block in blocks]))
+    if rest is not None and rest.shape == (len(faces),):
+        strain = np.concatenate([area_change(block, faces, rest) for block in blocks])
+        pack.values("area", strain, signed=True)
+    if reference is not None and _comparable(cloth, reference):
+        pack.values("distance", distance(cloth.positions, reference.positions))
+    if depths is not None:
+        pack.values("depth", depths)
+    for name, curve in cloth.frame_fields.items():
+        if name in curves:
+            pack.numbers(name, curve)
+    return pack
+
+
+def _comparable(cloth: Trajectory, reference: Trajectory) -> bool:
+    same = cloth.positions.shape[1] == reference.positions.shape[1] and cloth.frames <= reference.frames
+    return same and np.allclose(cloth.times, reference.times[: cloth.frames])
+
+
+def _rest_areas(path: Path) -> np.ndarray | None:
+    """(F,) [m^2]; None where there are none to be read, and the page then offers no change of area."""
+    try:
+        return np.load(path)
+    except (OSError, ValueError):
+        return None
+
+
+def _depths(cloths: Mapping[str, Trajectory], body: Trajectory) -> dict[str, np.ndarray]:
+    """Method -> (T,V) [mm] below the skin; all of a frame at once, for its search tree is the cost."""
+    found = {method: np.zeros(cloth.positions.shape[:2]) for method, cloth in cloths.items()}
+    for frame in range(body.frames):
+        having = [method for method, cloth in cloths.items() if frame < cloth.frames]
+        if having:
+            points = [cloths[method].positions[frame] for method in having]
+            deep = depth(np.concatenate(points), body.positions[frame], body.faces)
+            for method, own in zip(having, np.split(deep, np.cumsum([len(x) for x in points])[:-1])):
+                found[method][frame] = own
+    return found
+
+
+def _body(body: Trajectory) -> Pack:
+    """The skin with few faces, the same vertices of it in every frame; whole where its faces do not close."""
+    import igl
+
+    kept, faces = np.arange(body.positions.shape[1]), body.faces.astype(np.int64)
+    if len(faces) > SKIN_FACES:
+        first = np.ascontiguousarray(body.positions[0], dtype=float)
+        _, fewer, _, birth = igl.decimate(first, np.ascontiguousarray(faces), SKIN_FACES)
+        kept, faces = (birth, fewer) if len(fewer) else (kept, faces)
+    pack = Pack()
+    pack.indices("faces", faces)
+    pack.numbers("times", body.times)
+    pack.positions("positions", body.positions[:, kept])
+    return pack
