@@ -297,7 +297,8 @@ def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, t
     assert worn == {"mine"} and {network.garment for network in plan.networks} == {"mine"}
     names = {scene.name for scene in plan.scenes}
     assert {"mine/sudden_stop", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
-    assert not any(name.startswith("dependence/mesh") for name in names)  # those are tailored
+    with pytest.raises(PlanError, match="unknown scene 'dependence/mesh/500'"):  # it tailors one itself
+        planned("--garment", str(path), "--scenes", "dependence/mesh/500", "-o", out)
     usual = planned("--preset", "smoke", "-o", out)
     assert {scene.garment for scene in usual.scenes if scene.dressed} == {"tshirt"}
 
