@@ -20,7 +20,8 @@ from benchmarks.presets import find_preset
 from benchmarks.schedule import Schedule
 from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
-from snug import check
+from snug import check, training
+from snug import train as train_command
 from snug.body import Body
 from snug.dressed_body import DressedBody
 from snug.garment_file import GarmentFile, add_garment_options, demand_a_file, garment_file
@@ -281,6 +282,25 @@ def test_check_answers_help_without_loading_anything_heavy():
         "sys.exit(bool({'numpy', 'torch', 'numba', 'igl', 'scipy', 'pyvista'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_path, tube, monkeypatch):
+    path = saved(tmp_path, tube, uv=100 * own_chart(tube.rest_positions, tube.faces))
+    (tmp_path / "silk.toml").write_text("density = 300.0\n")
+    seen = []
+
+    def stop(kind, dressed, motions, **options):
+        seen.append(dressed)
+        raise ValueError("seen enough")
+
+    monkeypatch.setattr(training, "train", stop)
+    words = ["--garment", str(path), "--garment-rest", "uv", "--garment-uv-scale", "0.01"]
+    words += ["--garment-material", str(tmp_path / "silk.toml"), "-o", str(tmp_path / "a.safetensors")]
+    assert train_command.main(words) == 2
+    (dressed,) = seen
+    assert dressed.cloth.material == Material(density=300.0) and dressed.vertices == 150
+    np.testing.assert_allclose(dressed.cloth.rest_uv, own_chart(tube.rest_positions, tube.faces))
+    assert train_command.main(["--garment", "tshirt", "--garment-up", "z"]) == 2 and len(seen) == 1
 
 
 # --- in a run ---------------------------------------------------------------------------------------------
