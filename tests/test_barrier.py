@@ -16,8 +16,11 @@ from reference_sim.energies import (
     ContactBarrier,
     Energy,
     Gravity,
+    Inertia,
+    Step,
     StretchStVK,
 )
+from reference_sim.material import GRAVITY
 
 pytest.importorskip("ipctk", reason="ipctk is not installed: no barrier to test")
 
@@ -204,3 +207,39 @@ def test_areas_that_weigh_pairs_are_the_rest_state_of_the_cloth():
     own = (mesh.edges < count).all(axis=1)
     assert mesh.edge_areas[own].sum() == pytest.approx(cloth.areas.sum(), rel=1e-12)
     assert mesh.edge_areas[~own].max() <= mesh.edge_areas[own].mean() * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(100, 150), marks=pytest.mark.slow)], ids=len)
+def test_a_step_that_nobody_chose_ends_free_and_where_it_says(seeds):
+    """Material, distance, step and velocities over decades; the gradient by differences of the energy."""
+    for seed in seeds:
+        random = np.random.default_rng(seed)
+        crumple, obstacle, start = crumpled()
+        stiffness, hinge = 10 ** random.uniform(-2, 2, 2)
+        cloth = Cloth(
+            crumple.cloth.rest_positions, crumple.cloth.faces,
+            Material(young_modulus=70e3 * stiffness, bending_stiffness=3.96e-5 * hinge),
+        )  # fmt: skip
+        dt = 10 ** random.uniform(-3, -0.5)
+        barrier = ContactBarrier(cloth, distance=10 ** random.uniform(-3, -2.3))
+        terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), barrier, Inertia(cloth, dt)]
+        potential = Potential(terms)
+        velocity = 10 ** random.uniform(-2, 1) * random.normal(size=start.shape)
+        potential.prepare(Step(start, velocity, start, dt, obstacle, 1))
+        potential.set_progress(1.0)
+        result = minimise(potential, start, timeout=20.0)
+        x, body = result.positions, obstacle.at(1)
+        assert not cuts(x, cloth.edges, x, cloth.faces).any(), seed
+        assert not cuts(x, cloth.edges, body, obstacle.faces).any(), seed
+        assert result.status in ("converged", "stalled", "max_iterations", "timeout") and result.reason
+        if result.status == "converged":
+            residual = 1e-6 * cloth.masses.mean() * GRAVITY
+            for _ in range(12):
+                d = random.uniform(-1, 1, x.shape)
+                coarse, fine = (_slope(potential, x, d, h) for h in (2e-8, 1e-8))
+                noise = 4e-7 * sum(map(abs, potential.terms(x).values())) + 4 * abs(coarse - fine)
+                assert abs(fine) <= residual * np.abs(d).sum() + noise, seed
+
+
+def _slope(potential: Potential, x: np.ndarray, d: np.ndarray, h: float) -> float:
+    return (potential.value(x + h * d) - potential.value(x - h * d)) / (2 * h)

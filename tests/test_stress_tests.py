@@ -10,9 +10,9 @@ from benchmarks.tasks.case import RunCase
 from benchmarks.tasks.task import Outcome
 from benchmarks.validation import convergence_check, stress_tests
 from benchmarks.validation.convergence_check import lbfgs_then_newton, solve_and_check
-from benchmarks.validation.initial_conditions import INITIAL_POSITIONS, VELOCITIES
+from benchmarks.validation.initial_conditions import INITIAL_POSITIONS, REST_SHAPES, VELOCITIES
 from benchmarks.validation.registry import STRESS_TESTS
-from benchmarks.validation.stress_steps import sheet
+from benchmarks.validation.stress_steps import BODIES, PINS, sheet, solve_sheet
 from benchmarks.validation.stress_tests import MAPS, STEPS
 from reference_sim import Cloth, minimise
 from reference_sim.energies import Energy, StretchStVK
@@ -123,3 +123,36 @@ def test_the_hessian_is_the_true_one_again_after_a_run_that_was_cut():
     for cut in (1, 3, 7):
         minimise(step.potential, step.guess, max_iterations=cut)
         assert np.array_equal(step.potential.hessian(step.guess).toarray(), before)
+
+
+def drawn(seed: int) -> dict[str, object]:
+    """A step of a sheet that nobody has chosen: every option of `sheet` drawn, factors over decades."""
+    random = np.random.default_rng(seed)
+
+    def factor(low: float, high: float) -> float:
+        return float(10 ** random.uniform(low, high))
+
+    def one_of(values):
+        return values[random.integers(len(values))]
+
+    terms = one_of(["membrane", "membrane+bending", "membrane+bending+area", "membrane+area"])
+    return {
+        "stiffness": factor(-3, 5), "bending": factor(-3, 5), "mass": factor(-2, 2), "contact": factor(-2, 3),
+        "gravity": one_of([0.0, 1.0, factor(0, 3)]), "dt": one_of([None, factor(-4, 1), factor(-4, 1)]),
+        "size": factor(-2, 2), "pins": one_of(list(PINS)), "shape": one_of(list(REST_SHAPES)),
+        "start": one_of(list(INITIAL_POSITIONS)), "speed": one_of([0.0, factor(-1, 3), *VELOCITIES]),
+        "scaling": one_of(["none", "length_area"]), "rest_angles": one_of([0.0, 1.0, "random"]),
+        "terms": terms, "body": one_of(["", *BODIES]),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [range(6), *(pytest.param(range(k, k + 25), marks=pytest.mark.slow) for k in range(1000, 1500, 25))],
+    ids=lambda seeds: str(seeds[0]),
+)
+def test_a_step_that_nobody_chose_is_no_lie_either(seeds):
+    """Claims are checked from the definitions, contact included; a failure has to be said."""
+    for seed in seeds:
+        row = solve_sheet(**drawn(seed))
+        assert row.status in ("ok", "stalled", "timeout", "diverged") and row.reason, (seed, drawn(seed), row)

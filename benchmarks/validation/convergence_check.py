@@ -24,7 +24,7 @@ TOLERANCE = 1e-6  # of the relative residual: largest gradient component over th
 ROUND_OFF = 1e-2  # relative residual that round-off may at most excuse
 RISE_ROUND_OFF = 1e-12  # of the sum of the terms' sizes, within the step
 EVALUATION_ROUND_OFF = 1e-6  # of the same: what two evaluations may differ by before the larger one is a rise
-DEGENERATE = 1e-9  # share of its area below which round-off alone decides at what angle a triangle stands
+ANGLE_ROUND_OFF = 32.0  # by how many times that of a coordinate a triangle's angle may be off
 TIMEOUT = 20.0  # [s] that the solver gives itself
 COLLAPSED = 1e-3  # share of its area below which a triangle has collapsed
 STATUS = {"converged": "ok", "max_iterations": "stalled"}
@@ -129,10 +129,15 @@ def first_rise(potential: Potential, points: Sequence[np.ndarray]) -> str:
 
 
 def undetermined_energy(potential: Potential, x: np.ndarray) -> float:
-    """Energy [J] that hinges at degenerate triangles may hold: their angles are round-off."""
-    if not (degenerate := areas(potential, x) < DEGENERATE * potential.cloth.areas).any():
-        return 0.0
-    return float(collapse_energies(potential)[1][degenerate].sum())
+    """Energy [J] that hinges may hold, times the share of half a turn within which round-off of x (V, 3)
+    leaves the angle of each of their triangles: that of a coordinate over the height of the triangle.
+    """
+    corner = x[potential.cloth.faces]
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    area = areas(potential, x)
+    round_off = ANGLE_ROUND_OFF * np.finfo(float).eps * np.abs(x).max()
+    share = np.divide(round_off * longest, 2.0 * area, out=np.ones(len(area)), where=area > 0.0)
+    return float((collapse_energies(potential)[1] * np.minimum(share, 1.0)).sum())
 
 
 def areas(potential: Potential, x: np.ndarray) -> np.ndarray:
