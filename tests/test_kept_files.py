@@ -12,9 +12,9 @@ from tasks_by_hand import InProcess
 from test_cell_tasks import TINY, NoLog, plan_of
 from test_runner import task
 
-from benchmarks import executor
+from benchmarks import executor, run
 from benchmarks.cache import Cache
-from benchmarks.results import RunFolder
+from benchmarks.results import RunFolder, digest_of_file
 from benchmarks.rows import rows_of
 from benchmarks.runner import Runner
 from benchmarks.schedule import tasks_of
@@ -77,6 +77,51 @@ def test_what_is_damaged_is_done_again_alone(whole, tmp_path, damage, name, redo
     assert set(runner.reused) == ALL - redone
     assert rows == whole[1]
     assert len(done(folder)[0].reused) == len(ALL)
+
+
+WORN = "trajectories/tshirt-sudden_stop"
+WORDS = ["--preset", "smoke", "--suite", "garments", "--scenes", "tshirt/sudden_stop"]
+WORDS += ["--methods", "simulation,skinning,supervised,snug"]
+
+
+def run_dressed(folder: Path) -> dict:
+    """What the command leaves there that does not come from the clock."""
+    assert run.main([*WORDS, "-o", str(folder)]) == 0
+    rows = RunFolder(folder).read_rows()
+    kept = [row for row in rows if not row.metric.startswith("cost/") and row.unit not in ("s", "ms", "MB")]
+    return {(r.method, r.metric, r.seed): (r.value, r.status, r.reason, r.uncertainty) for r in kept}
+
+
+@pytest.fixture(scope="module")
+def dressed(tmp_path_factory) -> tuple[Path, dict]:
+    folder = tmp_path_factory.mktemp("dressed")
+    return folder, run_dressed(folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", [flip, truncate, "replace", Path.unlink])
+@pytest.mark.parametrize(
+    "name",
+    [
+        f"{WORN}/settled.npy", f"{WORN}/body.npy", f"{WORN}/body.vtkhdf", f"{WORN}/rest_areas.npy",
+        f"{WORN}/simulation.vtkhdf", f"{WORN}/simulation-quasi-static.vtkhdf", f"{WORN}/snug.npz",
+        f"{WORN}/snug-quasi-static.vtkhdf", "trajectories/tshirt-walk/simulation.vtkhdf",
+        "models/supervised-seed0.safetensors",
+    ],
+)  # fmt: skip
+def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dressed, tmp_path, name, damage):
+    folder = shutil.copytree(dressed[0], tmp_path / "run")
+    digests = RunFolder(folder).read_config()["digests"]
+    if damage == "replace":  # by another whole file of its kind
+        other = next(n for n in digests if Path(n).suffix == Path(name).suffix and n != name)
+        shutil.copyfile(folder / other, folder / name)
+    else:
+        damage(folder / name)
+    assert not (folder / name).is_file() or digest_of_file(folder / name) != digests[name]
+    rows = run_dressed(folder)
+    assert rows == dressed[1]
+    config = RunFolder(folder).read_config()
+    assert set(config["digests"]) == set(digests) and RunFolder(folder).changed(config) == []
 
 
 def test_what_hangs_on_a_damaged_reference_is_done_again(whole, tmp_path):
