@@ -23,7 +23,6 @@ from .metric import COMPARED_WITH
 from .metrics import names_of
 from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
-from .registry import DeclarationError
 from .results import digest_of_file
 from .scene import Scene
 from .scenes import find_scene, of_garment
@@ -268,9 +267,7 @@ class Schedule:
     def _of_body(self, garment: str) -> dict[str, Any]:
         """What the assets are made from."""
         sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
-        declared, own = of_garment(garment, self.plan.motions.worn), dict[str, Any]()
-        if declared.files:
-            own["files"] = {name: _content(Path(name), garment) for name in declared.files}
+        own: dict[str, Any] = {}
         if self.plan.body:
             own["body"] = self.plan.body.digest
         if self.plan.garment and garment == self.plan.garment.file.name:
@@ -307,13 +304,6 @@ def _declared(entry: Any) -> dict[str, Any]:
 def _modules_behind(entry: Any) -> tuple[str, ...]:
     """Of a scene or a method: its module, and what declares it where that is outside."""
     return tuple(dict.fromkeys(filter(None, (entry.module, entry.declared_in))))
-
-
-def _content(path: Path, garment: str) -> str:
-    """Digest of a file. Raises DeclarationError where there is none."""
-    if not path.is_file():
-        raise DeclarationError(f"{path}: no such file; garment {garment} is read from it")
-    return digest_of_file(path)
 
 
 def _keyed(task: Any) -> Any:

@@ -32,7 +32,6 @@ SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the t
 DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
 CROTCH_FILLET = 0.03  # [m] the same between torso and leg
-SEAT = 0.06  # [m] by which their seat is narrower at the crotch
 TAPER = 0.4  # how steeply trousers may narrow from the seat to the thighs
 MOST_CELLS = 4e6  # of the grid: a person takes a tenth
 TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")

@@ -10,11 +10,14 @@ from test_cell_tasks import plan_of
 
 from benchmarks import provenance
 from benchmarks.methods import find_method
-from benchmarks.plan import Motions, Network
-from benchmarks.scenes import GarmentScenes
+from benchmarks.plan import Motions, Network, OwnGarment
+from benchmarks.results import digest_of_file
+from benchmarks.run import choose_garment
+from benchmarks.run_options import make_parser
 from benchmarks.schedule import Schedule, tasks_of
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.task import Task
+from snug.garment_file import GarmentFile
 from snug.recipe import DEFAULT, TERMS
 from snug.recipes import TRAININGS, Training
 
@@ -43,14 +46,15 @@ def test_an_energy_that_a_recipe_names_is_part_of_the_training(tmp_path, monkeyp
 
 def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path):
     mesh = tmp_path / "cape.obj"
-    motions = dataclasses.replace(MOTIONS, worn=(GarmentScenes("cape", "", files=(str(mesh),)),))
-    schedule = Schedule(plan_of(tmp_path, motions=motions))
     with pytest.raises(ValueError, match=r"cape\.obj"):
-        schedule.data("walk", "cape")
+        choose_garment(make_parser().parse_args(["--garment", str(mesh)]))
     seen = []
     for text in ("v 0 0 0", "v 0 0 1"):
         mesh.write_text(text)
-        seen.append(dict(schedule.data("walk", "cape").inputs))
+        garment = OwnGarment(GarmentFile(path=mesh), (digest_of_file(mesh),))
+        motions = dataclasses.replace(MOTIONS, worn=(garment.scenes,))
+        plan = dataclasses.replace(plan_of(tmp_path, motions=motions), garment=garment)
+        seen.append(dict(Schedule(plan).data("walk", "cape").inputs))
     assert seen[0] != seen[1] and seen[0].keys() == seen[1].keys()
 
 

@@ -69,14 +69,12 @@ def further_scenes(garment: str) -> tuple[Scene, ...]:
 class GarmentScenes:
     """A garment of snug.garments: its scenes are "<garment>/<motion>", and "<garment>/<motion>@clip".
 
-    dynamic: whether its motions are those that stop within a frame, instead of the run's own. files: paths of
-    what the garment is read from, so that a run knows when one has changed.
+    dynamic: whether its motions are those that stop within a frame, instead of the run's own.
     """
 
     garment: str
     words: str
     dynamic: bool = False
-    files: tuple[str, ...] = ()
 
     def scene(self, motion: str, part: str = "whole") -> Scene:
         """A body in this garment doing that motion, or its liveliest part."""
