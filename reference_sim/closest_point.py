@@ -87,7 +87,7 @@ class FaceTree:
         points, rest_points = (np.ascontiguousarray(x, self._corners.dtype) for x in (points, rest_points))
         faces = np.full(len(points), -1) if hints is None else np.array(hints, np.int64)
         # Neighbours one after another: they visit the same boxes, and do so together.
-        sequence = np.argsort(self._place[faces]) if hints is not None else _by_cells(points)
+        sequence = np.argsort(self._place[faces]) if hints is not None else by_cells(points)
         barycentric, closest = np.empty((len(points), 3)), np.empty((len(points), 3))
         search(
             points, rest_points, float(region), float(exact), self._corners, self._discs, self._centroids,
@@ -112,7 +112,7 @@ def _halved(centroids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return order, starts
 
 
-def _by_cells(points: np.ndarray) -> np.ndarray:
+def by_cells(points: np.ndarray) -> np.ndarray:
     """Points (S, 3) in the order (S,) of cells of a grid, halved again and again like the faces."""
     if len(points) == 0:
         return np.empty(0, np.int64)

@@ -4,7 +4,7 @@ From frame to frame the closest point of a sample moves little. So it slides (su
 to the foot of its sample, which finds it wherever the surface is one smooth sheet. What sliding cannot find is
 another limb that came near. Against that, in each frame:
 
-- one sample in ROTATION is searched exactly, another one each time;
+- one group of neighbouring samples in ROTATION is searched exactly, another one each time;
 - a sample tries its neighbours' faces where its own is too far: distances of two samples to one surface differ
   by no more than the samples are apart;
 - a sample deeper than DEEP below its plane is searched exactly: that is where a false plane costs most.
@@ -22,12 +22,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..closest_point import FaceTree
+from ..closest_point import FaceTree, by_cells
+from ..group_search import GROUP
 from ..kernel_cache import njit
 from ..obstacle import Obstacle, Planes, _plane_normals, vertex_normals
 from ..surface_walk import triangle_adjacency, walk_to_foot
 
 ROTATION = 16
+FAR, SELDOM = 0.03, 4  # [m] samples farther away slide in one frame of so many only, and ride in the others
 DEEP = 2e-3  # [m] below the plane
 SLACK = 1e-4  # [m] by which a neighbour's distance must be the better one to be tried
 NEIGHBOURS = 4
@@ -60,7 +62,7 @@ class SlidingObstacle(Obstacle):
         """Vertices and normals at a frame, with the tree fitted to it."""
         if self._posed is None or self._posed[0] != frame:
             assert self._patch is not None
-            vertices = self.at(frame)
+            vertices = self._patch.posed(self.at(frame))
             self._patch.tree.refit(vertices)
             self._posed = frame, vertices, vertex_normals(vertices, self._patch.faces)
         return self._posed[1:]
@@ -103,16 +105,22 @@ class SlidingObstacle(Obstacle):
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
     ) -> np.ndarray:
+        """As the exact one. Points that are the first of a larger set of samples ride with the places of
+        those, where they were when planes were last asked for.
+        """
         before, after = (min(f, self.frames - 1) for f in (frame - 1, frame))
         anchors = self._anchors(points, rest_points)
         assert self._patch is not None
         vertices, _ = self._pose(before)
-        anchors.follow(points, before, self._patch, vertices, self.region)
-        anchors.frame = after
+        leader = next((a for a in self._kinds.values() if a.frame == before and a.leads(anchors)), None)
+        if leader is None:
+            leader = anchors
+            anchors.follow(points, before, self._patch, vertices, self.region)
+            anchors.frame = after
         out = np.empty_like(points)
         _carry(
-            points, anchors.closest, anchors.faces, anchors.barycentric, self._patch.faces, vertices,
-            self.at(after), out,
+            points, leader.closest, leader.faces, leader.barycentric, self._patch.faces, vertices,
+            self._patch.posed(self.at(after)), out,
         )  # fmt: skip
         return out
 
@@ -130,10 +138,15 @@ class _Patch:
             alone = cKDTree(centroids).query(rest_points)[0].max() > obstacle.region
             if not alone:  # a sample without a face in its region meets all
                 self.numbers = np.flatnonzero(np.isfinite(near))
-        self.faces = np.ascontiguousarray(obstacle.faces[self.numbers])
+        self.vertices, faces = np.unique(obstacle.faces[self.numbers], return_inverse=True)
+        self.faces = np.ascontiguousarray(faces.reshape(-1, 3))
         self.centroids = np.ascontiguousarray(centroids[self.numbers])
         self.adjacency = triangle_adjacency(self.faces)
         self.tree = FaceTree(self.faces, self.centroids)
+
+    def posed(self, positions: np.ndarray) -> np.ndarray:
+        """Its own vertices among those of the body."""
+        return positions[self.vertices]
 
 
 class _Anchors:
@@ -145,9 +158,18 @@ class _Anchors:
         self.home = np.ascontiguousarray(home)
         near = cKDTree(home).query(home, k=min(NEIGHBOURS + 1, count))[1].reshape(count, -1)
         self.neighbours = np.ascontiguousarray(near[:, 1:])
+        self._order = by_cells(home)
+        self._led: dict[int, bool] = {}
         self.barycentric, self.closest = np.zeros((count, 3)), np.zeros((count, 3))
         self.distance = np.zeros(count)
         self.forget()
+
+    def leads(self, other: _Anchors) -> bool:
+        """Whether the other's samples are the first of these."""
+        if id(other) not in self._led:
+            first = self.home[: len(other.home)]
+            self._led[id(other)] = other is not self and np.array_equal(first, other.home)
+        return self._led[id(other)]
 
     def forget(self) -> None:
         self.faces = np.full(len(self.home), -1)
@@ -164,8 +186,10 @@ class _Anchors:
         reach = np.inf if self.rest_points is None else region * region
         state = self.faces, self.barycentric, self.closest, self.distance
         skin = vertices, patch.faces, patch.adjacency, patch.centroids
-        _slide(points, *skin, self.home, reach, *state)
-        self.search(np.arange(self.turn, len(points), ROTATION), points, patch, region)
+        _slide(points, self.turn, *skin, self.home, reach, *state)
+        groups = np.arange(-(-len(points) // GROUP))[self.turn :: ROTATION]
+        which = (GROUP * groups[:, None] + np.arange(GROUP)).ravel()
+        self.search(self._order[which[which < len(points)]], points, patch, region)
         self.turn = (self.turn + 1) % ROTATION
         _ask_neighbours(points, self.neighbours, *skin, self.home, reach, *state)
 
@@ -195,10 +219,15 @@ def _set(s, points, face, v, w, vertices, faces, barycentric, closest):
 
 @njit(cache=True, error_model="numpy")
 def _slide(
-    points, vertices, faces, adjacency, centroids, home, reach, anchors, barycentric, closest, distance
+    points, turn, vertices, faces, adjacency, centroids, home, reach, anchors, barycentric, closest, distance
 ):
     corners = np.empty((1, 3, 3))
     for s in range(len(points)):
+        if distance[s] > FAR and (s + turn) % SELDOM != 0:
+            v, w = barycentric[s, 1], barycentric[s, 2]
+            distance[s] = _set(s, points, anchors[s], v, w, vertices, faces, barycentric, closest)
+            if distance[s] > FAR:
+                continue
         face, v, w = walk_to_foot(
             points[s, 0], points[s, 1], points[s, 2], np.uint32(anchors[s]), vertices, faces, adjacency,
             centroids, home[s], reach, corners,
@@ -217,10 +246,13 @@ def _ask_neighbours(
     for _ in range(SWEEPS):
         for s in range(len(points)):
             for n in neighbours[s]:
+                excess = distance[s] - distance[n] - SLACK
+                if excess <= 0.0:
+                    continue
                 apart = 0.0
                 for c in range(3):
                     apart += (points[s, c] - points[n, c]) ** 2
-                if distance[s] <= distance[n] + np.sqrt(apart) + SLACK:
+                if excess * excess <= apart:
                     continue
                 squared = 0.0
                 for c in range(3):
