@@ -200,15 +200,15 @@ FAULTS = (
     Fault(
         "a first step without friction",
         FRICTION,
-        "self._coulomb(samples, skin, planes.normals)",
-        "0 * self._coulomb(samples, skin, planes.normals)",
+        "self._coulomb(samples, planes.points - moved, planes.normals)",
+        "0 * self._coulomb(samples, planes.points - moved, planes.normals)",
         fast=("friction_slide",),
     ),
     Fault(
         "friction against the ground, not its skin",
         FRICTION,
-        "samples + planes.points - skin",
-        "samples + planes.points - planes.points",
+        "samples + moved",
+        "samples + 0 * moved",
         fast=("friction_belt",),
     ),
     # minimisers

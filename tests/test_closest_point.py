@@ -9,7 +9,7 @@ from meshes import grid, random_rotation, sphere
 
 from reference_sim.closest_point import FaceTree
 from reference_sim.group_search import GROUP
-from reference_sim.obstacle import vertex_normals
+from reference_sim.surface import vertex_normals
 from reference_sim.triangle import closest_on_triangle
 
 

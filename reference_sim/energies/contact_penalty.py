@@ -6,6 +6,7 @@
 The exact distance to a moving body has jumps where a sample is pinched between two limbs, and Newton's
 method does not survive them; so each sample gets one plane per step, taken at the initial guess and frozen
 (`Obstacle.planes`), and this energy is the distance to that plane. The true signed distance is a metric.
+A sample that cannot meet the body within the step gets a plane out of its way.
 
 Samples sit on vertices, edge midpoints and face centroids, because a coarse mesh whose vertices are outside
 still cuts through a shoulder with its edges. a_s makes k a density: each of the three kinds of sample
@@ -21,6 +22,7 @@ import scipy.sparse as sp
 
 from ..cloth import Cloth
 from ..kernel_cache import njit
+from ..material import GRAVITY
 from .energy import Energy, Step
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
 DEFAULT_STIFFNESS = 3.4e6  # [J/m^5]: 2500 J/m^3 on a vertex of a T-shirt with 1000 vertices
 DEFAULT_MARGIN = 4e-3  # [m]
+SLACK = 0.01  # [m] that forces may move a sample in a step, beyond its flight
 
 
 class ContactPenalty(Energy):
@@ -91,9 +94,20 @@ class ContactPenalty(Energy):
     def prepare(self, step: Step) -> None:
         if step.obstacle is None:
             raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
-        planes = step.obstacle.planes(self.sample_matrix @ step.guess, step.frame, self.rest_samples)
+        samples, reach = self.sample_matrix @ step.guess, self._reach(step)
+        planes = step.obstacle.planes(samples, step.frame, self.rest_samples, reach)
         self.planes, self.points, self.normals = planes, planes.points, planes.normals
         self.step = step
+
+    def _reach(self, step: Step) -> np.ndarray:
+        """(S,) [m] from the guess within which a sample may meet the body in this step.
+
+        Left alone it flies to x + dt v, its weight pulls it another g dt^2 down, and a pin takes it along.
+        """
+        way = step.previous + step.dt * step.velocity - step.guess
+        flight = np.linalg.norm(self.sample_matrix @ way, axis=1)
+        pulled = np.linalg.norm(way[self.cloth.pins], axis=1).max(initial=0.0)
+        return np.maximum(flight, pulled) + GRAVITY * step.dt**2 + self.margin + SLACK
 
     def energy(self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None) -> Tensor:
         """x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S) [J]; default: the prepared planes."""
