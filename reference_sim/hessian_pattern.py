@@ -97,7 +97,8 @@ class HessianPattern:
 
     def _widened(self, extra: np.ndarray) -> HessianPattern:
         wider = copy.copy(self)
-        wider.__dict__.pop("order", None)
+        for cached in ("order", "_constant"):
+            wider.__dict__.pop(cached, None)
         key = np.union1d(self._key, extra)
         moved = np.append(np.searchsorted(key, self._key), -1)  # slot -1, not stored, stays -1
         wider._slots = [moved[slots] for slots in self._slots]
@@ -136,18 +137,31 @@ class HessianPattern:
         changing: Hessians of the dynamic terms at x, which this pattern must cover. convexity: see
         Energy.active_hessian_blocks.
         """
-        data = np.zeros(len(self.indices))
+        data = self._constant.copy()
         for energy, slots in zip(self.energies, self._slots):
-            if energy.dynamic:
-                continue
-            elements, blocks = (
-                energy.active_hessian_blocks(x, convexity) if self.block == 3 else energy.scalar_stiffness(x)
-            )
-            k = energy.stencils.shape[1]
-            _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
+            if not (energy.dynamic or self.block in energy.constant):
+                self._add_blocks(energy, slots, x, convexity, data)
         for matrix in changing:
             self._add(matrix, data)
         return data
+
+    @cached_property
+    def _constant(self) -> np.ndarray:
+        """Values (nnz,) of the terms that give the same everywhere."""
+        data, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
+        for energy, slots in zip(self.energies, self._slots):
+            if self.block in energy.constant:
+                self._add_blocks(energy, slots, anywhere, 0.0, data)
+        return data
+
+    def _add_blocks(
+        self, energy: Energy, slots: np.ndarray, x: np.ndarray, convexity: float, data: np.ndarray
+    ) -> None:
+        elements, blocks = (
+            energy.active_hessian_blocks(x, convexity) if self.block == 3 else energy.scalar_stiffness(x)
+        )
+        k = energy.stencils.shape[1]
+        _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
 
     def _add(self, hessian: sp.csc_matrix, data: np.ndarray) -> None:
         key, values = self._keys_of(hessian)

@@ -45,6 +45,8 @@ class Energy:
         stencils: (N, k) vertex indices of each element.
         dynamic: True where the vertices that the term couples change with x, as the pairs of a contact do.
             Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks.
+        constant: block sizes (3: Hessian, 1: scalar stiffness) of which the term gives the same at every x
+            and in every step.
         remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
             judged without preparing the one before it.
     """
@@ -53,6 +55,7 @@ class Energy:
     cloth: Cloth
     stencils: np.ndarray
     dynamic: bool = False
+    constant: tuple[int, ...] = ()
     remembers: bool = False
 
     def energy(self, x: Tensor) -> Tensor:

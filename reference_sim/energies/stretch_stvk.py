@@ -26,6 +26,7 @@ class StretchStVK(Energy):
     """StVK membrane energy [J] of each face of `cloth`."""
 
     name = "strain"
+    constant = (1,)
 
     def __init__(self, cloth: Cloth) -> None:
         self.cloth = cloth
