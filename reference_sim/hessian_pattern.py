@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from .block_places import BlockPlaces
 from .energies.energy import Energy
 from .kernel_cache import njit
 from .linear_solver import nested_dissection
@@ -140,7 +141,7 @@ class HessianPattern:
         data = self._constant.copy()
         for energy, slots in zip(self.energies, self._slots):
             if not (energy.dynamic or self.block in energy.constant):
-                self._add_blocks(energy, slots, x, convexity, data)
+                self._add_term(energy, slots, x, convexity, data)
         for matrix in changing:
             self._add(matrix, data)
         return data
@@ -151,17 +152,17 @@ class HessianPattern:
         data, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
         for energy, slots in zip(self.energies, self._slots):
             if self.block in energy.constant:
-                self._add_blocks(energy, slots, anywhere, 0.0, data)
+                self._add_term(energy, slots, anywhere, 0.0, data)
         return data
 
-    def _add_blocks(
+    def _add_term(
         self, energy: Energy, slots: np.ndarray, x: np.ndarray, convexity: float, data: np.ndarray
     ) -> None:
-        elements, blocks = (
-            energy.active_hessian_blocks(x, convexity) if self.block == 3 else energy.scalar_stiffness(x)
-        )
-        k = energy.stencils.shape[1]
-        _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
+        places = BlockPlaces(slots, self._base, self._stride, self.block)
+        if self.block == 3:
+            energy.add_hessian(x, convexity, places, data)
+        else:
+            places.add(*energy.scalar_stiffness(x), data)
 
     def _add(self, hessian: sp.csc_matrix, data: np.ndarray) -> None:
         key, values = self._keys_of(hessian)
@@ -196,17 +197,3 @@ def _fill_rows(start, row, block, indices):
                 for r in range(block):
                     indices[at] = block * row[p] + r
                     at += 1
-
-
-@njit(cache=True)
-def _scatter(elements, blocks, slots, k, block, base, stride, data):
-    for n in range(elements.shape[0]):
-        e = elements[n]
-        for a in range(k):
-            for b in range(k):
-                slot = slots[e, a * k + b]
-                if slot >= 0:
-                    for j in range(block):
-                        at = base[slot] + j * stride[slot]
-                        for i in range(block):
-                            data[at + i] += blocks[n, block * a + i, block * b + j]

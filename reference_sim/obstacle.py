@@ -27,13 +27,15 @@ class Planes:
     """One contact plane per sample: points (S, 3) [m], unit outward normals (S, 3), and where it was found.
 
     faces: (S,) face of the obstacle; barycentric: (S, 3) place on it. Of a sample out of reach: the middle of
-    its home face, the one whose rest centroid is nearest to its rest position, and a plane far below it.
+    its home face, the one whose rest centroid is nearest to its rest position, and a plane FAR below it.
+    far: (S,) whether a sample is out of reach; None where none is.
     """
 
     points: np.ndarray
     normals: np.ndarray
     faces: np.ndarray
     barycentric: np.ndarray
+    far: np.ndarray | None = None
 
 
 @dataclass
@@ -201,7 +203,7 @@ class Obstacle:
             points, found.points, faces, barycentric, far, vertices, self.faces,
             vertex_normals(vertices, self.faces), normals,
         )  # fmt: skip
-        return Planes(found.points, normals, faces, barycentric)
+        return Planes(found.points, normals, faces, barycentric, far)
 
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None

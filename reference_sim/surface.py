@@ -6,7 +6,7 @@ import numpy as np
 
 from .kernel_cache import njit
 
-FAR = 1.0  # [m] below a sample out of reach lies its plane
+FAR = 1e30  # [m] below a sample lies a plane that cannot touch it; finite also as float32
 
 
 @njit(cache=True, error_model="numpy")
