@@ -14,6 +14,15 @@ from .kernel_cache import njit
 LANES = 8
 
 _STEEP = np.tan(np.pi / 8)
+# arctan(t) = t + t z p(z), z = t^2 up to tan(pi/8)^2: a polynomial through 13 Chebyshev points, at most 5e-17 off.
+_P0, _P1, _P2, _P3, _P4, _P5 = (
+    -0.33333333333333324206, 0.19999999999997013892, -0.14285714285329708164,
+    0.11111111085322108759, -0.09090908059031191027, 0.07692281099937743250,
+)  # fmt: skip
+_P6, _P7, _P8, _P9, _P10, _P11 = (
+    -0.06666205259976526188, 0.05876834004614160666, -0.05217312574061591002,
+    0.04499500728984032009, -0.03338782450121195152, 0.01511376509660092467,
+)  # fmt: skip
 
 
 @njit(cache=True, inline="always", error_model="numpy")
@@ -24,7 +33,10 @@ def arctan2(y, x):
     steep = low > _STEEP * high
     t = ((low - high) if steep else low) / ((low + high) if steep else high)
     z = t * t  # at most tan(pi/8)^2
-    a = t * (ATAN_PLACEHOLDER)
+    high = _P6 + z * (_P7 + z * (_P8 + z * (_P9 + z * (_P10 + z * _P11))))
+    low = _P0 + z * (_P1 + z * (_P2 + z * (_P3 + z * (_P4 + z * _P5))))
+    square = z * z
+    a = t + t * z * (low + square * square * square * high)
     a = a + 0.25 * np.pi if steep else a
     a = 0.5 * np.pi - a if across > along else a
     a = np.pi - a if x < 0.0 else a
