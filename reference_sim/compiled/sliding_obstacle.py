@@ -7,6 +7,7 @@ another limb that came near. Against that, in each frame:
 - one group of neighbouring samples in ROTATION is searched exactly, another one each time;
 - a sample tries its neighbours' faces where its own is too far: distances of two samples to one surface differ
   by no more than the samples are apart;
+- a sample whose place is farther away than the step's reach looks for another surface within that reach;
 - a sample deeper than DEEP below its plane is searched exactly: that is where a false plane costs most.
 
 What the rotation finds reaches its neighbours by the second rule in the same frame. A plane is therefore that
@@ -25,7 +26,8 @@ from scipy.spatial import cKDTree
 from ..closest_point import FaceTree, by_cells
 from ..group_search import GROUP
 from ..kernel_cache import njit
-from ..obstacle import Obstacle, Planes, _plane_normals, vertex_normals
+from ..obstacle import Obstacle, Planes
+from ..surface import carry, plane_normals, vertex_normals
 from ..surface_walk import triangle_adjacency, walk_to_foot
 
 ROTATION = 16
@@ -51,6 +53,7 @@ class SlidingObstacle(Obstacle):
         super()._forget()
         self._kinds: dict[tuple[int, bool], _Anchors] = {}
         self._patch: _Patch | None = None
+        self._none_far = np.zeros(0, bool)
         self._posed: tuple[int, np.ndarray, np.ndarray] | None = None  # frame, vertices, their normals
 
     def start_again(self) -> None:
@@ -77,19 +80,28 @@ class SlidingObstacle(Obstacle):
             self._kinds[kind] = _Anchors(points if rest_points is None else rest_points, rest_points)
         return self._kinds[kind]
 
-    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+    def planes(
+        self,
+        points: np.ndarray,
+        frame: int,
+        rest_points: np.ndarray | None = None,
+        reach: np.ndarray | None = None,
+    ) -> Planes:
+        """As the exact ones. Without `reach`, other limbs are found by the rotation alone."""
         frame = min(frame, self.frames - 1)
         anchors = self._anchors(points, rest_points)
         assert self._patch is not None
         vertices, of_vertices = self._pose(frame)
-        anchors.follow(points, frame, self._patch, vertices, self.region)
+        anchors.follow(points, frame, self._patch, vertices, self.region, reach)
         normals = np.empty_like(points)
+        if len(self._none_far) < len(points):
+            self._none_far = np.zeros(len(points), bool)
 
         def set_normals(at: np.ndarray | slice) -> None:
             some = np.empty_like(normals[at])
-            _plane_normals(
-                points[at], anchors.closest[at], anchors.faces[at], anchors.barycentric[at], vertices,
-                self._patch.faces, of_vertices, some,
+            plane_normals(
+                points[at], anchors.closest[at], anchors.faces[at], anchors.barycentric[at],
+                self._none_far[: len(some)], vertices, self._patch.faces, of_vertices, some,
             )  # fmt: skip
             normals[at] = some
 
@@ -118,9 +130,9 @@ class SlidingObstacle(Obstacle):
             anchors.follow(points, before, self._patch, vertices, self.region)
             anchors.frame = after
         out = np.empty_like(points)
-        _carry(
-            points, leader.closest, leader.faces, leader.barycentric, self._patch.faces, vertices,
-            self._patch.posed(self.at(after)), out,
+        carry(
+            points, leader.closest, leader.faces, leader.barycentric, vertices,
+            self._patch.posed(self.at(after)), self._patch.faces, out,
         )  # fmt: skip
         return out
 
@@ -177,32 +189,60 @@ class _Anchors:
         self.turn = 0
 
     def follow(
-        self, points: np.ndarray, frame: int, patch: _Patch, vertices: np.ndarray, region: float
+        self,
+        points: np.ndarray,
+        frame: int,
+        patch: _Patch,
+        vertices: np.ndarray,
+        region: float,
+        reach: np.ndarray | None = None,
     ) -> None:
-        """Take the places to the samples' at points (S, 3) [m], the body's vertices (B, 3) at `frame`."""
+        """Take the places to the samples' at points (S, 3) [m], the body's vertices (B, 3) at `frame`.
+
+        reach: (S,) [m] within which no surface is missed by a sample whose own place is farther away.
+        """
         if frame not in (self.frame, self.frame + 1):
-            self.search(np.arange(len(points)), points, patch, region)
+            self.search(self._order, points, patch, region)
             return
-        reach = np.inf if self.rest_points is None else region * region
+        limit = np.inf if self.rest_points is None else region * region
         state = self.faces, self.barycentric, self.closest, self.distance
         skin = vertices, patch.faces, patch.adjacency, patch.centroids
-        _slide(points, self.turn, *skin, self.home, reach, *state)
+        _slide(points, self.turn, *skin, self.home, limit, *state)
         groups = np.arange(-(-len(points) // GROUP))[self.turn :: ROTATION]
         which = (GROUP * groups[:, None] + np.arange(GROUP)).ravel()
         self.search(self._order[which[which < len(points)]], points, patch, region)
+        if reach is not None:
+            far = self._order[(self.distance > reach)[self._order]]
+            self.search(far, points, patch, region, reach)
         self.turn = (self.turn + 1) % ROTATION
-        _ask_neighbours(points, self.neighbours, *skin, self.home, reach, *state)
+        _ask_neighbours(points, self.neighbours, *skin, self.home, limit, *state)
 
-    def search(self, which: np.ndarray, points: np.ndarray, patch: _Patch, region: float) -> None:
-        """Exact closest points for some samples."""
+    def search(
+        self,
+        which: np.ndarray,
+        points: np.ndarray,
+        patch: _Patch,
+        region: float,
+        reach: np.ndarray | None = None,
+    ) -> None:
+        """Exact closest points for some samples; with a reach (S,) [m], for those that have one within it."""
+        if not len(which):
+            return
         rest = None if self.rest_points is None else self.rest_points[which]
         hints: Any = self.faces[which]
         found = patch.tree.nearest(
-            points[which], hints=None if (hints < 0).any() else hints, rest_points=rest, region=region
+            points[which],
+            hints=None if (hints < 0).any() else hints,
+            rest_points=rest,
+            region=region,
+            reach=None if reach is None else reach[which],
+            sequence=np.arange(len(which)),
         )
-        self.faces[which] = found.faces
-        self.barycentric[which], self.closest[which] = found.barycentric, found.points
-        self.distance[which] = np.linalg.norm(points[which] - found.points, axis=1)
+        known = found.faces >= 0
+        which = which[known]
+        self.faces[which] = found.faces[known]
+        self.barycentric[which], self.closest[which] = found.barycentric[known], found.points[known]
+        self.distance[which] = np.linalg.norm(points[which] - self.closest[which], axis=1)
 
 
 @njit(cache=True, inline="always")
@@ -280,48 +320,3 @@ def _gaps(points, closest, normals):
             gap += normals[s, c] * (points[s, c] - closest[s, c])
         gaps[s] = gap
     return gaps
-
-
-@njit(cache=True, inline="always")
-def _frame(x, i, j, k, axes):
-    """Rows of axes (3, 3): orthonormal frame of a triangle."""
-    first, second = 0.0, 0.0
-    for c in range(3):
-        axes[0, c] = x[j, c] - x[i, c]
-        axes[1, c] = x[k, c] - x[i, c]
-        first += axes[0, c] ** 2
-    first = np.sqrt(first)
-    for c in range(3):
-        axes[0, c] /= first
-    axes[2, 0] = axes[0, 1] * axes[1, 2] - axes[0, 2] * axes[1, 1]
-    axes[2, 1] = axes[0, 2] * axes[1, 0] - axes[0, 0] * axes[1, 2]
-    axes[2, 2] = axes[0, 0] * axes[1, 1] - axes[0, 1] * axes[1, 0]
-    for c in range(3):
-        second += axes[2, c] ** 2
-    second = np.sqrt(second)
-    for c in range(3):
-        axes[2, c] /= second
-    axes[1, 0] = axes[2, 1] * axes[0, 2] - axes[2, 2] * axes[0, 1]
-    axes[1, 1] = axes[2, 2] * axes[0, 0] - axes[2, 0] * axes[0, 2]
-    axes[1, 2] = axes[2, 0] * axes[0, 1] - axes[2, 1] * axes[0, 0]
-
-
-@njit(cache=True, error_model="numpy")
-def _carry(points, closest, anchors, barycentric, faces, before, after, out):
-    """Where points go that keep their place in the frame of their face."""
-    old, new = np.empty((3, 3)), np.empty((3, 3))
-    for s in range(len(points)):
-        i, j, k = faces[anchors[s], 0], faces[anchors[s], 1], faces[anchors[s], 2]
-        _frame(before, i, j, k, old)
-        _frame(after, i, j, k, new)
-        for c in range(3):
-            out[s, c] = (
-                barycentric[s, 0] * after[i, c] + barycentric[s, 1] * after[j, c]
-                + barycentric[s, 2] * after[k, c]
-            )  # fmt: skip
-        for a in range(3):
-            local = 0.0
-            for c in range(3):
-                local += old[a, c] * (points[s, c] - closest[s, c])
-            for c in range(3):
-                out[s, c] += new[a, c] * local
