@@ -23,7 +23,7 @@ from .group_search import search
 from .kernel_cache import njit
 from .triangle import SLIVER
 
-LEAF = 4  # faces in a leaf, at most
+LEAF = 16  # faces in a leaf, at most
 HALVINGS = 6  # of the longest side, for samples that nothing is remembered of
 
 

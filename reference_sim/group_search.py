@@ -1,8 +1,8 @@
 """Descent into a tree of boxes (see `closest_point`) by groups of samples that lie near each other.
 
-A box is opened if it may be of use to one sample of the group: the box around the group is asked first, then
-the distances of all its samples side by side, in vector instructions. The tree is descended once for all.
-In a leaf the flat disc around a face keeps it from most samples of the group. None of that changes an answer.
+The tree is descended once for the box around a group. At a leaf, the distances of all samples of the group to
+its box are worked out side by side, in vector instructions; those within look at its faces, of which the flat
+discs around them keep most away. Neither changes an answer.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import numpy as np
 from .kernel_cache import njit
 from .triangle import closest_on_triangle
 
-GROUP = 32  # samples; fewer share less of the way, more are farther apart
+GROUP = 16  # samples; fewer share less of the way, more are farther apart
 FAST = {"nnan", "nsz", "reassoc"}  # for bounds alone, within ROUND_OFF
-NONE = 1e300  # a distance greater than any
 ROUND_OFF = 1e-14  # of lengths: some fifty times that of float64
 
 
@@ -65,7 +64,7 @@ def _descend(
     """
     x, rest, span, weights, numbers, places, stack, bounds = scratch
     # Squares of: distance to the best face so far, distance beyond which nothing is of use.
-    best, useful, beyond, answer, hint = numbers[0], numbers[1], numbers[2], places[0], places[1]
+    best, useful, apart, answer, hint = numbers[0], numbers[1], numbers[2], places[0], places[1]
     limit, inner, count, size = region * region, len(starts) - 2, len(members), 0.0
     for i in range(3):
         size += np.float64(boxes[0, 1, i]) - boxes[0, 0, i]
@@ -86,7 +85,9 @@ def _descend(
                 best[g], answer[g], weights[g, 0], weights[g, 1] = distance, k, v, w
         useful[g] = _useful(best[g], size, exact)
     stack[0], bounds[0], depth = 0, 0.0, 1
-    worst = useful.max()
+    worst = 0.0
+    for g in range(count):
+        worst = max(worst, useful[g])
     while depth > 0:
         depth -= 1
         node = stack[depth]
@@ -94,22 +95,27 @@ def _descend(
             continue
         if node < inner:
             near, other = 2 * node + 1, 2 * node + 2
-            least_near = _least(boxes, rest_boxes, near, x, span, useful, worst, limit)
-            least_other = _least(boxes, rest_boxes, other, x, span, useful, worst, limit)
+            least_near = _apart(boxes, rest_boxes, near, span, limit)
+            least_other = _apart(boxes, rest_boxes, other, span, limit)
             if least_other < least_near:
                 near, other, least_near, least_other = other, near, least_other, least_near
-            if least_other < NONE:
+            if least_other <= worst:
                 stack[depth], bounds[depth] = other, least_other
                 depth += 1
-            if least_near < NONE:
+            if least_near <= worst:
                 stack[depth], bounds[depth] = near, least_near
                 depth += 1
             continue
-        for k in range(starts[node - inner], starts[node - inner + 1]):
-            if _beyond_disc(discs, k, x, useful, beyond) > 0.0:
+        _box_distances(boxes, node, x, apart)
+        for g in range(count):
+            if apart[g] > useful[g]:
                 continue
-            for g in range(count):
-                if beyond[g] > 0.0 or k == hint[g] or _squared(centroids, k, rest, g) > limit:
+            for k in range(starts[node - inner], starts[node - inner + 1]):
+                if (
+                    k == hint[g]
+                    or _to_disc(discs, k, x[0, g], x[1, g], x[2, g]) > useful[g]
+                    or _squared(centroids, k, rest, g) > limit
+                ):
                     continue
                 v, w, distance = closest_on_triangle(corners, k, x[0, g], x[1, g], x[2, g])
                 if distance < best[g] or (
@@ -117,7 +123,9 @@ def _descend(
                 ):
                     best[g], answer[g], weights[g, 0], weights[g, 1] = distance, k, v, w
                     useful[g] = _useful(distance, size, exact)
-        worst = useful[:count].max()
+        worst = 0.0
+        for g in range(count):
+            worst = max(worst, useful[g])
     for g in range(count):
         found[members[g]] = answer[g]
         found_v[members[g]], found_w[members[g]] = weights[g, 0], weights[g, 1]
@@ -136,47 +144,38 @@ def _ends(values):
 
 
 @njit(cache=True, inline="always")
-def _apart(boxes, node, low, high):
-    """Squared distance between a box of the tree and one from low (3,) to high (3,)."""
-    total = 0.0
+def _apart(boxes, rest_boxes, node, span, limit):
+    """Squared distance between the boxes of a node and of a group; infinite where the regions are apart."""
+    apart = rest_apart = 0.0
     for i in range(3):
-        gap = max(max(np.float64(boxes[node, 0, i]) - high[i], low[i] - boxes[node, 1, i]), 0.0)
-        total += gap * gap
-    return total
+        gap = max(max(np.float64(boxes[node, 0, i]) - span[1, i], span[0, i] - boxes[node, 1, i]), 0.0)
+        apart += gap * gap
+        gap = max(
+            max(np.float64(rest_boxes[node, 0, i]) - span[3, i], span[2, i] - rest_boxes[node, 1, i]), 0.0
+        )
+        rest_apart += gap * gap
+    return apart if rest_apart <= limit else np.inf
 
 
 @njit(cache=True, fastmath=FAST)
-def _least(boxes, rest_boxes, node, x, span, useful, worst, limit):
-    """The least squared distance from points of a group to a box that is of use to them; NONE if none is."""
-    rest_limit = limit * (1.0 + ROUND_OFF)
-    if _apart(boxes, node, span[0], span[1]) > worst or _apart(rest_boxes, node, span[2], span[3]) > rest_limit:
-        return NONE
+def _box_distances(boxes, node, x, out):
+    """Squared distances from the points of a group to a box."""
     l0, l1, l2 = np.float64(boxes[node, 0, 0]), np.float64(boxes[node, 0, 1]), np.float64(boxes[node, 0, 2])
     h0, h1, h2 = np.float64(boxes[node, 1, 0]), np.float64(boxes[node, 1, 1]), np.float64(boxes[node, 1, 2])
-    least = NONE
     for g in range(GROUP):
         dx = max(max(l0 - x[0, g], x[0, g] - h0), 0.0)
         dy = max(max(l1 - x[1, g], x[1, g] - h1), 0.0)
         dz = max(max(l2 - x[2, g], x[2, g] - h2), 0.0)
-        distance = dx * dx + dy * dy + dz * dz
-        least = min(least, distance if distance <= useful[g] else NONE)
-    return least
+        out[g] = dx * dx + dy * dy + dz * dz
 
 
-@njit(cache=True, fastmath=FAST)
-def _beyond_disc(discs, k, x, useful, out):
-    """Positive for points to which the flat disc around a face is of no use; and the least of them."""
-    c0, c1, c2, r = discs[k, 0], discs[k, 1], discs[k, 2], discs[k, 3]
-    n0, n1, n2 = discs[k, 4], discs[k, 5], discs[k, 6]
-    least = NONE
-    for g in range(GROUP):
-        dx, dy, dz = x[0, g] - c0, x[1, g] - c1, x[2, g] - c2
-        height = n0 * dx + n1 * dy + n2 * dz
-        across = np.sqrt(max(dx * dx + dy * dy + dz * dz - height * height, 0.0))
-        over = max(across - r, 0.0)
-        out[g] = height * height + over * over - useful[g]
-        least = min(least, out[g])
-    return least
+@njit(cache=True, inline="always")
+def _to_disc(discs, k, x, y, z):
+    """Squared distance from a point to the flat disc around a face."""
+    dx, dy, dz = x - discs[k, 0], y - discs[k, 1], z - discs[k, 2]
+    height = discs[k, 4] * dx + discs[k, 5] * dy + discs[k, 6] * dz
+    across = np.sqrt(max(dx * dx + dy * dy + dz * dz - height * height, 0.0)) - discs[k, 3]
+    return height * height + max(across, 0.0) ** 2
 
 
 @njit(cache=True, inline="always")
@@ -186,7 +185,7 @@ def _squared(points, k, x, g):
     return dx * dx + dy * dy + dz * dz
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _useful(squared, size, exact):
     """Squared distance beyond which nothing is of use, once something is found at `squared`.
 

@@ -44,12 +44,11 @@ def arctan2(y, x):
 
 
 @njit(cache=True)
-def add_blocks(u, n, e, corners, slots, base, stride, data):
+def add_blocks(u, row, n, e, corners, slots, base, stride, data):
     """Add the 3 x 3 blocks of element e in lane n of u to the values of a matrix, see `block_places`.
 
-    Of its corners x corners blocks, u holds those on and below the diagonal, row after row.
+    Of its corners x corners blocks, u holds those on and below the diagonal, row after row, from `row` on.
     """
-    row = 0
     for a in range(corners):
         for b in range(a + 1):
             slot = slots[e, a * corners + b]

@@ -145,9 +145,9 @@ def test_within_reach_answers_are_exact_and_beyond_there_are_none(name):
         exact = tree.nearest(points, **rest)
         distance = np.linalg.norm(points - exact.points, axis=1)
         reach = distance * generator.uniform(0.5, 1.5, len(points))
-        reach[::7] = np.inf
+        reach[distance < 1e-9] = np.inf  # of these round-off decides
         near = distance < reach
-        assert 0.3 < near.mean() < 0.8
+        assert 0.3 < near.mean() < 0.95
         for hints in (None, exact.faces, generator.integers(-1, len(faces), len(points))):
             found = tree.nearest(points, hints=hints, reach=reach, **rest)
             assert (found.faces[near] == exact.faces[near]).all() and (found.faces[~near] == -1).all()

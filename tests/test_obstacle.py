@@ -189,7 +189,9 @@ def wandering(seed: int) -> tuple[Obstacle, np.ndarray, np.ndarray]:
     rest, faces = bar()
     generator = np.random.default_rng(seed)
     rest_points = rest[faces].mean(axis=1)[generator.integers(len(faces), size=300)]
-    points = bent(rest_points * [1, 1.5, 1.5]) + generator.normal(0, 0.04, rest_points.shape)
+    thickness = generator.uniform(0.1, 2.0, (300, 1))
+    points = bent(rest_points * np.hstack([thickness**0, thickness, thickness]))
+    points += generator.normal(0, 0.01, points.shape)
     rest_points[::30, 2] += 0.5
     return Obstacle(bent(rest), faces, rest_positions=rest, region=0.3), points, rest_points
 
@@ -204,7 +206,9 @@ def test_planes_are_exact_within_reach_and_for_all_that_is_deep():
     needed[::30] = True  # no face of theirs is near: they meet all
     assert exact.far is None or not exact.far.any()
     assert (height < -0.025).sum() > 20 and 0.3 < needed.mean() < 0.8
-    for one, other in zip((found.points, found.normals, found.faces), (exact.points, exact.normals, exact.faces)):
+    for one, other in zip(
+        (found.points, found.normals, found.faces), (exact.points, exact.normals, exact.faces)
+    ):
         assert (one[needed] == other[needed]).all()
     far = found.far
     assert not far[needed].any() and far.sum() > 50
