@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from ..energies import BendHinge, ContactPenalty, Energy, StretchStVK
 
 MEMORY = 10
-REACH = 0.02  # [m] besides the way of inertia: a sample farther from its plane is in no contact
 ORDER = ("inertia", "gravity", "strain", "bending", "collision")  # of the energies of an iteration
 
 
@@ -80,7 +79,7 @@ class CompiledLBFGS:
         target = (terms.inertia.x_hat - x0).astype(np.float32).ravel()
         edges_of(x0, self._membrane.vertices, 2, self._membrane.state)
         edges_of(x0, self._hinges.vertices, 3, self._hinges.state)
-        contact = self._frozen_contact(x0, target)
+        contact = self._frozen_contact(x0)
         u = np.zeros(x0.size, np.float32)
         middle = time.perf_counter()
         if not iteration.precondition(contact, self._factor):
@@ -100,12 +99,12 @@ class CompiledLBFGS:
         reason = f"stopped after {int(self._counts[0])} iterations"
         return self._result(x, "max_iterations", reason, seconds, residual)
 
-    def _frozen_contact(self, x0: np.ndarray, target: np.ndarray) -> Any:
-        """The blocks of samples, those named that may touch: within REACH and the way that inertia asks for."""
+    def _frozen_contact(self, x0: np.ndarray) -> Any:
+        """The blocks of samples, and which of them have one that is not far."""
         near, term = np.zeros(0, np.int64), self._terms.contact
         if term is not None:
             near = _depths(
-                x0.ravel(), self._order, self._contact.vertices, self._weights, term.points, term.normals, term.margin, target,
+                x0.ravel(), self._order, self._contact.vertices, self._weights, term.points, term.normals, term.margin, _far(term),
                 self._contact.state,
             )  # fmt: skip
         return iteration.Contact(near, *self._contact)
@@ -186,9 +185,15 @@ def _factor(cloth: Cloth, terms: Terms, order: np.ndarray) -> Any:
     )  # fmt: skip
 
 
+def _far(term: ContactPenalty) -> np.ndarray:
+    """(S,) samples that the step has out of reach."""
+    planes = term.planes
+    return np.zeros(len(term.stencils), bool) if planes is None or planes.far is None else planes.far
+
+
 @njit(cache=True)
-def _depths(x, order, vertices, constants, points, normals, margin, target, state):
-    """Normals and depths of the samples at x (3V,), in blocks; those with a sample that may touch."""
+def _depths(x, order, vertices, constants, points, normals, margin, far, state):
+    """Normals and depths of the samples at x (3V,), in blocks; those with one that is not far (S,)."""
     near, count = np.empty(len(state), np.int64), 0
     for place in range(len(order)):
         s, block, lane = order[place], place // LANES, place % LANES
@@ -200,14 +205,8 @@ def _depths(x, order, vertices, constants, points, normals, margin, target, stat
             depth -= normals[s, a] * (sample - points[s, a])
             state[block, a * LANES + lane] = normals[s, a]
         state[block, 3 * LANES + lane] = depth
-        if count > 0 and near[count - 1] == block:
+        if far[s] or (count > 0 and near[count - 1] == block):
             continue
-        if depth <= -REACH:
-            way = 0.0
-            for a in range(3):
-                way += (u * target[i + a] + v * target[j + a] + w * target[k + a]) ** 2
-            if (depth + REACH) ** 2 >= way:
-                continue
         near[count] = block
         count += 1
     return near[:count]

@@ -112,7 +112,8 @@ class SlidingObstacle(Obstacle):
             set_normals(deep)
         anchors.frame = frame
         faces = self._patch.numbers[anchors.faces]
-        return Planes(anchors.closest.copy(), normals, faces, anchors.barycentric.copy())
+        far = None if reach is None else anchors.distance > reach
+        return Planes(anchors.closest.copy(), normals, faces, anchors.barycentric.copy(), far)
 
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
