@@ -27,7 +27,7 @@ from ..closest_point import FaceTree, by_cells
 from ..group_search import GROUP
 from ..kernel_cache import njit
 from ..obstacle import Obstacle, Planes
-from ..surface import carry, plane_normals, vertex_normals
+from ..surface import carry, not_outside, plane_normals, vertex_normals
 from ..surface_walk import triangle_adjacency, walk_to_foot
 
 ROTATION = 16
@@ -173,6 +173,7 @@ class _Anchors:
         self.neighbours = np.ascontiguousarray(near[:, 1:])
         self._order = by_cells(home)
         self._led: dict[int, bool] = {}
+        self._home: np.ndarray | None = None
         self.barycentric, self.closest = np.zeros((count, 3)), np.zeros((count, 3))
         self.distance = np.zeros(count)
         self.forget()
@@ -183,6 +184,12 @@ class _Anchors:
             first = self.home[: len(other.home)]
             self._led[id(other)] = other is not self and np.array_equal(first, other.home)
         return self._led[id(other)]
+
+    def _home_faces(self, patch: _Patch) -> np.ndarray:
+        """(S,) the face whose rest centroid is nearest to the sample at rest."""
+        if self._home is None:
+            self._home = cKDTree(patch.centroids).query(self.home)[1]
+        return self._home
 
     def forget(self) -> None:
         self.faces = np.full(len(self.home), -1)
@@ -215,6 +222,10 @@ class _Anchors:
         if reach is not None:
             far = self._order[(self.distance > reach)[self._order]]
             self.search(far, points, patch, region, reach)
+            if self.rest_points is not None:  # by the rule of the exact one: deep is not far
+                out = np.where(self.distance > reach, -1, self.faces)
+                deep = not_outside(out, points, self._home_faces(patch), vertices, patch.faces)
+                self.search(deep, points, patch, region)
         self.turn = (self.turn + 1) % ROTATION
         _ask_neighbours(points, self.neighbours, *skin, self.home, limit, *state)
 
