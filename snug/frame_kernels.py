@@ -7,6 +7,8 @@ matrix lies in one piece, in the order of use, float32, bf16 (the upper halves o
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import types
 from numba.extending import overload
@@ -100,19 +102,29 @@ def run_frame(
     skin_frame(work[len(work) - rest.size :], rest, first, joints, shares, order, transforms, pelvis, out)
 
 
-def _value(weight):
+def _value(weight: Any) -> Any:
     """A stored weight as float32, but for its row's factor."""
 
 
+def _expanded(weight: Any) -> Any:  # bf16 is the upper half of a float32
+    return np.uint32(np.uint32(weight) << np.uint32(16)).view(np.float32)
+
+
+def _converted(weight: Any) -> Any:
+    return np.float32(weight)
+
+
 @overload(_value, inline="always")
-def _value_of(weight):
+def _value_of(weight: Any) -> Any:
     if weight == types.uint16:
-        return lambda weight: np.uint32(np.uint32(weight) << np.uint32(16)).view(np.float32)
-    return lambda weight: np.float32(weight)
+        return _expanded
+    return _converted
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _multiply(kind, weights, terms, x, y, rows, columns):
+def _multiply(
+    kind: int, weights: np.ndarray, terms: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int
+) -> None:
     """Four rows at once: each number of x is read once for them, and four streams come from memory."""
     for i in range(0, rows, ROWS):
         w = weights[i * columns :]
@@ -146,8 +158,8 @@ def _sigmoid(x: np.float32) -> np.float32:
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _cell(inputs, recurrent, state, size):
-    """torch.nn.GRU's convention, see snug.fast_network; inputs W_i x + b_i and recurrent W_h h + b_h: (3 size,)"""
+def _cell(inputs: np.ndarray, recurrent: np.ndarray, state: np.ndarray, size: int) -> None:
+    """torch.nn.GRU's gates, see snug.fast_network, of W_i x + b_i and W_h h + b_h, (3 size,) each."""
     for j in range(size):
         r = _sigmoid(inputs[j] + recurrent[j])
         z = _sigmoid(inputs[size + j] + recurrent[size + j])

@@ -103,10 +103,8 @@ class FramePlan:
         self._terms += [network.input_mean.numpy(), network.input_std.numpy()]
         return self._place(len(network.input_mean) + further)
 
-    def linear(
-        self, layer: nn.Linear, x: slice, *, rectified: bool = False, target: slice | None = None
-    ) -> slice:
-        """That layer of the numbers at x; of it the positive part, if rectified."""
+    def linear(self, layer: Any, x: slice, *, rectified: bool = False, target: slice | None = None) -> slice:
+        """A torch.nn.Linear of the numbers at x; of it the positive part, if rectified."""
         target = target or self._place(layer.out_features)
         kind = RECTIFIED if rectified else PRODUCT
         self._product(kind, *_numbers_of(layer), x, target.start)
@@ -125,7 +123,7 @@ class FramePlan:
             x = state
         return x
 
-    def offsets(self, network: Any, *parts: tuple[nn.Linear, slice]) -> None:
+    def offsets(self, network: Any, *parts: tuple[Any, slice]) -> None:
         """The network's answer, (3 V,) by these layers of the numbers there, summed. It comes last."""
         places, vertices = self._places.copy(), network.vertices
         places[np.isin(places, network.pins)] = vertices  # as those behind: without offset
@@ -183,8 +181,8 @@ def rounded(network: Any, precision: str) -> Any:
     return network
 
 
-def _numbers_of(layer: nn.Linear) -> tuple[np.ndarray, np.ndarray]:
-    """Matrix (m, n) and bias (m,)."""
+def _numbers_of(layer: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Matrix (m, n) and bias (m,) of a torch.nn.Linear."""
     bias = torch.zeros(layer.out_features) if layer.bias is None else layer.bias.detach()
     return layer.weight.detach().numpy(), bias.numpy()
 

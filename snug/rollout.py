@@ -1,7 +1,7 @@
 """Run a trained network over a motion, one frame at a time, as an application would.
 
-Times of frames are those of network and skinning, one compiled call (snug.frame_plan); `frame_inputs` makes what
-they take as ready. Many at once go through torch.
+Times of frames are those of network and skinning, one compiled call each (snug.frame_plan); `frame_inputs`
+makes what they take as ready. Many bodies at once go through torch.
 """
 
 from __future__ import annotations
@@ -228,8 +228,8 @@ def _features(
 def _one_by_one(
     frame: CompiledFrame, features: np.ndarray, dressed: DressedBody, motion: Any, betas: np.ndarray | None
 ) -> Callable[[], Iterator[np.ndarray]]:
-    """What begins the frames of the motion anew, after those of the features that come before it. It is compiled and
-    warmed up at once.
+    """What begins the frames of the motion anew, from the state that earlier features leave; it is compiled
+    and warmed up at once.
     """
     transforms, pelvis = dressed.transforms(motion.poses, betas).numpy(), dressed.pelvis(motion, betas)
     past, features = features[: -motion.frames], features[-motion.frames :]

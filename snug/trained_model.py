@@ -72,8 +72,7 @@ class TrainedModel:
     summary: windows above the spike limit, updates left out, returns to good weights, with names.
     seconds: wall time of the steps, contact search included, and of a pretraining before them;
         setup_seconds: of making ready the motions and the first anchors.
-    precision: that of its matrices in memory in a roll-out on a CPU, one of snug.frame_plan.PRECISIONS; a choice of
-        whoever runs it, not in its file.
+    precision: of its matrices in roll-outs, one of snug.frame_plan.PRECISIONS; its file does not say it.
     """
 
     kind: str

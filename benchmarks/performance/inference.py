@@ -25,8 +25,8 @@ SWEPT = 48  # [MB] of other work between two cold frames: a solver, and what lie
 
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
-    """Median, 95 % and least time over all frames of roll-outs, and the median of a roll-out whose weights have left the
-    caches before each frame; memory and file of the network.
+    """Median, 95 % and least time over all frames of roll-outs, and the median of a cold one; memory and file
+    of the network.
     """
     from snug.training import untrained_model
 

@@ -52,8 +52,9 @@ class PoseSpaceDeformation(nn.Module):
     def lay_out(self, plan: FramePlan) -> None:
         """`forward` for one frame."""
         x = plan.normalised(self)
-        for layer in self.activations[::2]:
-            x = plan.linear(layer, x, rectified=True)
+        for layer in self.activations:
+            if isinstance(layer, nn.Linear):
+                x = plan.linear(layer, x, rectified=True)
         plan.offsets(self, (self.offsets, x))
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> None:

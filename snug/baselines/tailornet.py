@@ -124,8 +124,9 @@ class FrequencyMixture(nn.Module):
         if len(self.high) > 1:
             raise ValueError(f"a network of {len(self.high)} pivots has no compiled frame: use one pivot")
         x = plan.normalised(self)
-        both = zip((self.low, self.high[0]), (x, slice(x.start, x.stop - SHAPES)))
-        plan.offsets(self, *(net.lay_out(plan, numbers) for net, numbers in both))
+        high: Any = self.high[0]
+        pose = slice(x.start, x.stop - SHAPES)
+        plan.offsets(self, self.low.lay_out(plan, x), high.lay_out(plan, pose))
 
 
 def smoothed(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
