@@ -22,7 +22,7 @@ FAST = {"reassoc", "contract", "nsz"}  # a number that is not finite stays so
 _ZERO, _ONE, _TWO, _HALF = (np.float32(x) for x in (0.0, 1.0, 2.0, 0.5))
 _LOG2_E, _LN_2 = np.float32(np.log2(np.e)), np.float32(np.log(2.0))
 _LOWEST, _HIGHEST, _BIAS, _SHIFT = np.float32(-126.0), np.float32(126.0), np.int32(127), np.int32(23)
-_C2, _C3, _C4, _C5, _C6, _C7 = (np.float32(1.0 / n) for n in (2, 6, 24, 120, 720, 5040))
+_C2, _C3, _C4, _C5, _C6 = (np.float32(1.0 / n) for n in (2, 6, 24, 120, 720))
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -153,7 +153,7 @@ def _sigmoid(x: np.float32) -> np.float32:
     y = _HIGHEST if y > _HIGHEST else y
     k = np.int32(y + (_HIGHEST + _TWO + _HALF)) - np.int32(128)
     r = (y - np.float32(k)) * _LN_2
-    e = _ONE + r * (_ONE + r * (_C2 + r * (_C3 + r * (_C4 + r * (_C5 + r * (_C6 + r * _C7))))))
+    e = _ONE + r * (_ONE + r * (_C2 + r * (_C3 + r * (_C4 + r * (_C5 + r * _C6)))))
     return _ONE / (_ONE + e * np.int32((k + _BIAS) << _SHIFT).view(np.float32))
 
 
