@@ -1,0 +1,188 @@
+"""Preconditioned L-BFGS that is stopped early, compiled as a whole and in float32.
+
+The method of minimise.LBFGS without its finish by Newton: the same preconditioner (mass over dt^2, the cotangent
+Laplacian, contacts at the start), the same two-loop recursion, the same sufficient decrease. What it leaves
+out: float64, the check of convergence (nothing but a factorised Hessian can say "converged"), and all terms
+but inertia, weight, StVK, hinges and the contact penalty.
+"""
+
+from __future__ import annotations
+
+import time
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..cloth import Cloth
+from ..kernel_cache import njit
+from ..known_terms import Terms, terms_of
+from ..minimise.descent import mean_weight
+from ..minimise.result import Result
+from ..potential import Potential
+from . import iteration
+from .elements import LANES, SCRATCH, blocks, edges_of
+from .scalar_factor import WIDTH, ScalarPattern
+
+if TYPE_CHECKING:
+    from ..energies import BendHinge, ContactPenalty, Energy, StretchStVK
+
+MEMORY = 10
+ORDER = ("inertia", "gravity", "strain", "bending", "collision")  # of the energies of an iteration
+
+
+class CompiledLBFGS:
+    """A minimiser bound to one potential.
+
+    Args:
+        max_iterations: after which it stops.
+        tolerance: relative residual, as in Newton, at which it stops sooner.
+
+    Raises:
+        ValueError: a term that it has no kernel for, or no inertia.
+    """
+
+    def __init__(self, potential: Potential, *, max_iterations: int, tolerance: float = 1e-6) -> None:
+        self.potential, self.max_iterations = potential, max_iterations
+        self._terms = terms = terms_of(potential, "CompiledLBFGS")
+        self._weight = mean_weight(potential)
+        self._tolerance = tolerance * self._weight
+        cloth = potential.cloth
+        count = cloth.vertex_count
+        zero = np.zeros(count)
+        self._vertices = iteration.Vertices(
+            (terms.inertia.masses / terms.inertia.dt**2).astype(np.float32),
+            (zero if terms.gravity is None else terms.gravity.weights).astype(np.float32),
+            3 * np.asarray(cloth.pins, np.int64),
+        )
+        self._membrane, self._lame = _membrane(terms.strain)
+        self._hinges = _hinges(terms.bending)
+        self._contact = _contact(terms.contact)
+        self._factor = _factor(cloth, terms)
+        size = (MEMORY, 3 * count)
+        self._memory = iteration.Memory(
+            np.empty(size, np.float32), np.empty(size, np.float32), np.empty(MEMORY, np.float32)
+        )
+        self._work = np.empty((4, 3 * count), np.float32)
+        self._scratch = np.empty(SCRATCH, np.float32)
+        self._energies, self._counts = np.zeros(5), np.zeros(3)
+        self._first_step = 1.0  # what the first direction of the last step allowed: most of the next too
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        """Run from x0 (V, 3) [m]: status "max_iterations", or "diverged"."""
+        start = time.perf_counter()
+        terms, x0 = self._terms, np.ascontiguousarray(x0, np.float64)
+        target = (terms.inertia.x_hat - x0).astype(np.float32).ravel()
+        edges_of(x0, self._membrane.vertices, 2, self._membrane.state)
+        edges_of(x0, self._hinges.vertices, 3, self._hinges.state)
+        if terms.contact is not None:
+            _freeze(terms.contact, x0, self._contact.state)
+        u = np.zeros(x0.size, np.float32)
+        middle = time.perf_counter()
+        if not iteration.precondition(self._contact, self._factor):
+            return self._result(x0, "stalled", "the preconditioner is not positive definite", {}, np.nan)
+        begun = time.perf_counter()
+        residual = iteration.descend(
+            u, target, self._vertices, self._membrane, self._lame, self._hinges, self._contact, self._factor,
+            self._memory, self.max_iterations, self._tolerance, min(2.0 * self._first_step, 1.0), self._work,
+            self._scratch, self._energies, self._counts,
+        )  # fmt: skip
+        self._first_step = float(self._counts[2])
+        seconds = {"assemble": middle - start, "factorise": begun - middle}
+        seconds["evaluate"] = time.perf_counter() - begun
+        x = x0 + u.reshape(x0.shape)
+        if not np.isfinite(self._energies.sum()):
+            return self._result(x, "diverged", "the energy is not finite", seconds, residual)
+        reason = f"stopped after {int(self._counts[0])} iterations"
+        return self._result(x, "max_iterations", reason, seconds, residual)
+
+    def _result(
+        self, x: np.ndarray, status: str, reason: str, seconds: dict[str, float], residual: float
+    ) -> Result:
+        named = dict(zip(ORDER, self._energies.tolist()))
+        gravity = self._terms.gravity
+        if gravity is not None:
+            named["gravity"] = gravity.value_and_gradient(x)[0]
+        terms = {energy.name: named[energy.name] for energy in self.potential.energies}
+        return Result(
+            positions=x,
+            status=status,
+            reason=reason,
+            iterations=int(self._counts[0]),
+            factorisations=1,
+            gradient_norm=float(residual) / self._weight,
+            energy=sum(terms.values()),
+            terms=terms,
+            seconds=seconds,
+        )
+
+
+def _indices(stencils: np.ndarray) -> np.ndarray:
+    return blocks(3 * stencils.astype(np.int32))
+
+
+def _elements(stencils: np.ndarray, constants: list[np.ndarray], states: int) -> Any:
+    """Blocks of elements with constants (N,) or (N, k), and room for so many states."""
+    columns = np.concatenate([c.reshape(len(c), prod(c.shape[1:])) for c in constants], axis=1)
+    vertices = _indices(stencils)
+    state = np.zeros((len(vertices), states * LANES), np.float32)
+    return iteration.Elements(vertices, blocks(columns.astype(np.float32)), state)
+
+
+def _membrane(term: StretchStVK | None) -> tuple[Any, Any]:
+    if term is None:
+        return _elements(np.zeros((0, 3), int), [np.zeros((0, 5))], 6), iteration.Lame(*np.zeros(2, "f4"))
+    elements = _elements(term.stencils, [term.Dm_inverse, term.areas], 6)
+    return elements, iteration.Lame(np.float32(term.lam), np.float32(term.mu))
+
+
+def _hinges(term: BendHinge | None) -> Any:
+    if term is None:
+        return _elements(np.zeros((0, 4), int), [np.zeros((0, 2))], 9)
+    return _elements(term.stencils, [term.stiffness, term.rest_angles], 9)
+
+
+def _contact(term: ContactPenalty | None) -> Any:
+    if term is None:
+        return _elements(np.zeros((0, 3), int), [np.zeros((0, 4))], 4)
+    return _elements(term.stencils, [term.weights, term.stiffness], 4)
+
+
+def _factor(cloth: Cloth, terms: Terms) -> Any:
+    """Pattern and constant values of the preconditioner, and room for its factor."""
+    number = np.full(cloth.vertex_count, -1)
+    number[cloth.free] = np.arange(cloth.free.sum())
+    fixed: list[Energy] = [e for e in (terms.inertia, terms.strain) if e is not None]
+    touching = np.zeros((0, 3), int) if terms.contact is None else terms.contact.stencils
+    pattern = ScalarPattern(int(cloth.free.sum()), [number[e.stencils] for e in fixed] + [number[touching]])
+    constant = np.zeros(pattern.entries)
+    for energy in fixed:
+        elements, values = energy.scalar_stiffness(cloth.rest_positions)
+        places = pattern.places(number[energy.stencils[elements]])
+        np.add.at(constant, places[places >= 0], values[places >= 0])
+    places = pattern.places(number[touching]).reshape(-1, 9)
+    n, entries = pattern.count, len(pattern.rows)
+    return iteration.Factor(
+        constant, blocks(places), np.flatnonzero(cloth.free)[pattern.order], pattern.row_starts,
+        pattern.row_columns, pattern.factor_rows, pattern.factor_columns, pattern.starts, pattern.rows,
+        np.empty_like(constant), np.empty(entries), np.empty(n), np.zeros(n), np.empty(n, np.int64),
+        np.zeros((n, WIDTH)),
+    )  # fmt: skip
+
+
+def _freeze(term: ContactPenalty, x0: np.ndarray, state: np.ndarray) -> None:
+    """Normals and depths of the samples at x0, in blocks."""
+    _depths(x0, term.stencils, term.weights, term.points, term.normals, term.margin, state)
+
+
+@njit(cache=True)
+def _depths(x, stencils, weights, points, normals, margin, state):
+    for s in range(len(stencils)):
+        block, lane, depth = s // LANES, s % LANES, margin
+        for i in range(3):
+            sample = 0.0
+            for a in range(3):
+                sample += weights[s, a] * x[stencils[s, a], i]
+            depth -= normals[s, i] * (sample - points[s, i])
+            state[block, i * LANES + lane] = normals[s, i]
+        state[block, 3 * LANES + lane] = depth
