@@ -125,11 +125,11 @@ def _value_of(weight: Any) -> Any:
 def _multiply(
     kind: int, weights: np.ndarray, terms: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int
 ) -> None:
-    """Four rows at once: each number of x is read once for them, and four streams come from memory."""
-    for i in range(0, rows, ROWS):
-        w = weights[i * columns :]
-        w0, w1 = w[:columns], w[columns : 2 * columns]
-        w2, w3 = w[2 * columns : 3 * columns], w[3 * columns : 4 * columns]
+    """Four rows at once, a quarter of the matrix apart: memory gives four streams sooner than one."""
+    part = rows // ROWS
+    for i in range(part):
+        w0, w1 = weights[i * columns :], weights[(part + i) * columns :]
+        w2, w3 = weights[(2 * part + i) * columns :], weights[(3 * part + i) * columns :]
         s0, s1, s2, s3 = _ZERO, _ZERO, _ZERO, _ZERO
         for k in range(columns):
             s0 += _value(w0[k]) * x[k]
@@ -137,12 +137,13 @@ def _multiply(
             s2 += _value(w2[k]) * x[k]
             s3 += _value(w3[k]) * x[k]
         for r, s in enumerate((s0, s1, s2, s3)):
-            value = terms[i + r] * s + terms[rows + i + r]
+            j = r * part + i
+            value = terms[j] * s + terms[rows + j]
             if kind == ADDED:
-                value += y[i + r]
+                value += y[j]
             elif kind == RECTIFIED and value < _ZERO:
                 value = _ZERO
-            y[i + r] = value
+            y[j] = value
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
