@@ -90,7 +90,7 @@ class Body:
         """
         from scipy.sparse import csr_array
 
-        # sum_j w_ij T_j (p_i, 1) is one matrix product: (w_ij p_ik) over (j, k), mostly zero, times T over (j, k).
+        # sum_j w_ij T_j (p_i, 1) is one product: (w_ij p_ik) over (j, k), mostly zero, times T over (j, k).
         points = np.concatenate([self.shaped(betas), np.ones((len(self.template), 1))], axis=1)
         spread = csr_array((self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), -1))
 
