@@ -152,7 +152,7 @@ def run_gru(gru: nn.GRU, x: Tensor, state: Tensor | None) -> tuple[Tensor, Tenso
 
 
 def run_linear(layer: nn.Linear, x: Tensor) -> Tensor:
-    """What layer(x) gives, for x (..., k); by `product` where no gradient is asked for, in float32 on a CPU."""
+    """What layer(x) gives, x (..., k); by `product` where no gradient is asked for, in float32 on a CPU."""
     if torch.is_grad_enabled() or x.device.type != "cpu" or x.dtype != torch.float32:
         return layer(x)
     return product(x.flatten(0, -2), layer.weight, layer.bias).view(*x.shape[:-1], -1)
