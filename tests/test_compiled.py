@@ -51,7 +51,7 @@ def in_float32(solver: CompiledLBFGS, x0: np.ndarray, u: np.ndarray) -> tuple[np
     target = (solver._terms.inertia.x_hat - x0).astype(np.float32).ravel()
     evaluate(
         u.astype(np.float32).ravel(), target, solver._vertices, solver._membrane, solver._lame, solver._hinges,
-        solver._contact, gradient, solver._scratch, energies,
+        solver._frozen_contact(x0, target), gradient, solver._scratch, energies,
     )  # fmt: skip
     return energies, gradient.reshape(u.shape)
 

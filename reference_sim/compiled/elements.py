@@ -185,14 +185,14 @@ def hinge_gradient(u, vertices, constants, edges, gradient, s):
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def contact_gradient(u, vertices, constants, planes, gradient, s):
+def contact_gradient(u, near, vertices, constants, planes, gradient, s):
     """Energy [J] of the contact penalty; adds to gradient (3V,) [N].
 
-    vertices (B, 3 LANES): 3 times the vertex. constants (B, 4 LANES): weights, stiffness [J/m^3]. planes
+    near: the blocks that are looked at. vertices (B, 3 LANES): 3 times the vertex. constants (B, 4 LANES): weights, stiffness [J/m^3]. planes
     (B, 4 LANES): normal, and the depth of x_0 under the margin [m], below zero above it.
     """
     total = 0.0
-    for b in range(len(vertices)):
+    for b in near:
         at, c, n = vertices[b], constants[b], planes[b]
         for l in range(LANES):
             i, j, k = at[l], at[LANES + l], at[2 * LANES + l]

@@ -26,8 +26,10 @@ INERTIA, GRAVITY, STRAIN, BENDING, COLLISION = range(5)  # places of their energ
 
 # What is constant of a potential. Vertices: inertia [N/m] and weights [N] (V,); pinned: 3 times the vertex.
 Vertices = namedtuple("Vertices", "inertia weights pinned")
-# vertices, constants, and per step the edges of x_0 or the planes; see elements.
+# vertices, constants, and per step the edges of x_0 or the planes; see elements. near: blocks (n,) of contact
+# samples that may touch in this step.
 Elements = namedtuple("Elements", "vertices constants state")
+Contact = namedtuple("Contact", "near vertices constants state")
 Lame = namedtuple("Lame", "lam mu")
 # The preconditioner: constant values (nnz,), where a contact sample (B, 9 LANES) adds to them, the pattern
 # and the factor.
@@ -52,7 +54,7 @@ def evaluate(u, target, vertices, membrane, lame, hinges, contact, gradient, scr
         u, hinges.vertices, hinges.constants, hinges.state, gradient, scratch
     )
     energies[COLLISION] = contact_gradient(
-        u, contact.vertices, contact.constants, contact.state, gradient, scratch
+        u, contact.near, contact.vertices, contact.constants, contact.state, gradient, scratch
     )
     for i in vertices.pinned:
         for a in range(3):
@@ -65,7 +67,7 @@ def precondition(contact, factor):
     """Factorise the constant stiffness plus that of the samples that touch at x_0."""
     values = factor.values
     values[:] = factor.constant
-    for b in range(len(contact.vertices)):
+    for b in contact.near:
         for l in range(LANES):
             depth = contact.state[b, 3 * LANES + l]
             if depth <= 0.0:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..closest_point import by_cells
 from ..cloth import Cloth
 from ..kernel_cache import njit
 from ..known_terms import Terms, terms_of
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from ..energies import BendHinge, ContactPenalty, Energy, StretchStVK
 
 MEMORY = 10
+REACH = 0.02  # [m] besides the way of inertia: a sample farther from its plane is in no contact
 ORDER = ("inertia", "gravity", "strain", "bending", "collision")  # of the energies of an iteration
 
 
@@ -57,8 +59,11 @@ class CompiledLBFGS:
         )
         self._membrane, self._lame = _membrane(terms.strain)
         self._hinges = _hinges(terms.bending)
-        self._contact = _contact(terms.contact)
-        self._factor = _factor(cloth, terms)
+        self._order, self._contact = _contact(terms.contact)
+        self._weights = np.zeros((0, 3 * LANES))  # in float64: a third of metres is no third in float32
+        if terms.contact is not None:
+            self._weights = blocks(terms.contact.weights[self._order])
+        self._factor = _factor(cloth, terms, self._order)
         size = (MEMORY, 3 * count)
         self._memory = iteration.Memory(
             np.empty(size, np.float32), np.empty(size, np.float32), np.empty(MEMORY, np.float32)
@@ -75,15 +80,14 @@ class CompiledLBFGS:
         target = (terms.inertia.x_hat - x0).astype(np.float32).ravel()
         edges_of(x0, self._membrane.vertices, 2, self._membrane.state)
         edges_of(x0, self._hinges.vertices, 3, self._hinges.state)
-        if terms.contact is not None:
-            _freeze(terms.contact, x0, self._contact.state)
+        contact = self._frozen_contact(x0, target)
         u = np.zeros(x0.size, np.float32)
         middle = time.perf_counter()
-        if not iteration.precondition(self._contact, self._factor):
+        if not iteration.precondition(contact, self._factor):
             return self._result(x0, "stalled", "the preconditioner is not positive definite", {}, np.nan)
         begun = time.perf_counter()
         residual = iteration.descend(
-            u, target, self._vertices, self._membrane, self._lame, self._hinges, self._contact, self._factor,
+            u, target, self._vertices, self._membrane, self._lame, self._hinges, contact, self._factor,
             self._memory, self.max_iterations, self._tolerance, min(2.0 * self._first_step, 1.0), self._work,
             self._scratch, self._energies, self._counts,
         )  # fmt: skip
@@ -95,6 +99,16 @@ class CompiledLBFGS:
             return self._result(x, "diverged", "the energy is not finite", seconds, residual)
         reason = f"stopped after {int(self._counts[0])} iterations"
         return self._result(x, "max_iterations", reason, seconds, residual)
+
+    def _frozen_contact(self, x0: np.ndarray, target: np.ndarray) -> Any:
+        """The blocks of samples, those named that may touch: within REACH and the way that inertia asks for."""
+        near, term = np.zeros(0, np.int64), self._terms.contact
+        if term is not None:
+            near = _depths(
+                x0.ravel(), self._order, self._contact.vertices, self._weights, term.points, term.normals, term.margin, target,
+                self._contact.state,
+            )  # fmt: skip
+        return iteration.Contact(near, *self._contact)
 
     def _result(
         self, x: np.ndarray, status: str, reason: str, seconds: dict[str, float], residual: float
@@ -142,18 +156,20 @@ def _hinges(term: BendHinge | None) -> Any:
     return _elements(term.stencils, [term.stiffness, term.rest_angles], 9)
 
 
-def _contact(term: ContactPenalty | None) -> Any:
+def _contact(term: ContactPenalty | None) -> tuple[np.ndarray, Any]:
+    """Samples in an order (S,) in which those of a block lie near each other, and their blocks."""
     if term is None:
-        return _elements(np.zeros((0, 3), int), [np.zeros((0, 4))], 4)
-    return _elements(term.stencils, [term.weights, term.stiffness], 4)
+        return np.zeros(0, int), _elements(np.zeros((0, 3), int), [np.zeros((0, 4))], 4)
+    order = by_cells(term.rest_samples)
+    return order, _elements(term.stencils[order], [term.weights[order], term.stiffness[order]], 4)
 
 
-def _factor(cloth: Cloth, terms: Terms) -> Any:
+def _factor(cloth: Cloth, terms: Terms, order: np.ndarray) -> Any:
     """Pattern and constant values of the preconditioner, and room for its factor."""
     number = np.full(cloth.vertex_count, -1)
     number[cloth.free] = np.arange(cloth.free.sum())
     fixed: list[Energy] = [e for e in (terms.inertia, terms.strain) if e is not None]
-    touching = np.zeros((0, 3), int) if terms.contact is None else terms.contact.stencils
+    touching = np.zeros((0, 3), int) if terms.contact is None else terms.contact.stencils[order]
     pattern = ScalarPattern(int(cloth.free.sum()), [number[e.stencils] for e in fixed] + [number[touching]])
     constant = np.zeros(pattern.entries)
     for energy in fixed:
@@ -170,19 +186,28 @@ def _factor(cloth: Cloth, terms: Terms) -> Any:
     )  # fmt: skip
 
 
-def _freeze(term: ContactPenalty, x0: np.ndarray, state: np.ndarray) -> None:
-    """Normals and depths of the samples at x0, in blocks."""
-    _depths(x0, term.stencils, term.weights, term.points, term.normals, term.margin, state)
-
-
 @njit(cache=True)
-def _depths(x, stencils, weights, points, normals, margin, state):
-    for s in range(len(stencils)):
-        block, lane, depth = s // LANES, s % LANES, margin
-        for i in range(3):
-            sample = 0.0
-            for a in range(3):
-                sample += weights[s, a] * x[stencils[s, a], i]
-            depth -= normals[s, i] * (sample - points[s, i])
-            state[block, i * LANES + lane] = normals[s, i]
+def _depths(x, order, vertices, constants, points, normals, margin, target, state):
+    """Normals and depths of the samples at x (3V,), in blocks; those with a sample that may touch."""
+    near, count = np.empty(len(state), np.int64), 0
+    for place in range(len(order)):
+        s, block, lane = order[place], place // LANES, place % LANES
+        i, j, k = vertices[block, lane], vertices[block, LANES + lane], vertices[block, 2 * LANES + lane]
+        u, v, w = constants[block, lane], constants[block, LANES + lane], constants[block, 2 * LANES + lane]
+        depth = margin
+        for a in range(3):
+            sample = u * x[i + a] + v * x[j + a] + w * x[k + a]
+            depth -= normals[s, a] * (sample - points[s, a])
+            state[block, a * LANES + lane] = normals[s, a]
         state[block, 3 * LANES + lane] = depth
+        if count > 0 and near[count - 1] == block:
+            continue
+        if depth <= -REACH:
+            way = 0.0
+            for a in range(3):
+                way += (u * target[i + a] + v * target[j + a] + w * target[k + a]) ** 2
+            if (depth + REACH) ** 2 >= way:
+                continue
+        near[count] = block
+        count += 1
+    return near[:count]

@@ -38,7 +38,8 @@ class ScalarPattern:
             k = stencil.shape[1]
             both = stencil[:, [(a, b) for a in range(k) for b in range(a)]].reshape(-1, 2)
             pairs.append(both[(both >= 0).all(axis=1) & (both[:, 0] != both[:, 1])])
-        pair = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
+        both = np.sort(np.concatenate(pairs), axis=1)
+        pair = np.stack(np.divmod(np.unique(both[:, 0] * count + both[:, 1]), count), axis=1)
         ones = np.ones(len(pair))
         lower = sp.csr_matrix((ones, (pair[:, 1], pair[:, 0])), shape=(count, count))
         self.order = np.asarray(nested_dissection((lower + lower.T).tocsr()), np.int64)
@@ -79,9 +80,9 @@ def _pattern_of_rows(starts: np.ndarray, columns: np.ndarray) -> tuple[np.ndarra
     factor_rows = np.cumsum(lengths)
     factor_columns = np.empty(factor_rows[-1], np.int64)
     _row_patterns(starts, columns, factor_rows.copy(), factor_columns)
-    for k in range(count):  # ascending: a column after those that it depends on
-        factor_columns[factor_rows[k] : factor_rows[k + 1]].sort()
-    return factor_rows, factor_columns
+    # Ascending: a column after those that it depends on.
+    rows = np.repeat(np.arange(count), np.diff(factor_rows))
+    return factor_rows, factor_columns[np.lexsort((factor_columns, rows))]
 
 
 @njit(cache=True)

@@ -4,9 +4,10 @@ From frame to frame the closest point of a sample moves little. So it slides (su
 to the foot of its sample, which finds it wherever the surface is one smooth sheet. What sliding cannot find is
 another limb that came near. Against that, in each frame:
 
-- one sample in ROTATION is searched exactly, another one each time;
+- one group of neighbouring samples in ROTATION is searched exactly, another one each time;
 - a sample tries its neighbours' faces where its own is too far: distances of two samples to one surface differ
   by no more than the samples are apart;
+- a sample whose place is farther away than the step's reach looks for another surface within that reach;
 - a sample deeper than DEEP below its plane is searched exactly: that is where a false plane costs most.
 
 What the rotation finds reaches its neighbours by the second rule in the same frame. A plane is therefore that
@@ -22,12 +23,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..closest_point import FaceTree
+from ..closest_point import FaceTree, by_cells
+from ..group_search import GROUP
 from ..kernel_cache import njit
-from ..obstacle import Obstacle, Planes, _plane_normals, vertex_normals
+from ..obstacle import Obstacle, Planes
+from ..surface import carry, plane_normals, vertex_normals
 from ..surface_walk import triangle_adjacency, walk_to_foot
 
 ROTATION = 16
+FAR, SELDOM = 0.03, 4  # [m] samples farther away slide in one frame of so many only, and ride in the others
 DEEP = 2e-3  # [m] below the plane
 SLACK = 1e-4  # [m] by which a neighbour's distance must be the better one to be tried
 NEIGHBOURS = 4
@@ -49,6 +53,7 @@ class SlidingObstacle(Obstacle):
         super()._forget()
         self._kinds: dict[tuple[int, bool], _Anchors] = {}
         self._patch: _Patch | None = None
+        self._none_far = np.zeros(0, bool)
         self._posed: tuple[int, np.ndarray, np.ndarray] | None = None  # frame, vertices, their normals
 
     def start_again(self) -> None:
@@ -60,7 +65,7 @@ class SlidingObstacle(Obstacle):
         """Vertices and normals at a frame, with the tree fitted to it."""
         if self._posed is None or self._posed[0] != frame:
             assert self._patch is not None
-            vertices = self.at(frame)
+            vertices = self._patch.posed(self.at(frame))
             self._patch.tree.refit(vertices)
             self._posed = frame, vertices, vertex_normals(vertices, self._patch.faces)
         return self._posed[1:]
@@ -75,19 +80,28 @@ class SlidingObstacle(Obstacle):
             self._kinds[kind] = _Anchors(points if rest_points is None else rest_points, rest_points)
         return self._kinds[kind]
 
-    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+    def planes(
+        self,
+        points: np.ndarray,
+        frame: int,
+        rest_points: np.ndarray | None = None,
+        reach: np.ndarray | None = None,
+    ) -> Planes:
+        """As the exact ones. Without `reach`, other limbs are found by the rotation alone."""
         frame = min(frame, self.frames - 1)
         anchors = self._anchors(points, rest_points)
         assert self._patch is not None
         vertices, of_vertices = self._pose(frame)
-        anchors.follow(points, frame, self._patch, vertices, self.region)
+        anchors.follow(points, frame, self._patch, vertices, self.region, reach)
         normals = np.empty_like(points)
+        if len(self._none_far) < len(points):
+            self._none_far = np.zeros(len(points), bool)
 
         def set_normals(at: np.ndarray | slice) -> None:
             some = np.empty_like(normals[at])
-            _plane_normals(
-                points[at], anchors.closest[at], anchors.faces[at], anchors.barycentric[at], vertices,
-                self._patch.faces, of_vertices, some,
+            plane_normals(
+                points[at], anchors.closest[at], anchors.faces[at], anchors.barycentric[at],
+                self._none_far[: len(some)], vertices, self._patch.faces, of_vertices, some,
             )  # fmt: skip
             normals[at] = some
 
@@ -103,16 +117,22 @@ class SlidingObstacle(Obstacle):
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
     ) -> np.ndarray:
+        """As the exact one. Points that are the first of a larger set of samples ride with the places of
+        those, where they were when planes were last asked for.
+        """
         before, after = (min(f, self.frames - 1) for f in (frame - 1, frame))
         anchors = self._anchors(points, rest_points)
         assert self._patch is not None
         vertices, _ = self._pose(before)
-        anchors.follow(points, before, self._patch, vertices, self.region)
-        anchors.frame = after
+        leader = next((a for a in self._kinds.values() if a.frame == before and a.leads(anchors)), None)
+        if leader is None:
+            leader = anchors
+            anchors.follow(points, before, self._patch, vertices, self.region)
+            anchors.frame = after
         out = np.empty_like(points)
-        _carry(
-            points, anchors.closest, anchors.faces, anchors.barycentric, self._patch.faces, vertices,
-            self.at(after), out,
+        carry(
+            points, leader.closest, leader.faces, leader.barycentric, vertices,
+            self._patch.posed(self.at(after)), self._patch.faces, out,
         )  # fmt: skip
         return out
 
@@ -130,10 +150,15 @@ class _Patch:
             alone = cKDTree(centroids).query(rest_points)[0].max() > obstacle.region
             if not alone:  # a sample without a face in its region meets all
                 self.numbers = np.flatnonzero(np.isfinite(near))
-        self.faces = np.ascontiguousarray(obstacle.faces[self.numbers])
+        self.vertices, faces = np.unique(obstacle.faces[self.numbers], return_inverse=True)
+        self.faces = np.ascontiguousarray(faces.reshape(-1, 3))
         self.centroids = np.ascontiguousarray(centroids[self.numbers])
         self.adjacency = triangle_adjacency(self.faces)
         self.tree = FaceTree(self.faces, self.centroids)
+
+    def posed(self, positions: np.ndarray) -> np.ndarray:
+        """Its own vertices among those of the body."""
+        return positions[self.vertices]
 
 
 class _Anchors:
@@ -145,9 +170,18 @@ class _Anchors:
         self.home = np.ascontiguousarray(home)
         near = cKDTree(home).query(home, k=min(NEIGHBOURS + 1, count))[1].reshape(count, -1)
         self.neighbours = np.ascontiguousarray(near[:, 1:])
+        self._order = by_cells(home)
+        self._led: dict[int, bool] = {}
         self.barycentric, self.closest = np.zeros((count, 3)), np.zeros((count, 3))
         self.distance = np.zeros(count)
         self.forget()
+
+    def leads(self, other: _Anchors) -> bool:
+        """Whether the other's samples are the first of these."""
+        if id(other) not in self._led:
+            first = self.home[: len(other.home)]
+            self._led[id(other)] = other is not self and np.array_equal(first, other.home)
+        return self._led[id(other)]
 
     def forget(self) -> None:
         self.faces = np.full(len(self.home), -1)
@@ -155,30 +189,60 @@ class _Anchors:
         self.turn = 0
 
     def follow(
-        self, points: np.ndarray, frame: int, patch: _Patch, vertices: np.ndarray, region: float
+        self,
+        points: np.ndarray,
+        frame: int,
+        patch: _Patch,
+        vertices: np.ndarray,
+        region: float,
+        reach: np.ndarray | None = None,
     ) -> None:
-        """Take the places to the samples' at points (S, 3) [m], the body's vertices (B, 3) at `frame`."""
+        """Take the places to the samples' at points (S, 3) [m], the body's vertices (B, 3) at `frame`.
+
+        reach: (S,) [m] within which no surface is missed by a sample whose own place is farther away.
+        """
         if frame not in (self.frame, self.frame + 1):
-            self.search(np.arange(len(points)), points, patch, region)
+            self.search(self._order, points, patch, region)
             return
-        reach = np.inf if self.rest_points is None else region * region
+        limit = np.inf if self.rest_points is None else region * region
         state = self.faces, self.barycentric, self.closest, self.distance
         skin = vertices, patch.faces, patch.adjacency, patch.centroids
-        _slide(points, *skin, self.home, reach, *state)
-        self.search(np.arange(self.turn, len(points), ROTATION), points, patch, region)
+        _slide(points, self.turn, *skin, self.home, limit, *state)
+        groups = np.arange(-(-len(points) // GROUP))[self.turn :: ROTATION]
+        which = (GROUP * groups[:, None] + np.arange(GROUP)).ravel()
+        self.search(self._order[which[which < len(points)]], points, patch, region)
+        if reach is not None:
+            far = self._order[(self.distance > reach)[self._order]]
+            self.search(far, points, patch, region, reach)
         self.turn = (self.turn + 1) % ROTATION
-        _ask_neighbours(points, self.neighbours, *skin, self.home, reach, *state)
+        _ask_neighbours(points, self.neighbours, *skin, self.home, limit, *state)
 
-    def search(self, which: np.ndarray, points: np.ndarray, patch: _Patch, region: float) -> None:
-        """Exact closest points for some samples."""
+    def search(
+        self,
+        which: np.ndarray,
+        points: np.ndarray,
+        patch: _Patch,
+        region: float,
+        reach: np.ndarray | None = None,
+    ) -> None:
+        """Exact closest points for some samples; with a reach (S,) [m], for those that have one within it."""
+        if not len(which):
+            return
         rest = None if self.rest_points is None else self.rest_points[which]
         hints: Any = self.faces[which]
         found = patch.tree.nearest(
-            points[which], hints=None if (hints < 0).any() else hints, rest_points=rest, region=region
+            points[which],
+            hints=None if (hints < 0).any() else hints,
+            rest_points=rest,
+            region=region,
+            reach=None if reach is None else reach[which],
+            sequence=np.arange(len(which)),
         )
-        self.faces[which] = found.faces
-        self.barycentric[which], self.closest[which] = found.barycentric, found.points
-        self.distance[which] = np.linalg.norm(points[which] - found.points, axis=1)
+        known = found.faces >= 0
+        which = which[known]
+        self.faces[which] = found.faces[known]
+        self.barycentric[which], self.closest[which] = found.barycentric[known], found.points[known]
+        self.distance[which] = np.linalg.norm(points[which] - self.closest[which], axis=1)
 
 
 @njit(cache=True, inline="always")
@@ -195,10 +259,15 @@ def _set(s, points, face, v, w, vertices, faces, barycentric, closest):
 
 @njit(cache=True, error_model="numpy")
 def _slide(
-    points, vertices, faces, adjacency, centroids, home, reach, anchors, barycentric, closest, distance
+    points, turn, vertices, faces, adjacency, centroids, home, reach, anchors, barycentric, closest, distance
 ):
     corners = np.empty((1, 3, 3))
     for s in range(len(points)):
+        if distance[s] > FAR and (s + turn) % SELDOM != 0:
+            v, w = barycentric[s, 1], barycentric[s, 2]
+            distance[s] = _set(s, points, anchors[s], v, w, vertices, faces, barycentric, closest)
+            if distance[s] > FAR:
+                continue
         face, v, w = walk_to_foot(
             points[s, 0], points[s, 1], points[s, 2], np.uint32(anchors[s]), vertices, faces, adjacency,
             centroids, home[s], reach, corners,
@@ -217,10 +286,13 @@ def _ask_neighbours(
     for _ in range(SWEEPS):
         for s in range(len(points)):
             for n in neighbours[s]:
+                excess = distance[s] - distance[n] - SLACK
+                if excess <= 0.0:
+                    continue
                 apart = 0.0
                 for c in range(3):
                     apart += (points[s, c] - points[n, c]) ** 2
-                if distance[s] <= distance[n] + np.sqrt(apart) + SLACK:
+                if excess * excess <= apart:
                     continue
                 squared = 0.0
                 for c in range(3):
@@ -248,48 +320,3 @@ def _gaps(points, closest, normals):
             gap += normals[s, c] * (points[s, c] - closest[s, c])
         gaps[s] = gap
     return gaps
-
-
-@njit(cache=True, inline="always")
-def _frame(x, i, j, k, axes):
-    """Rows of axes (3, 3): orthonormal frame of a triangle."""
-    first, second = 0.0, 0.0
-    for c in range(3):
-        axes[0, c] = x[j, c] - x[i, c]
-        axes[1, c] = x[k, c] - x[i, c]
-        first += axes[0, c] ** 2
-    first = np.sqrt(first)
-    for c in range(3):
-        axes[0, c] /= first
-    axes[2, 0] = axes[0, 1] * axes[1, 2] - axes[0, 2] * axes[1, 1]
-    axes[2, 1] = axes[0, 2] * axes[1, 0] - axes[0, 0] * axes[1, 2]
-    axes[2, 2] = axes[0, 0] * axes[1, 1] - axes[0, 1] * axes[1, 0]
-    for c in range(3):
-        second += axes[2, c] ** 2
-    second = np.sqrt(second)
-    for c in range(3):
-        axes[2, c] /= second
-    axes[1, 0] = axes[2, 1] * axes[0, 2] - axes[2, 2] * axes[0, 1]
-    axes[1, 1] = axes[2, 2] * axes[0, 0] - axes[2, 0] * axes[0, 2]
-    axes[1, 2] = axes[2, 0] * axes[0, 1] - axes[2, 1] * axes[0, 0]
-
-
-@njit(cache=True, error_model="numpy")
-def _carry(points, closest, anchors, barycentric, faces, before, after, out):
-    """Where points go that keep their place in the frame of their face."""
-    old, new = np.empty((3, 3)), np.empty((3, 3))
-    for s in range(len(points)):
-        i, j, k = faces[anchors[s], 0], faces[anchors[s], 1], faces[anchors[s], 2]
-        _frame(before, i, j, k, old)
-        _frame(after, i, j, k, new)
-        for c in range(3):
-            out[s, c] = (
-                barycentric[s, 0] * after[i, c] + barycentric[s, 1] * after[j, c]
-                + barycentric[s, 2] * after[k, c]
-            )  # fmt: skip
-        for a in range(3):
-            local = 0.0
-            for c in range(3):
-                local += old[a, c] * (points[s, c] - closest[s, c])
-            for c in range(3):
-                out[s, c] += new[a, c] * local
