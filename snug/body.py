@@ -88,9 +88,11 @@ class Body:
         """`vertices` of that shape for any poses and translations; what shape alone decides is computed here,
         once: for whoever poses frame after frame. Raises BodyError.
         """
-        # sum_j w_ij T_j (p_i, 1) is one matrix product: (w_ij p_ik) over (j, k) times T over (j, k).
+        from scipy.sparse import csr_array
+
+        # sum_j w_ij T_j (p_i, 1) is one product: (w_ij p_ik) over (j, k), mostly zero, times T over (j, k).
         points = np.concatenate([self.shaped(betas), np.ones((len(self.template), 1))], axis=1)
-        spread = (self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), -1)
+        spread = csr_array((self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), -1))
 
         def pose(poses: ArrayLike, translations: ArrayLike) -> NDArray[np.float64]:
             transforms = self.transforms(poses, translations, betas)

@@ -16,7 +16,8 @@ from torch import Tensor
 from reference_sim.material import Material
 from snug.motion_inputs import motion_rates
 from snug.recipe import Recipe
-from snug.skinning import axis_angle_to_matrix, joint_transforms, matrix_to_6d, skin
+from snug.skeleton import rotation_matrices
+from snug.skinning import skin
 
 FEATURE_SETS = ("motion", "pose", "pose_shape", "rates")
 
@@ -84,10 +85,8 @@ class DressedBody:
         """Rest-to-posed transforms of the joints relative to the pelvis: (T, 24, 3) [rad] -> (T, 24, 3,
         4).
         """
-        joints = torch.as_tensor(self.body.joints(betas))  # float64 until the chain is done
-        rotations = axis_angle_to_matrix(torch.as_tensor(poses, dtype=torch.float64))
-        home = (-joints[0]).expand(len(poses), 3)
-        return joint_transforms(rotations, joints, self.parents, home).float()
+        home = np.tile(-self.body.joints(betas)[0], (len(poses), 1))
+        return torch.from_numpy(self.body.transforms(poses, home, betas)).float()
 
     def features(
         self,
@@ -105,17 +104,17 @@ class DressedBody:
         """
         if kind not in FEATURE_SETS:
             raise ValueError(f"unknown features {kind!r}: use one of {FEATURE_SETS}")
-        rotations = axis_angle_to_matrix(torch.as_tensor(motion.poses, dtype=torch.float64))
+        rotations = rotation_matrices(motion.poses)
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
         if kind == "motion":
             velocity = _root_velocity(motion, rotations[:, 0], recipe.velocity_frame)
             parts.append(velocity * (not still))
         if kind == "rates":
-            parts.append(torch.as_tensor(motion_rates(motion)) * (not still))
+            parts.append(motion_rates(motion) * (not still))
         if kind in ("motion", "pose_shape"):
             shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
-            parts.append(torch.as_tensor(shape).expand(len(motion.poses), -1))
-        return torch.cat(parts, dim=-1).float()
+            parts.append(np.broadcast_to(shape, (len(motion.poses), len(shape))))
+        return torch.from_numpy(np.concatenate(parts, axis=1).astype(np.float32))
 
     def skinned(
         self,
@@ -131,18 +130,19 @@ class DressedBody:
         return posed.double().numpy() + self.pelvis(motion, betas)[:, None]
 
 
-def _pose_numbers(poses: np.ndarray, rotations: Tensor, pose_input: str) -> Tensor:
-    """(T, 72) axis-angle numbers, or (T, 141): up direction in the root's axes and 6 numbers a joint."""
+def _pose_numbers(poses: np.ndarray, rotations: np.ndarray, pose_input: str) -> np.ndarray:
+    """(T, 72) axis-angle numbers, or (T, 141): up direction in the root's axes and 6 numbers a joint, the first
+    two columns of its rotation (Zhou et al. 2019, "On the continuity of rotation representations in neural
+    networks").
+    """
     if pose_input == "axis_angle":
-        return torch.as_tensor(poses, dtype=torch.float64).flatten(1)
+        return poses.reshape(len(poses), -1)
     up = rotations[:, 0, 1, :]  # R^T e_y: a walk to the east and a walk to the north give the same input
-    return torch.cat([up, matrix_to_6d(rotations[:, 1:]).flatten(1)], dim=-1)
+    columns = rotations[:, 1:, :, :2].swapaxes(-1, -2)
+    return np.concatenate([up, columns.reshape(len(poses), -1)], axis=1)
 
 
-def _root_velocity(motion: Any, root: Tensor, frame: str) -> Tensor:
+def _root_velocity(motion: Any, root: np.ndarray, frame: str) -> np.ndarray:
     """Velocity of the root joint, (T, 3) [m/s]; zero in the first frame, which has no past."""
-    steps = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * motion.fps
-    velocity = torch.as_tensor(steps, dtype=torch.float64)
-    if frame == "world":
-        return velocity
-    return torch.einsum("tji,tj->ti", root, velocity)
+    velocity = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * motion.fps
+    return velocity if frame == "world" else np.einsum("tji,tj->ti", root, velocity)

@@ -8,11 +8,16 @@ at the start is zero at run time; in training N(0, sigma) is added to it, sigma 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from snug.fast_network import FastLinear, run_gru, run_linear
+
+if TYPE_CHECKING:
+    from snug.frame_plan import FramePlan
 
 HIDDEN, LAYERS = 256, 4
 
@@ -66,6 +71,10 @@ class Regressor(nn.Module):
             hidden, state = self.gru(normalised, state)  # (N, T, 256), (4, N, 256)
             flat = run_linear(self.offsets, hidden) * self.output_scale  # (N, T, 3V)
         return flat.unflatten(-1, (self.vertices, 3)), state
+
+    def lay_out(self, plan: FramePlan) -> None:
+        """`forward` for one frame."""
+        plan.offsets(self, (self.offsets, plan.gru(self.gru, plan.normalised(self))))
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
         """(layers, batch, hidden) drawn from N(0, sigma): so that long roll-outs hold."""

@@ -1,13 +1,13 @@
 """Run a trained network over a motion, one frame at a time, as an application would.
 
-Times of frames are those of network and skinning; `frame_inputs` makes what they take as ready.
+Times of frames are those of network and skinning, one compiled call each (snug.frame_plan); `frame_inputs`
+makes what they take as ready. Many bodies at once go through torch.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from torch import Tensor
 
 from reference_sim.trajectory import Trajectory
 from snug.dressed_body import DressedBody
+from snug.frame_plan import CompiledFrame
 from snug.skinning import skin
 from snug.trained_model import TrainedModel, find_kind
 
@@ -68,7 +69,6 @@ def ready_to_roll_out(
     frames = predictions(model, dressed, motion, betas, before=before)
     held = np.arange(motion.frames) if kept is None else kept
 
-    @one_thread()
     def run() -> Trajectory:
         positions, seconds = collected(frames(), held)
         return _trajectory(model, dressed, motion, positions, held, seconds)
@@ -156,35 +156,21 @@ def predictions(
     first one. That, inputs and joint transforms are made, and the network warmed up, before this returns.
     Raises RollOutError.
     """
-    features = _features(model, dressed, _joined(before, motion), betas)
-    rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
-    transforms = dressed.transforms(motion.poses, betas)
-    past, features = features[: -motion.frames], features[-motion.frames :]
-    start = None
-    with torch.inference_mode():
-        for earlier in past:
-            _, start = model.network(earlier[None, None], start)
-
-    @torch.inference_mode()
-    def step(frame: int, state: Any) -> tuple[Tensor, Any]:
-        offsets, state = model.network(features[frame][None, None], state)
-        return skin(rest + offsets[0, 0], weights, transforms[frame]), state
-
-    return _one_by_one(step, dressed.pelvis(motion, betas), start)
+    whole = _joined(before, motion)
+    features = _features(model, dressed, whole, betas).numpy()
+    frame = CompiledFrame(
+        dressed.rest(betas), dressed.weights(model.recipe.smoothing), model.network, precision=model.precision
+    )
+    return _one_by_one(frame, features, dressed, motion, betas)
 
 
 def skinned_frames(
     dressed: DressedBody, motion: Any, smoothing: int, betas: np.ndarray | None = None
 ) -> Callable[[], Iterator[np.ndarray]]:
     """As `predictions`, of skinning alone, with weights smoothed by that many sweeps."""
-    rest, weights = dressed.rest(betas), dressed.weights(smoothing)
-    transforms = dressed.transforms(motion.poses, betas)
-
-    @torch.inference_mode()
-    def step(frame: int, state: Any) -> tuple[Tensor, Any]:
-        return skin(rest, weights, transforms[frame]), state
-
-    return _one_by_one(step, dressed.pelvis(motion, betas))
+    nothing = np.empty((motion.frames, 0), np.float32)
+    frame = CompiledFrame(dressed.rest(betas), dressed.weights(smoothing))
+    return _one_by_one(frame, nothing, dressed, motion, betas)
 
 
 def frame_inputs(
@@ -240,40 +226,27 @@ def _features(
 
 
 def _one_by_one(
-    step: Callable[[int, Any], tuple[Tensor, Any]], pelvis: np.ndarray, start: Any = None
+    frame: CompiledFrame, features: np.ndarray, dressed: DressedBody, motion: Any, betas: np.ndarray | None
 ) -> Callable[[], Iterator[np.ndarray]]:
-    """What begins the frames anew, from the state `start`: step(frame, state) gives vertices (V, 3) about the
-    pelvis (T, 3) and the next state. It is warmed up at once.
+    """What begins the frames of the motion anew, from the state that earlier features leave; it is compiled
+    and warmed up at once.
     """
+    transforms, pelvis = dressed.transforms(motion.poses, betas).numpy(), dressed.pelvis(motion, betas)
+    past, features = features[: -motion.frames], features[-motion.frames :]
+    start, out = frame.start(), np.empty((dressed.vertices, 3))
+    for earlier in past:
+        frame(earlier, transforms[0], pelvis[0], start, out)
 
     def frames() -> Iterator[np.ndarray]:
-        state = start
-        for frame, origin in enumerate(pelvis):
-            with one_thread():
-                vertices, state = step(frame, state)
-            yield vertices.numpy().astype(np.float64) + origin
+        work = start.copy()
+        for now in zip(features, transforms, pelvis):
+            out = np.empty((dressed.vertices, 3))
+            frame(*now, work, out)
+            yield out
 
-    with one_thread():
-        for frame in range(min(WARM_UP, len(pelvis))):
-            step(frame, None)
+    for _ in zip(range(WARM_UP), frames()):
+        pass
     return frames
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """torch with one thread inside, and as many as before afterwards.
-
-    A frame is too little work to be shared: handing it out to threads takes longer than the work.
-    """
-    before = torch.get_num_threads()
-    if before == 1:
-        yield
-        return
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 @torch.inference_mode()

@@ -10,42 +10,6 @@ import torch
 from torch import Tensor
 
 
-def axis_angle_to_matrix(axis_angle: Tensor) -> Tensor:
-    """Rodrigues' formula, R = I + (sin t / t) [a] + ((1 - cos t) / t^2) [a]^2 with t = |a|.
-
-    axis_angle: (..., 3) [rad]. Returns (..., 3, 3). Both factors are smooth functions of t^2; near zero they
-    are taken from their series, so that the gradient is finite (and right) at the identity.
-    """
-    squared = (axis_angle * axis_angle).sum(-1)[..., None, None]
-    small = squared < 1e-6
-    # The inner `where` keeps the branch that is not used away from 0/0, whose gradient would be nan.
-    safe = torch.where(small, torch.ones_like(squared), squared)
-    angle = safe.sqrt()
-    first = torch.where(small, 1 - squared / 6 + squared**2 / 120, angle.sin() / angle)
-    # 1 - cos t = 2 sin^2(t/2) loses no digits for small angles.
-    half = (0.5 * angle).sin()
-    second = torch.where(small, 0.5 - squared / 24 + squared**2 / 720, 2 * half * half / safe)
-    cross = _cross_matrix(axis_angle)
-    identity = torch.eye(3, dtype=axis_angle.dtype, device=axis_angle.device)
-    return identity + first * cross + second * (cross @ cross)
-
-
-def _cross_matrix(a: Tensor) -> Tensor:
-    """[a] with [a] b = a x b. a: (..., 3) -> (..., 3, 3)."""
-    x, y, z = a.unbind(-1)
-    zero = torch.zeros_like(x)
-    return torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=-1).unflatten(-1, (3, 3))
-
-
-def matrix_to_6d(rotations: Tensor) -> Tensor:
-    """The first two columns of a rotation, one after the other: a continuous description of it.
-
-    rotations: (..., 3, 3). Returns (..., 6). Source: Zhou et al. 2019, "On the continuity of rotation
-    representations in neural networks".
-    """
-    return rotations[..., :, :2].transpose(-1, -2).flatten(-2)
-
-
 def joint_transforms(
     rotations: Tensor, joints: Tensor, parents: Sequence[int], translations: Tensor
 ) -> Tensor:

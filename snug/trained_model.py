@@ -5,7 +5,7 @@ file.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +72,7 @@ class TrainedModel:
     summary: windows above the spike limit, updates left out, returns to good weights, with names.
     seconds: wall time of the steps, contact search included, and of a pretraining before them;
         setup_seconds: of making ready the motions and the first anchors.
+    precision: of its matrices in roll-outs, one of snug.frame_plan.PRECISIONS; its file does not say it.
     """
 
     kind: str
@@ -83,6 +84,7 @@ class TrainedModel:
     setup_seconds: float = 0.0
     history: list[dict[str, float]] = field(default_factory=list)
     summary: dict[str, Any] = field(default_factory=dict)
+    precision: str = "float32"
 
     @property
     def megabytes(self) -> float:
@@ -92,6 +94,12 @@ class TrainedModel:
     @property
     def vertices(self) -> int:
         return int(self.network.vertices)
+
+    def rounded(self, precision: str) -> TrainedModel:
+        """The same with matrices of that precision: their values are rounded here. Raises ValueError."""
+        from snug.frame_plan import rounded
+
+        return replace(self, network=rounded(self.network, precision), precision=precision)
 
     def save(self, path: str | Path) -> Path:
         """Write weights and metadata to one safetensors file, whole or not at all."""

@@ -9,13 +9,16 @@ Regressor that sees them beside the motion:
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 from torch import Tensor, nn
 
 from snug.fast_network import FastLinear, run_gru, run_linear
 from snug.regressor import HIDDEN, Regressor
+
+if TYPE_CHECKING:
+    from snug.frame_plan import FramePlan
 
 DYNAMICS_LAYERS = 2
 
@@ -56,6 +59,14 @@ class TwoStageRegressor(Regressor):
         normalised = (features - self.input_mean) / self.input_std
         offsets, decoding = self.answer(torch.cat([normalised, known], -1), decoding)
         return offsets, torch.cat([moving, decoding])
+
+    def lay_out(self, plan: FramePlan) -> None:
+        """`forward` for one frame."""
+        x = plan.normalised(self, further=self.coordinates.out_features)
+        known = x.start + len(self.input_mean)
+        moving = plan.gru(self.dynamics, slice(x.start, known))
+        plan.linear(self.coordinates, moving, target=slice(known, x.stop))
+        plan.offsets(self, (self.offsets, plan.gru(self.gru, x)))
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
         """(layers, batch, hidden): the decoder's from N(0, sigma), that of the dynamics zero."""

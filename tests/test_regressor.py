@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 from dressing import leaning, swaying, tube_dress
+from scipy.spatial.transform import Rotation
 
 from snug import fast_network
 from snug.baselines.pbns import PoseSpaceDeformation
@@ -99,6 +100,16 @@ def test_default_inputs_know_no_heading_and_no_place():
     assert torch.allclose(plain, other, atol=1e-6)
     literal = dressed.features(moved, PAPER) - dressed.features(motion, PAPER)
     assert literal.abs().max() > 0.5
+
+
+def test_default_inputs_begin_with_up_and_the_first_two_columns_of_each_rotation():
+    dressed, motion = tube_dress(), leaning(swaying(4))
+    found = dressed.features(motion, DEFAULT).numpy()
+    turns = Rotation.from_rotvec(motion.poses.reshape(-1, 3)).as_matrix().reshape(4, 24, 3, 3)
+    assert np.allclose(found[:, :3], turns[:, 0].transpose(0, 2, 1) @ [0.0, 1.0, 0.0], atol=1e-6)
+    for joint in range(1, 24):
+        six = found[:, 6 * joint - 3 : 6 * joint + 3]
+        assert np.allclose(six, np.concatenate([turns[:, joint, :, 0], turns[:, joint, :, 1]], 1), atol=1e-6)
 
 
 def test_default_inputs_know_lean_speed_and_shape():

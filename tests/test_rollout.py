@@ -68,33 +68,6 @@ def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
     assert torch.allclose(known(0)[0], make(5)[0], atol=1e-6)
 
 
-def test_a_frame_is_computed_by_one_thread_and_the_setting_is_restored(monkeypatch):
-    dressed, motion = tube_dress(), swaying()
-    model = untrained_model("snug", dressed, [motion], seed=0)
-    inside, forward = [], type(model.network).forward
-
-    def watched(network, *given):
-        inside.append(torch.get_num_threads())
-        return forward(network, *given)
-
-    monkeypatch.setattr(type(model.network), "forward", watched)
-    before = torch.get_num_threads()
-    try:
-        torch.set_num_threads(3)
-        roll_out(model, dressed, motion)
-        frames = predictions(model, dressed, motion)()
-        for _ in range(2):
-            next(frames)
-            assert torch.get_num_threads() == 3  # a caller's own work between two frames keeps its threads
-        monkeypatch.setattr(type(model.network), "forward", None)
-        with pytest.raises(TypeError):
-            next(frames)
-        assert torch.get_num_threads() == 3
-    finally:
-        torch.set_num_threads(before)
-    assert set(inside) == {1}
-
-
 def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_computed_too():
     computed = []
 

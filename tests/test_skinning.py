@@ -1,12 +1,11 @@
-"""Rotations against scipy, skinning against its invariants."""
+"""Skinning against its invariants."""
 
 import numpy as np
-import pytest
 import torch
 from scipy.spatial.transform import Rotation
 
 from snug.fast_skinning import FastSkin
-from snug.skinning import axis_angle_to_matrix, joint_transforms, matrix_to_6d, skin
+from snug.skinning import joint_transforms, skin
 
 PARENTS = [-1, 0, 1, 1]
 
@@ -15,41 +14,15 @@ def random_tensor(*shape: int, seed: int = 0) -> torch.Tensor:
     return torch.from_numpy(np.random.default_rng(seed).normal(size=shape))
 
 
-@pytest.mark.parametrize("size", [0.0, 1e-12, 1e-8, 0.9e-3, 1.1e-3, 0.5, np.pi, 7.0])
-def test_rodrigues_agrees_with_scipy_at_every_angle(size):
-    axis = random_tensor(20, 3)
-    axis = size * axis / axis.norm(dim=-1, keepdim=True)
-    expected = Rotation.from_rotvec(axis.numpy()).as_matrix()
-    tolerance = 2e-15 * max(1.0, size)  # rounding of the angle itself
-    np.testing.assert_allclose(axis_angle_to_matrix(axis).numpy(), expected, rtol=0, atol=tolerance)
-
-
-def test_gradient_at_the_identity_is_the_rotation_generator():
-    # d R / d a_k at a = 0 is the cross-product matrix of the k-th axis, (L_k)_ij = -e_kij.
-    jacobian = torch.autograd.functional.jacobian(axis_angle_to_matrix, torch.zeros(3, dtype=torch.float64))
-    levi_civita = np.zeros((3, 3, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        levi_civita[i, j, k], levi_civita[i, k, j] = 1.0, -1.0
-    np.testing.assert_allclose(jacobian.numpy(), -np.einsum("kij->ijk", levi_civita), atol=1e-15)
-
-
-@pytest.mark.parametrize("size", [1e-9, 0.9e-3, 1.1e-3, 2.0])
-def test_gradient_agrees_with_finite_differences_on_both_branches(size):
-    axis = (size * random_tensor(3)).requires_grad_()
-    assert torch.autograd.gradcheck(axis_angle_to_matrix, (axis,), eps=1e-7, atol=1e-7)
-
-
-def test_6d_holds_the_first_two_columns():
-    rotations = axis_angle_to_matrix(random_tensor(5, 4, 3))
-    described = matrix_to_6d(rotations)
-    assert described.shape == (5, 4, 6)
-    torch.testing.assert_close(described[..., :3], rotations[..., 0])
-    torch.testing.assert_close(described[..., 3:], rotations[..., 1])
+def rotations_of(turns: torch.Tensor) -> torch.Tensor:
+    """(..., 3) [rad] -> (..., 3, 3), by scipy."""
+    matrices = Rotation.from_rotvec(turns.reshape(-1, 3).numpy()).as_matrix()
+    return torch.from_numpy(matrices).reshape(*turns.shape, 3)
 
 
 def test_chain_against_homogeneous_matrices():
     """The textbook product of 4x4 matrices, G_j = G_parent [R_j | p_j - p_parent], then G_j [I | -p_j]."""
-    rotations = axis_angle_to_matrix(random_tensor(4, 3))
+    rotations = rotations_of(random_tensor(4, 3))
     joints, translation = random_tensor(4, 3, seed=1), random_tensor(3, seed=2)
     world: list[np.ndarray] = []
     for joint, parent in enumerate(PARENTS):
@@ -77,7 +50,7 @@ def test_a_joint_does_not_move_itself():
     turns = torch.zeros(4, 3, dtype=torch.float64)
     turns[1] = torch.tensor([0.3, -0.8, 0.5])
     still = torch.zeros(3, dtype=torch.float64)
-    transforms = joint_transforms(axis_angle_to_matrix(turns), joints, PARENTS, still)
+    transforms = joint_transforms(rotations_of(turns), joints, PARENTS, still)
     moved = skin(joints, torch.eye(4, dtype=torch.float64), transforms)
     torch.testing.assert_close(moved[:2], joints[:2])
     assert (moved[2:] - joints[2:]).norm(dim=-1).min() > 0.1
@@ -86,13 +59,13 @@ def test_a_joint_does_not_move_itself():
 def test_batches_broadcast_and_gradients_flow():
     joints, points = random_tensor(4, 3), random_tensor(2, 5, 9, 3, seed=1)
     weights = torch.softmax(random_tensor(9, 4, seed=2), dim=-1)
-    turns = random_tensor(2, 5, 4, 3, seed=3).requires_grad_()
+    rotations = rotations_of(random_tensor(2, 5, 4, 3, seed=3)).requires_grad_()
     shifts = random_tensor(2, 5, 3, seed=4)
-    posed = skin(points, weights, joint_transforms(axis_angle_to_matrix(turns), joints, PARENTS, shifts))
+    posed = skin(points, weights, joint_transforms(rotations, joints, PARENTS, shifts))
     assert posed.shape == (2, 5, 9, 3)
-    one = joint_transforms(axis_angle_to_matrix(turns[1, 3]), joints, PARENTS, shifts[1, 3])
+    one = joint_transforms(rotations[1, 3], joints, PARENTS, shifts[1, 3])
     torch.testing.assert_close(posed[1, 3], skin(points[1, 3], weights, one))
-    (gradient,) = torch.autograd.grad(posed.square().sum(), turns)
+    (gradient,) = torch.autograd.grad(posed.square().sum(), rotations)
     assert torch.isfinite(gradient).all() and gradient.norm() > 1.0
 
 

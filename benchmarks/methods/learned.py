@@ -50,6 +50,15 @@ def _ablation(recipe: str) -> MethodEntry:
     )  # fmt: skip
 
 
+def _stored(precision: str) -> MethodEntry:
+    words = f"SNUG, its weights in {precision}"
+    entry = network("snug", words, f"{words}: less memory to read in a frame, rounded answers")
+    return replace(
+        entry, name=f"snug-{precision}", options={"kind": "snug", "precision": precision}, batched=False,
+        role="ablation", base="snug",
+    )  # fmt: skip
+
+
 _LABELS = {
     "no-noise": "first states of zero",
     "noise-alone": "first states of noise, none remembered",
@@ -80,6 +89,7 @@ LEARNED = (
     network("snug-paper", "SNUG, paper's text", "SNUG by the paper's text, its closest points remembered",
             base="snug", pairing_group="snug"),
     *(_ablation(recipe.name) for recipe in ABLATIONS),
+    *(_stored(precision) for precision in ("bf16", "int8")),
     *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
     *(_cleaned(kind, label) for kind, label in (("snug", "SNUG"), ("pbns", "PBNS"),
                                                 ("supervised", "Supervised"),

@@ -17,9 +17,13 @@ from ..scene import BuiltScene
 
 @dataclass
 class Network(Method):
-    """A model read from its file. Features are made and the network is warmed up before run()."""
+    """A model read from its file. Features are made and the network is warmed up before run().
+
+    precision: that of its matrices, one of snug.frame_plan.PRECISIONS.
+    """
 
     path: Path
+    precision: str = "float32"
 
     def prepare(self, scene: BuiltScene) -> None:
         from snug.dressed_body import DressedBody
@@ -27,7 +31,7 @@ class Network(Method):
         from snug.trained_model import TrainedModel
 
         assert scene.dressed is not None
-        self.model = TrainedModel.load(self.path)
+        self.model = TrainedModel.load(self.path).rounded(self.precision)
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         self.frames = ready_to_roll_out(
@@ -57,6 +61,6 @@ class Network(Method):
         return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
 
 
-def make(*, models: Path, seed: int, kind: str) -> Network:
+def make(*, models: Path, seed: int, kind: str, precision: str = "float32") -> Network:
     """The network of that name, "untrained" or one of snug.recipe.TRAININGS, and seed."""
-    return Network(model_path(models, kind, seed))
+    return Network(model_path(models, kind, seed), precision)

@@ -21,8 +21,13 @@ if TYPE_CHECKING:
     from snug.trained_model import TrainedModel
 
 
+SWEPT = 48  # [MB] of other work between two cold frames: a solver, and what lies in the caches of a large CPU
+
+
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
-    """Median, 95 % and least time over all frames of roll-outs; memory and file of the network."""
+    """Median, 95 % and least time over all frames of roll-outs, and the median of a cold one; memory and file
+    of the network.
+    """
     from snug.training import untrained_model
 
     chosen = settings.chosen
@@ -39,18 +44,26 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
         "inference": float(np.median(frames)),
         "inference_p95": float(np.quantile(frames, 0.95)),
         "inference_least": float(frames.min()),
+        "inference_cold": 1e3 * float(np.median(_frame_seconds(model, dressed, motions[0], swept=SWEPT))),
         "parameters": sum(p.numel() for p in model.network.parameters()),
         "network_memory": model.megabytes,
         "model_file": size / 1e6,
     }
 
 
-def _frame_seconds(model: TrainedModel, dressed: DressedBody, motion: Motion) -> list[float]:
-    """Wall time [s] of each frame of a roll-out; inputs and joint transforms are ready before."""
+def _frame_seconds(
+    model: TrainedModel, dressed: DressedBody, motion: Motion, *, swept: int = 0
+) -> list[float]:
+    """Wall time [s] of each frame of a roll-out; inputs and joint transforms are ready before.
+
+    swept: [MB] read and written before each frame, off the clock.
+    """
     from snug.rollout import predictions
 
+    other = np.zeros(swept * 125_000)
     frames, seconds = predictions(model, dressed, motion)(), []
     for _ in range(motion.frames):
+        other += 1.0
         start = time.perf_counter()
         next(frames)
         seconds.append(time.perf_counter() - start)

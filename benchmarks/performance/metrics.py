@@ -75,6 +75,8 @@ METRICS = (
         _metric("inference", "ms", "Frame", "network and skinning, one frame at a time: median"),
         _metric("inference_p95", "ms", "Frame, 95 %", "95 % of the frames took less"),
         _metric("inference_least", "ms", "Least frame", "the quickest frame"),
+        _metric("inference_cold", "ms", "Frame, cold",
+                "median of frames before each of which other work has swept 48 MB through the caches"),
         _size("parameters", "Parameters", "of the network"),
         _metric("network_memory", "MB", "Network", "memory of the network"),
         _metric("model_file", "MB", "File", "size of the network's file"),

@@ -9,11 +9,15 @@ membrane strain it is what the SNUG paper calls the extended PBNS.
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
 
 from snug.regressor import Regressor
+
+if TYPE_CHECKING:
+    from snug.frame_plan import FramePlan
 
 WIDTH, DEPTH = 32, 4
 
@@ -44,6 +48,14 @@ class PoseSpaceDeformation(nn.Module):
         normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
         flat = self.offsets(self.activations(normalised)) * self.output_scale  # (N, T, 3V)
         return flat.unflatten(-1, (self.vertices, 3)), None
+
+    def lay_out(self, plan: FramePlan) -> None:
+        """`forward` for one frame."""
+        x = plan.normalised(self)
+        for layer in self.activations:
+            if isinstance(layer, nn.Linear):
+                x = plan.linear(layer, x, rectified=True)
+        plan.offsets(self, (self.offsets, x))
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> None:
         """A static network has no state."""

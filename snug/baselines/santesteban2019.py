@@ -12,10 +12,15 @@ do on other bodies. The 2 mm clean-up of its authors is a method of its own, see
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import torch
 from torch import Tensor, nn
 
 from snug.regressor import Regressor
+
+if TYPE_CHECKING:
+    from snug.frame_plan import FramePlan
 
 SHAPES, FIT, HIDDEN = 10, 20, 1500
 
@@ -49,3 +54,10 @@ class FitAndWrinkles(nn.Module):
         hidden, state = self.gru(normalised, state)  # (N, T, 1500), (1, N, 1500)
         flat = self.fit(normalised[..., -SHAPES:]) + self.offsets(hidden)  # (N, T, 3V)
         return (self.output_scale * flat).unflatten(-1, (self.vertices, 3)), state
+
+    def lay_out(self, plan: FramePlan) -> None:
+        """`forward` for one frame."""
+        x = plan.normalised(self)
+        first, _, drape = self.fit
+        shape = plan.linear(first, slice(x.stop - SHAPES, x.stop), rectified=True)
+        plan.offsets(self, (drape, shape), (self.offsets, plan.gru(self.gru, x)))

@@ -26,6 +26,7 @@ from snug.regressor import Regressor
 from snug.skinning import unposed
 
 if TYPE_CHECKING:
+    from snug.frame_plan import FramePlan
     from snug.training_set import Batch
 
 SHAPES, WIDTH, DROPOUT = 10, 1024, 0.2
@@ -52,6 +53,12 @@ class _Perceptron(nn.Module):
         hidden = torch.relu(self.first(numbers))
         hidden = hidden if mask is None else hidden * mask
         return self.last(torch.relu(self.second(hidden)))
+
+    def lay_out(self, plan: FramePlan, x: slice) -> tuple[nn.Linear, slice]:
+        """The last layer, and the place of what it reads, from numbers at x."""
+        for layer in (self.first, self.second):
+            x = plan.linear(layer, x, rectified=True)
+        return self.last, x
 
 
 class FrequencyMixture(nn.Module):
@@ -111,6 +118,15 @@ class FrequencyMixture(nn.Module):
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, None]:
         low, high = self.bands(features, state)
         return low + high, None
+
+    def lay_out(self, plan: FramePlan) -> None:
+        """`forward` for one frame. Raises ValueError for several pivots, which no model file has."""
+        if len(self.high) > 1:
+            raise ValueError(f"a network of {len(self.high)} pivots has no compiled frame: use one pivot")
+        x = plan.normalised(self)
+        high: Any = self.high[0]
+        pose = slice(x.start, x.stop - SHAPES)
+        plan.offsets(self, self.low.lay_out(plan, x), high.lay_out(plan, pose))
 
 
 def smoothed(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
