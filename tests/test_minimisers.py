@@ -153,7 +153,7 @@ def test_weight_alone_is_one_sweep_to_the_exact_fall(method):
 def test_what_a_sweep_cannot_do_is_refused_and_a_runaway_is_a_status(method, touching):
     potential, guess = touching
     cloth = potential.cloth
-    with pytest.raises(ValueError, match="no sweep for the term"):
+    with pytest.raises(ValueError, match="no kernel for the term"):
         method(Potential([ContactBarrier(cloth), Inertia(cloth, DT)]), max_iterations=1)
     with pytest.raises(ValueError, match="needs inertia"):
         method(Potential([Gravity(cloth)]), max_iterations=1)

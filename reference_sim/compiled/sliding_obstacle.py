@@ -31,7 +31,7 @@ from ..surface import carry, not_outside, plane_normals, vertex_normals
 from ..surface_walk import triangle_adjacency, walk_to_foot
 
 ROTATION = 16
-FAR, SELDOM = 0.03, 4  # [m] samples farther away slide in one frame of so many only, and ride in the others
+FAR, SELDOM = 0.03, 8  # [m] samples farther away slide in one frame of so many only, and ride in the others
 DEEP = 2e-3  # [m] below the plane
 SLACK = 1e-4  # [m] by which a neighbour's distance must be the better one to be tried
 NEIGHBOURS = 4
@@ -216,16 +216,18 @@ class _Anchors:
         state = self.faces, self.barycentric, self.closest, self.distance
         skin = vertices, patch.faces, patch.adjacency, patch.centroids
         _slide(points, self.turn, *skin, self.home, limit, *state)
-        groups = np.arange(-(-len(points) // GROUP))[self.turn :: ROTATION]
-        which = (GROUP * groups[:, None] + np.arange(GROUP)).ravel()
-        self.search(self._order[which[which < len(points)]], points, patch, region)
+        near = self._order
         if reach is not None:
-            far = self._order[(self.distance > reach)[self._order]]
-            self.search(far, points, patch, region, reach)
+            away = (self.distance > reach)[self._order]
+            near = self._order[~away]
+            self.search(self._order[away], points, patch, region, reach)
             if self.rest_points is not None:  # by the rule of the exact one: deep is not far
                 out = np.where(self.distance > reach, -1, self.faces)
                 deep = not_outside(out, points, self._home_faces(patch), vertices, patch.faces)
                 self.search(deep, points, patch, region)
+        groups = np.arange(-(-len(near) // GROUP))[self.turn :: ROTATION]
+        which = (GROUP * groups[:, None] + np.arange(GROUP)).ravel()
+        self.search(near[which[which < len(near)]], points, patch, region)
         self.turn = (self.turn + 1) % ROTATION
         _ask_neighbours(points, self.neighbours, *skin, self.home, limit, *state)
 
