@@ -58,8 +58,8 @@ _ON_CLIPS = ("--scenes", ",".join(CLIPS))
 _GAP = {"time": "cost/frame", "bought": "gap/energy"}
 _SOLVERS = tuple(
     Measurement(
-        "solver", title, ("--suite", "speed", *_ON_CLIPS, "--methods", "simulation,skinning,{method}"), before,
-        after, **_GAP,
+        "solver", title, ("--suite", "speed", *_ON_CLIPS, "--methods", "simulation,skinning,{method}"),
+        before, after, **_GAP,
     )
     for title, before, after in (
         ("L-BFGS, 10 iterations", "lbfgs-10", "lbfgs-10"),
@@ -82,7 +82,10 @@ def _performance(group: str, case: str, method: str, time: str, bought: str) -> 
 MEASUREMENTS = (
     *_SOLVERS,
     *_HYBRIDS,
-    *(_performance("inference", f"inference/{n}", "snug", "inference", "inference_p95") for n in (1000, 4400)),
+    *(
+        _performance("inference", f"inference/{n}", "snug", "inference", "inference_p95")
+        for n in (1000, 4400)
+    ),
     *(
         _performance("reference", case, "simulation", "frame", "converged_frames")
         for case in ("garment/walk-1000", "garment/run-1000", "garment/walk-4400", "sheet/64x64")

@@ -96,9 +96,9 @@ class FaceTree:
         reach = np.full(len(points), np.inf) if reach is None else np.ascontiguousarray(reach, np.float64)
         barycentric, closest = np.empty((len(points), 3)), np.empty((len(points), 3))
         search(
-            points, rest_points, float(region), float(exact), reach, self._corners, self._discs, self._centroids,
-            self._boxes, self._rest_boxes, self._starts, self._order, self._place, self._ascending, sequence,
-            faces, barycentric, closest,
+            points, rest_points, float(region), float(exact), reach, self._corners, self._discs,
+            self._centroids, self._boxes, self._rest_boxes, self._starts, self._order, self._place,
+            self._ascending, sequence, faces, barycentric, closest,
         )  # fmt: skip
         return Closest(faces, barycentric, closest)
 

@@ -43,7 +43,7 @@ class CarriedResidual:
 
 
 @njit(cache=True)
-def _turn(vectors, before, after, out):
+def _turn(vectors: np.ndarray, before: np.ndarray, after: np.ndarray, out: np.ndarray) -> None:
     """after before^T v: blends are close to rotations, and their transpose never amplifies."""
     for v in range(len(vectors)):
         for i in range(3):

@@ -12,8 +12,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from snug.contact import PARTS, ContactCache, Patch
 from reference_sim.surface_walk import CROSSINGS, SLACK
+from snug.contact import PARTS, ContactCache, Patch
 
 NEAREST = 3  # body vertices whose faces are tried for each sample
 CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances

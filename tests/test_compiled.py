@@ -50,8 +50,8 @@ def in_float32(solver: CompiledLBFGS, x0: np.ndarray, u: np.ndarray) -> tuple[np
     energies, gradient = np.zeros(5), np.empty(u.size, np.float32)
     target = (solver._terms.inertia.x_hat - x0).astype(np.float32).ravel()
     evaluate(
-        u.astype(np.float32).ravel(), target, solver._vertices, solver._membrane, solver._lame, solver._hinges,
-        solver._frozen_contact(x0), gradient, solver._scratch, energies,
+        u.astype(np.float32).ravel(), target, solver._vertices, solver._membrane, solver._lame,
+        solver._hinges, solver._frozen_contact(x0), gradient, solver._scratch, energies,
     )  # fmt: skip
     return energies, gradient.reshape(u.shape)
 
@@ -172,9 +172,7 @@ def two_boxes(way: float, frames: int) -> Obstacle:
     high, _ = box((-0.1, 0.3, -0.1), (0.1, 0.5, 0.1))
     both = np.concatenate([faces, faces + len(low)])
     steps = np.linspace(0, way, frames)
-    return Obstacle(
-        np.stack([np.concatenate([low, high - [0, step, 0]]) for step in steps]), both
-    )
+    return Obstacle(np.stack([np.concatenate([low, high - [0, step, 0]]) for step in steps]), both)
 
 
 def test_a_limb_that_comes_near_is_found_by_the_rotation_and_told_to_neighbours():

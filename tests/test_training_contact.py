@@ -9,11 +9,11 @@ import pytest
 import torch
 from dressing import swaying, tube_dress
 
+from reference_sim.surface_walk import triangle_adjacency
 from snug.contact import ContactCache
 from snug.recipe import DEFAULT
 from snug.skeleton import JOINT
 from snug.skinning import skin
-from reference_sim.surface_walk import triangle_adjacency
 from snug.trainer import Trainer
 from snug.training_contact import FIRST_NEAR, FIRST_PROPAGATED, NEAR, PROPAGATED
 

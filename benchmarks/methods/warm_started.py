@@ -121,7 +121,6 @@ class WarmStarted(Method):
             return skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
         return predictions(model, dressed, motion, betas, before=before)
 
-
     def _carry(self, scene: BuiltScene) -> CarriedResidual:
         from snug.carried_residual import CarriedResidual
         from snug.dressed_body import DressedBody

@@ -41,19 +41,21 @@ def blocks(values: np.ndarray) -> np.ndarray:
     count, width = values.shape
     padded = np.zeros((-(-count // LANES) * LANES, width), values.dtype)
     padded[:count] = values
-    return np.ascontiguousarray(padded.reshape(-1, LANES, width).transpose(0, 2, 1)).reshape(-1, width * LANES)
+    return np.ascontiguousarray(padded.reshape(-1, LANES, width).transpose(0, 2, 1)).reshape(
+        -1, width * LANES
+    )
 
 
 @njit(cache=True)
 def edges_of(x, vertices, columns, out):
     """out (B, 3 columns LANES) float32: x_(k+1) - x_0 of each element, k < columns, from x (V, 3) float64."""
     for b in range(len(vertices)):
-        for l in range(LANES):
-            first = vertices[b, l] // 3
+        for g in range(LANES):
+            first = vertices[b, g] // 3
             for k in range(columns):
-                other = vertices[b, (k + 1) * LANES + l] // 3
+                other = vertices[b, (k + 1) * LANES + g] // 3
                 for i in range(3):
-                    out[b, (3 * k + i) * LANES + l] = np.float32(x[other, i] - x[first, i])
+                    out[b, (3 * k + i) * LANES + g] = np.float32(x[other, i] - x[first, i])
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -66,22 +68,22 @@ def membrane_gradient(u, vertices, constants, edges, lam, mu, gradient, s):
     total = 0.0
     for b in range(len(vertices)):
         at, c, e = vertices[b], constants[b], edges[b]
-        for l in range(LANES):
-            i, j, k = at[l], at[LANES + l], at[2 * LANES + l]
-            s[l] = u[j] - u[i]
-            s[LANES + l] = u[j + 1] - u[i + 1]
-            s[2 * LANES + l] = u[j + 2] - u[i + 2]
-            s[3 * LANES + l] = u[k] - u[i]
-            s[4 * LANES + l] = u[k + 1] - u[i + 1]
-            s[5 * LANES + l] = u[k + 2] - u[i + 2]
+        for g in range(LANES):
+            i, j, k = at[g], at[LANES + g], at[2 * LANES + g]
+            s[g] = u[j] - u[i]
+            s[LANES + g] = u[j + 1] - u[i + 1]
+            s[2 * LANES + g] = u[j + 2] - u[i + 2]
+            s[3 * LANES + g] = u[k] - u[i]
+            s[4 * LANES + g] = u[k + 1] - u[i + 1]
+            s[5 * LANES + g] = u[k + 2] - u[i + 2]
         energy = np.float32(0.0)
-        for l in range(LANES):
-            x1, y1, z1 = s[l] + e[l], s[LANES + l] + e[LANES + l], s[2 * LANES + l] + e[2 * LANES + l]
-            x2 = s[3 * LANES + l] + e[3 * LANES + l]
-            y2 = s[4 * LANES + l] + e[4 * LANES + l]
-            z2 = s[5 * LANES + l] + e[5 * LANES + l]
-            d00, d01, d10, d11 = c[l], c[LANES + l], c[2 * LANES + l], c[3 * LANES + l]
-            area = c[4 * LANES + l]
+        for g in range(LANES):
+            x1, y1, z1 = s[g] + e[g], s[LANES + g] + e[LANES + g], s[2 * LANES + g] + e[2 * LANES + g]
+            x2 = s[3 * LANES + g] + e[3 * LANES + g]
+            y2 = s[4 * LANES + g] + e[4 * LANES + g]
+            z2 = s[5 * LANES + g] + e[5 * LANES + g]
+            d00, d01, d10, d11 = c[g], c[LANES + g], c[2 * LANES + g], c[3 * LANES + g]
+            area = c[4 * LANES + g]
             ax, ay, az = x1 * d00 + x2 * d10, y1 * d00 + y2 * d10, z1 * d00 + z2 * d10
             bx, by, bz = x1 * d01 + x2 * d11, y1 * d01 + y2 * d11, z1 * d01 + z2 * d11
             g00 = HALF * (ax * ax + ay * ay + az * az - ONE)
@@ -95,14 +97,14 @@ def membrane_gradient(u, vertices, constants, edges, lam, mu, gradient, s):
             # P = F S, and the force of a corner P b.
             t00, t01 = d00 * s00 + d01 * s01, d00 * s01 + d01 * s11
             t10, t11 = d10 * s00 + d11 * s01, d10 * s01 + d11 * s11
-            s[6 * LANES + l], s[9 * LANES + l] = ax * t00 + bx * t01, ax * t10 + bx * t11
-            s[7 * LANES + l], s[10 * LANES + l] = ay * t00 + by * t01, ay * t10 + by * t11
-            s[8 * LANES + l], s[11 * LANES + l] = az * t00 + bz * t01, az * t10 + bz * t11
-        total += energy
-        for l in range(LANES):
-            i, j, k = at[l], at[LANES + l], at[2 * LANES + l]
+            s[6 * LANES + g], s[9 * LANES + g] = ax * t00 + bx * t01, ax * t10 + bx * t11
+            s[7 * LANES + g], s[10 * LANES + g] = ay * t00 + by * t01, ay * t10 + by * t11
+            s[8 * LANES + g], s[11 * LANES + g] = az * t00 + bz * t01, az * t10 + bz * t11
+        total += float(energy)
+        for g in range(LANES):
+            i, j, k = at[g], at[LANES + g], at[2 * LANES + g]
             for a in range(3):
-                f1, f2 = s[(6 + a) * LANES + l], s[(9 + a) * LANES + l]
+                f1, f2 = s[(6 + a) * LANES + g], s[(9 + a) * LANES + g]
                 gradient[j + a] += f1
                 gradient[k + a] += f2
                 gradient[i + a] -= f1 + f2
@@ -119,21 +121,21 @@ def hinge_gradient(u, vertices, constants, edges, gradient, s):
     total = 0.0
     for b in range(len(vertices)):
         at, c, e = vertices[b], constants[b], edges[b]
-        for l in range(LANES):
-            i0, i1, i2, i3 = at[l], at[LANES + l], at[2 * LANES + l], at[3 * LANES + l]
+        for g in range(LANES):
+            i0, i1, i2, i3 = at[g], at[LANES + g], at[2 * LANES + g], at[3 * LANES + g]
             x, y, z = u[i0], u[i0 + 1], u[i0 + 2]
-            s[l], s[LANES + l], s[2 * LANES + l] = u[i1] - x, u[i1 + 1] - y, u[i1 + 2] - z
-            s[3 * LANES + l], s[4 * LANES + l], s[5 * LANES + l] = u[i2] - x, u[i2 + 1] - y, u[i2 + 2] - z
-            s[6 * LANES + l], s[7 * LANES + l], s[8 * LANES + l] = u[i3] - x, u[i3 + 1] - y, u[i3 + 2] - z
+            s[g], s[LANES + g], s[2 * LANES + g] = u[i1] - x, u[i1 + 1] - y, u[i1 + 2] - z
+            s[3 * LANES + g], s[4 * LANES + g], s[5 * LANES + g] = u[i2] - x, u[i2 + 1] - y, u[i2 + 2] - z
+            s[6 * LANES + g], s[7 * LANES + g], s[8 * LANES + g] = u[i3] - x, u[i3 + 1] - y, u[i3 + 2] - z
         energy = np.float32(0.0)
-        for l in range(LANES):
-            ex, ey, ez = s[l] + e[l], s[LANES + l] + e[LANES + l], s[2 * LANES + l] + e[2 * LANES + l]
-            px = s[3 * LANES + l] + e[3 * LANES + l]
-            py = s[4 * LANES + l] + e[4 * LANES + l]
-            pz = s[5 * LANES + l] + e[5 * LANES + l]
-            qx = s[6 * LANES + l] + e[6 * LANES + l]
-            qy = s[7 * LANES + l] + e[7 * LANES + l]
-            qz = s[8 * LANES + l] + e[8 * LANES + l]
+        for g in range(LANES):
+            ex, ey, ez = s[g] + e[g], s[LANES + g] + e[LANES + g], s[2 * LANES + g] + e[2 * LANES + g]
+            px = s[3 * LANES + g] + e[3 * LANES + g]
+            py = s[4 * LANES + g] + e[4 * LANES + g]
+            pz = s[5 * LANES + g] + e[5 * LANES + g]
+            qx = s[6 * LANES + g] + e[6 * LANES + g]
+            qy = s[7 * LANES + g] + e[7 * LANES + g]
+            qz = s[8 * LANES + g] + e[8 * LANES + g]
             length2 = ex * ex + ey * ey + ez * ez + TINY
             inverse = ONE / np.sqrt(length2)
             length = length2 * inverse
@@ -146,9 +148,7 @@ def hinge_gradient(u, vertices, constants, edges, gradient, s):
             bx, by, bz = nx * scale, ny * scale, nz * scale
             foot_a = (ex * px + ey * py + ez * pz) * inverse
             foot_b = (ex * qx + ey * qy + ez * qz) * inverse
-            sine = inverse * (
-                (by * az - bz * ay) * ex + (bz * ax - bx * az) * ey + (bx * ay - by * ax) * ez
-            )
+            sine = inverse * ((by * az - bz * ay) * ex + (bz * ax - bx * az) * ey + (bx * ay - by * ax) * ez)
             cosine = -(ax * bx + ay * by + az * bz)
             size_s, size_c = abs(sine), abs(cosine)
             a = min(size_s, size_c) / (max(size_s, size_c) + TINY)
@@ -157,30 +157,30 @@ def hinge_gradient(u, vertices, constants, edges, gradient, s):
             angle = HALF_PI - angle if size_s > size_c else angle
             angle = PI - angle if cosine < np.float32(0.0) else angle
             angle = -angle if sine < np.float32(0.0) else angle
-            angle -= c[LANES + l]
+            angle -= c[LANES + g]
             angle -= TWO_PI * np.floor((angle + PI) / TWO_PI)
-            stiffness = c[l]
+            stiffness = c[g]
             energy += HALF * stiffness * angle * angle
             force = stiffness * angle
             wa, wb = force * (length - foot_a), force * (length - foot_b)
             va, vb = force * foot_a, force * foot_b
-            s[9 * LANES + l] = wa * ax - wb * bx
-            s[10 * LANES + l] = wa * ay - wb * by
-            s[11 * LANES + l] = wa * az - wb * bz
-            s[12 * LANES + l] = va * ax - vb * bx
-            s[13 * LANES + l] = va * ay - vb * by
-            s[14 * LANES + l] = va * az - vb * bz
+            s[9 * LANES + g] = wa * ax - wb * bx
+            s[10 * LANES + g] = wa * ay - wb * by
+            s[11 * LANES + g] = wa * az - wb * bz
+            s[12 * LANES + g] = va * ax - vb * bx
+            s[13 * LANES + g] = va * ay - vb * by
+            s[14 * LANES + g] = va * az - vb * bz
             force *= length
-            s[15 * LANES + l], s[16 * LANES + l], s[17 * LANES + l] = -force * ax, -force * ay, -force * az
-            s[18 * LANES + l], s[19 * LANES + l], s[20 * LANES + l] = force * bx, force * by, force * bz
-        total += energy
-        for l in range(LANES):
-            i0, i1, i2, i3 = at[l], at[LANES + l], at[2 * LANES + l], at[3 * LANES + l]
+            s[15 * LANES + g], s[16 * LANES + g], s[17 * LANES + g] = -force * ax, -force * ay, -force * az
+            s[18 * LANES + g], s[19 * LANES + g], s[20 * LANES + g] = force * bx, force * by, force * bz
+        total += float(energy)
+        for g in range(LANES):
+            i0, i1, i2, i3 = at[g], at[LANES + g], at[2 * LANES + g], at[3 * LANES + g]
             for a in range(3):
-                gradient[i0 + a] += s[(9 + a) * LANES + l]
-                gradient[i1 + a] += s[(12 + a) * LANES + l]
-                gradient[i2 + a] += s[(15 + a) * LANES + l]
-                gradient[i3 + a] += s[(18 + a) * LANES + l]
+                gradient[i0 + a] += s[(9 + a) * LANES + g]
+                gradient[i1 + a] += s[(12 + a) * LANES + g]
+                gradient[i2 + a] += s[(15 + a) * LANES + g]
+                gradient[i3 + a] += s[(18 + a) * LANES + g]
     return total
 
 
@@ -188,41 +188,42 @@ def hinge_gradient(u, vertices, constants, edges, gradient, s):
 def contact_gradient(u, near, vertices, constants, planes, gradient, s):
     """Energy [J] of the contact penalty; adds to gradient (3V,) [N].
 
-    near: the blocks that are looked at. vertices (B, 3 LANES): 3 times the vertex. constants (B, 4 LANES): weights, stiffness [J/m^3]. planes
-    (B, 4 LANES): normal, and the depth of x_0 under the margin [m], below zero above it.
+    near: the blocks that are looked at. vertices (B, 3 LANES): 3 times the vertex. constants (B, 4 LANES):
+    weights, stiffness [J/m^3]. planes (B, 4 LANES): normal, and the depth of x_0 under the margin [m], below
+    zero above it.
     """
     total = 0.0
     for b in near:
         at, c, n = vertices[b], constants[b], planes[b]
-        for l in range(LANES):
-            i, j, k = at[l], at[LANES + l], at[2 * LANES + l]
+        for g in range(LANES):
+            i, j, k = at[g], at[LANES + g], at[2 * LANES + g]
             for a in range(3):
-                s[a * LANES + l] = u[i + a]
-                s[(3 + a) * LANES + l] = u[j + a]
-                s[(6 + a) * LANES + l] = u[k + a]
+                s[a * LANES + g] = u[i + a]
+                s[(3 + a) * LANES + g] = u[j + a]
+                s[(6 + a) * LANES + g] = u[k + a]
         deepest, energy = np.float32(0.0), np.float32(0.0)
-        for l in range(LANES):
-            w0, w1, w2 = c[l], c[LANES + l], c[2 * LANES + l]
-            x = w0 * s[l] + w1 * s[3 * LANES + l] + w2 * s[6 * LANES + l]
-            y = w0 * s[LANES + l] + w1 * s[4 * LANES + l] + w2 * s[7 * LANES + l]
-            z = w0 * s[2 * LANES + l] + w1 * s[5 * LANES + l] + w2 * s[8 * LANES + l]
-            depth = n[3 * LANES + l] - (n[l] * x + n[LANES + l] * y + n[2 * LANES + l] * z)
+        for g in range(LANES):
+            w0, w1, w2 = c[g], c[LANES + g], c[2 * LANES + g]
+            x = w0 * s[g] + w1 * s[3 * LANES + g] + w2 * s[6 * LANES + g]
+            y = w0 * s[LANES + g] + w1 * s[4 * LANES + g] + w2 * s[7 * LANES + g]
+            z = w0 * s[2 * LANES + g] + w1 * s[5 * LANES + g] + w2 * s[8 * LANES + g]
+            depth = n[3 * LANES + g] - (n[g] * x + n[LANES + g] * y + n[2 * LANES + g] * z)
             depth = max(depth, np.float32(0.0))
-            stiffness = c[3 * LANES + l] * depth * depth
+            stiffness = c[3 * LANES + g] * depth * depth
             energy += stiffness * depth
-            s[9 * LANES + l] = -THREE * stiffness
+            s[9 * LANES + g] = -THREE * stiffness
             deepest = max(deepest, depth)
         if deepest == np.float32(0.0):
             continue
-        total += energy
-        for l in range(LANES):
-            force = s[9 * LANES + l]
+        total += float(energy)
+        for g in range(LANES):
+            force = s[9 * LANES + g]
             if force == np.float32(0.0):
                 continue
             for corner in range(3):
-                part, i = force * c[corner * LANES + l], at[corner * LANES + l]
+                part, i = force * c[corner * LANES + g], at[corner * LANES + g]
                 for a in range(3):
-                    gradient[i + a] += part * n[a * LANES + l]
+                    gradient[i + a] += part * n[a * LANES + g]
     return total
 
 

@@ -50,9 +50,7 @@ def evaluate(u, target, vertices, membrane, lame, hinges, contact, gradient, scr
     energies[STRAIN] = membrane_gradient(
         u, membrane.vertices, membrane.constants, membrane.state, lame.lam, lame.mu, gradient, scratch
     )
-    energies[BENDING] = hinge_gradient(
-        u, hinges.vertices, hinges.constants, hinges.state, gradient, scratch
-    )
+    energies[BENDING] = hinge_gradient(u, hinges.vertices, hinges.constants, hinges.state, gradient, scratch)
     energies[COLLISION] = contact_gradient(
         u, contact.near, contact.vertices, contact.constants, contact.state, gradient, scratch
     )
@@ -68,16 +66,16 @@ def precondition(contact, factor):
     values = factor.values
     values[:] = factor.constant
     for b in contact.near:
-        for l in range(LANES):
-            depth = contact.state[b, 3 * LANES + l]
+        for g in range(LANES):
+            depth = contact.state[b, 3 * LANES + g]
             if depth <= 0.0:
                 continue
-            curvature = 6.0 * contact.constants[b, 3 * LANES + l] * depth
+            curvature = 6.0 * contact.constants[b, 3 * LANES + g] * depth
             for i in range(3):
                 for j in range(3):
-                    place = factor.contact_places[b, (3 * i + j) * LANES + l]
+                    place = factor.contact_places[b, (3 * i + j) * LANES + g]
                     if place >= 0:
-                        weights = contact.constants[b, i * LANES + l] * contact.constants[b, j * LANES + l]
+                        weights = contact.constants[b, i * LANES + g] * contact.constants[b, j * LANES + g]
                         values[place] += curvature * weights
     return factorise(
         values, factor.row_starts, factor.row_columns, factor.factor_rows, factor.factor_columns,

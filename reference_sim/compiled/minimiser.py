@@ -1,9 +1,9 @@
 """Preconditioned L-BFGS that is stopped early, compiled as a whole and in float32.
 
-The method of minimise.LBFGS without its finish by Newton: the same preconditioner (mass over dt^2, the cotangent
-Laplacian, contacts at the start), the same two-loop recursion, the same sufficient decrease. What it leaves
-out: float64, the check of convergence (nothing but a factorised Hessian can say "converged"), and all terms
-but inertia, weight, StVK, hinges and the contact penalty.
+The method of minimise.LBFGS without its finish by Newton: the same preconditioner (mass over dt^2, the
+cotangent Laplacian, contacts at the start), the same two-loop recursion, the same sufficient decrease. What
+it leaves out: float64, the check of convergence (nothing but a factorised Hessian can say "converged"), and
+all terms but inertia, weight, StVK, hinges and the contact penalty.
 """
 
 from __future__ import annotations
@@ -104,8 +104,8 @@ class CompiledLBFGS:
         near, term = np.zeros(0, np.int64), self._terms.contact
         if term is not None:
             near = _depths(
-                x0.ravel(), self._order, self._contact.vertices, self._weights, term.points, term.normals, term.margin, _far(term),
-                self._contact.state,
+                x0.ravel(), self._order, self._contact.vertices, self._weights, term.points, term.normals,
+                term.margin, _far(term), self._contact.state,
             )  # fmt: skip
         return iteration.Contact(near, *self._contact)
 

@@ -1,12 +1,12 @@
 """An obstacle whose contact planes follow their samples over the surface, and are searched in rotation.
 
 From frame to frame the closest point of a sample moves little. So it slides (surface_walk) from where it was
-to the foot of its sample, which finds it wherever the surface is one smooth sheet. What sliding cannot find is
-another limb that came near. Against that, in each frame:
+to the foot of its sample, which finds it wherever the surface is one smooth sheet. What sliding cannot find
+is another limb that came near. Against that, in each frame:
 
 - one group of neighbouring samples in ROTATION is searched exactly, another one each time;
-- a sample tries its neighbours' faces where its own is too far: distances of two samples to one surface differ
-  by no more than the samples are apart;
+- a sample tries its neighbours' faces where its own is too far: distances of two samples to one surface
+  differ by no more than the samples are apart;
 - a sample whose place is farther away than the step's reach looks for another surface within that reach;
 - a sample deeper than DEEP below its plane is searched exactly: that is where a false plane costs most.
 
@@ -97,11 +97,13 @@ class SlidingObstacle(Obstacle):
         if len(self._none_far) < len(points):
             self._none_far = np.zeros(len(points), bool)
 
+        patch = self._patch
+
         def set_normals(at: np.ndarray | slice) -> None:
             some = np.empty_like(normals[at])
             plane_normals(
                 points[at], anchors.closest[at], anchors.faces[at], anchors.barycentric[at],
-                self._none_far[: len(some)], vertices, self._patch.faces, of_vertices, some,
+                self._none_far[: len(some)], vertices, patch.faces, of_vertices, some,
             )  # fmt: skip
             normals[at] = some
 
