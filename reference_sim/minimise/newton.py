@@ -28,13 +28,11 @@ from ..potential import Potential
 from .convergence_check import convergence_check
 from .descent import Descent, Observer, approximate_wolfe, sufficient_decrease
 from .factorised import FactorisedDescent, FactorisedHessian
+from .iterative import LARGEST_FACTORISED, IterativeHessian
 from .lbfgs_history import LBFGSHistory, dot
 from .result import Result, check_tolerance
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
-# In units of M/dt^2. A static cloth that nothing holds needs a shift against its rigid motions alone; begun
-# at 1 instead, that shift slows the soft bending modes down ten times.
-FIRST_SHIFT = 1e-4
 MAX_SHIFT = 1e12  # beyond it a step is shorter than round-off
 STEP_TOLERANCE = 1e-3  # of a mean edge length
 WATCHDOG_AFTER = 20  # iterations: most steps of a garment are done by then, and sooner so
@@ -75,8 +73,10 @@ class Newton:
         check_tolerance(tolerance)
         self.potential, self.reuse, self.observe = potential, reuse, observe
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
-        self.first_level = len(CONVEXITY) - 1 if start_projected else 0
-        self.hessian = FactorisedHessian(potential, tolerance=tolerance, reference_dt=reference_dt)
+        small = 3 * int(potential.cloth.free.sum()) <= LARGEST_FACTORISED
+        kind = FactorisedHessian if small else IterativeHessian
+        self.hessian = kind(potential, tolerance=tolerance, reference_dt=reference_dt)
+        self.first_level = len(CONVEXITY) - 1 if start_projected and small else 0
         self.step_tolerance = STEP_TOLERANCE * float(potential.cloth.edge_lengths.mean())
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:
@@ -155,7 +155,7 @@ class Run(FactorisedDescent):
         """Quasi-Newton steps on the last factorisation, until a new one would serve better."""
         norms = [self.gradient_norm()]
         while norms[-1] > tolerance and self.iterations < self.n.max_iterations:
-            if self.late(self.n.timeout) or not self.quasi_newton_step(self.history, self.solve):
+            if self.late(self.n.timeout) or not self.quasi_newton_step(self.history, self.precondition):
                 return
             self.iterations += 1
             self.quasi_newton_steps += 1
@@ -215,9 +215,11 @@ class Run(FactorisedDescent):
         """-H^-1 g with the first projection, then shift, that makes H positive definite; its level."""
         shift = 0.0
         # A singular Hessian, as of cloth that may move rigidly, needs no projection. Inertia excludes it.
-        while not self.factorise(
-            data, shift or (self.hessian.tiny_shift(data) if self.hessian.static else 0.0)
-        ):
+        while (
+            p := self.newton_step(
+                data, shift or (self.hessian.tiny_shift(data) if self.hessian.static else 0.0)
+            )
+        ) is None:
             if projection + 1 < len(CONVEXITY):
                 projection += 1
                 data = self.assemble(CONVEXITY[projection])
@@ -225,8 +227,14 @@ class Run(FactorisedDescent):
                 return np.full_like(self.g, np.nan), projection
             else:
                 shift = max(4 * shift, 1.0)
-        p = self.solve(-self.g)
         return p, projection
+
+    def newton_step(self, data: np.ndarray, shift: float | np.ndarray) -> np.ndarray | None:
+        """-(H + shift M/dt^2)^-1 g (3n,); None where that is found not to be positive definite."""
+        if not self.factorise(data, shift):
+            return None
+        p = self.solve(-self.g)
+        return p if self.hessian.downward is None else None
 
     def line_search_step(self, projection: int, predicted: bool) -> bool:
         """One step by line search, at rising projection levels, then with rising shifts, until there is one.
@@ -238,8 +246,8 @@ class Run(FactorisedDescent):
         if projection == len(CONVEXITY):
             projection, shift = projection - 1, 1.0
         while shift <= MAX_SHIFT:
-            if self.factorise(self.assemble(CONVEXITY[projection]), shift):
-                p = self.solve(-self.g)
+            p = self.newton_step(self.assemble(CONVEXITY[projection]), shift)
+            if p is not None:
                 slope = dot(self.g, p)
                 if np.isfinite(slope) and slope < 0 and self.line_search(p, slope):
                     self.projection_level, self.raised = projection, projection > first
