@@ -140,11 +140,10 @@ class HessianPattern:
         for energy, slots in zip(self.energies, self._slots):
             if energy.dynamic:
                 continue
-            elements, blocks = (
-                energy.active_hessian_blocks(x, convexity) if self.block == 3 else energy.scalar_stiffness(x)
-            )
+            pieces = energy.hessian_pieces(x, convexity) if self.block == 3 else [energy.scalar_stiffness(x)]
             k = energy.stencils.shape[1]
-            _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
+            for elements, blocks in pieces:
+                _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
         for matrix in changing:
             self._add(matrix, data)
         return data
@@ -162,7 +161,7 @@ class HessianPattern:
         return result
 
     def along(self, data: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Values (m,) of `graph`: the matrix of these values where each vertex moves along its direction (n, 3)."""
+        """Values (m,) of `graph`: the matrix where each vertex moves along its own of directions (n, 3)."""
         values = np.empty(len(self._key))
         _contract(self._key, len(self.free), self._base, self._stride, data, directions, values)
         return values

@@ -1,4 +1,4 @@
-"""The Newton finish of large meshes, forced on small ones: held against dense numpy and the factorised one."""
+"""Newton's method of large meshes, forced on small ones: against dense numpy and the factorised one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from reference_sim.energies import BendHinge, Gravity, Inertia, StretchStVK
 from reference_sim.linear_solver import CholmodSolver
 from reference_sim.minimise import iterative, make_minimiser, newton
 from reference_sim.minimise.factorised import FactorisedHessian
-from reference_sim.minimise.iterative import MAX_PRODUCTS, SETTLED, IterativeHessian
+from reference_sim.minimise.iterative import SETTLED, IterativeHessian
 
 SHEET, FACES = grid(8, 8, width=0.5, depth=0.5)
 SIDES = np.flatnonzero((SHEET[:, 0] == 0) | (SHEET[:, 0] == 0.5))
@@ -74,13 +74,16 @@ def test_it_says_what_was_checked_and_what_was_not(large):
 def test_nothing_of_the_size_of_the_hessian_is_analysed(large, monkeypatch):
     sizes = []
     init = CholmodSolver.__init__
-    monkeypatch.setattr(
-        CholmodSolver, "__init__", lambda self, indptr, *rest: sizes.append(len(indptr)) or init(self, indptr, *rest)
-    )
+
+    def noted(self, indptr, *rest):
+        sizes.append(len(indptr) - 1)
+        init(self, indptr, *rest)
+
+    monkeypatch.setattr(CholmodSolver, "__init__", noted)
     large()
     potential, x0 = swinging()
     assert minimise(potential, x0, "lbfgs").status == "converged"
-    assert sizes and max(sizes) <= 82
+    assert set(sizes) == {len(x0) - 2}
 
 
 def hessian_at(potential: Potential, x: np.ndarray, convexity: float) -> tuple[IterativeHessian, np.ndarray]:
@@ -131,7 +134,7 @@ def test_a_solve_of_an_indefinite_matrix_ends_in_negative_curvature():
 def test_the_lowest_curvature_is_that_of_the_dense_eigenvalue_problem():
     potential, x0 = swinging()
     x = minimise(potential, x0).positions
-    hessian, data = hessian_at(potential, x, 0.0)
+    hessian, _ = hessian_at(potential, x, 0.0)
     hessian.look_for_negative_curvature()
     assert hessian.downward is None and hessian.settled
     scalar = hessian._scalar
@@ -167,7 +170,6 @@ def test_a_look_that_does_not_settle_is_not_called_converged(large, monkeypatch)
 def test_what_is_small_enough_is_factorised():
     potential, _ = swinging()
     assert type(make_minimiser(potential).hessian) is FactorisedHessian
-    assert MAX_PRODUCTS > 100
 
 
 def test_lbfgs_alone_takes_less_than_4_kilobytes_a_vertex():

@@ -11,6 +11,7 @@ prints it (eq. 11): some three times as stiff.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 SCALINGS = ("length_area", "none")
+PIECE = 1 << 14  # hinges whose blocks, 1152 bytes each, are in memory at once
 
 
 class BendHinge(Energy):
@@ -82,9 +84,20 @@ class BendHinge(Energy):
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """grad theta grad theta^T is never negative; the term with Hess theta is reduced by `convexity`."""
-        blocks = np.empty((len(self.stencils), 12, 12))
-        _hessian(x, self.stencils, self.stiffness, self.rest_angles, convexity, blocks)
-        return np.arange(len(blocks)), blocks
+        return self._piece(x, convexity, slice(None))
+
+    def hessian_pieces(
+        self, x: np.ndarray, convexity: float = 0.0
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        for start in range(0, len(self.stencils), PIECE):
+            yield self._piece(x, convexity, slice(start, start + PIECE))
+
+    def _piece(self, x: np.ndarray, convexity: float, piece: slice) -> tuple[np.ndarray, np.ndarray]:
+        hinges = np.arange(len(self.stencils))[piece]
+        blocks = np.empty((len(hinges), 12, 12))
+        stencils, stiffness, rest = self.stencils[piece], self.stiffness[piece], self.rest_angles[piece]
+        _hessian(x, stencils, stiffness, rest, convexity, blocks)
+        return hinges, blocks
 
 
 def _wrap(angle):

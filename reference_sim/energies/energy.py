@@ -7,6 +7,7 @@ holds every override to the default. Torch is imported only where the definition
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -125,6 +126,12 @@ class Energy:
             values = np.where(values < 0, (1 - convexity) * values, values)
             blocks = (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
         return np.arange(len(self.stencils)), blocks
+
+    def hessian_pieces(
+        self, x: np.ndarray, convexity: float = 0.0
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """What active_hessian_blocks gives, in pieces where all at once would take much memory."""
+        yield self.active_hessian_blocks(x, convexity)
 
     def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
         """Of a dynamic term: its second derivatives (3V, 3V) [N/m] at x (V, 3), as active_hessian_blocks."""

@@ -72,7 +72,7 @@ def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bo
 
 
 def most_negative(run: FactorisedDescent, data: np.ndarray) -> np.ndarray | None:
-    """The direction (3n,) of most negative curvature, by inverse iteration; None if no shift makes up for it."""
+    """The direction (3n,) of most negative curvature, by inverse iteration; None if no shift outdoes it."""
     shift = 1.0
     while not run.factorise(data, shift):
         shift *= 4

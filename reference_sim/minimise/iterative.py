@@ -1,13 +1,14 @@
 """The Hessian of a mesh too large to factorise it: solved with by preconditioned conjugate gradients.
 
-The preconditioner P^-1 = S^-1 + N (N^T H N)^-1 N^T has two factored n x n matrices. The scalar S of L-BFGS
-knows the membrane and takes cloth to be as stiff along its normals, where bending alone resists. So these, the
-columns of N, get the true Hessian among themselves. Flat and hanging cloth then needs a tenth of the steps.
+The preconditioner P^-1 = S^-1 + N (N^T H N)^-1 N^T needs two factorisations of n x n matrices. The scalar S
+of L-BFGS takes cloth to be as stiff along its normals, the columns of N, as in its plane, though only bending
+resists there. So the normals get the true Hessian among themselves. Cloth that hangs then needs a tenth of
+the steps, crumpled cloth up to as many.
 
-How exactly a system is solved follows from the size of its
-right-hand side (Nocedal and Wright 2006, algorithm 7.1). A direction of negative curvature ends a solve: the
-matrix is not positive definite. That it is cannot be proved without a factorisation. Lanczos' method from a
-random start, which finds the ends of the spectrum first, tells how low the lowest curvature is.
+How exactly a system is solved follows from the size of its right-hand side (Nocedal and Wright 2006,
+algorithm 7.1). A direction of negative curvature ends a solve: the matrix is not positive definite. That it
+is, nothing proves but a factorisation. Lanczos' method from a random start, which finds the ends of the
+spectrum first, estimates the lowest curvature.
 """
 
 from __future__ import annotations
@@ -28,10 +29,11 @@ LARGEST_RESIDUAL = 0.03  # of a solve, as a share of its right-hand side
 MAX_PRODUCTS = 1000  # of the matrix and a vector, in one solve
 LOOK_AFTER = 20  # steps of Lanczos' method until the lowest eigenvalue is looked at again
 SETTLED = 0.1  # of the lowest eigenvalue found: how near to it the matrix has one
+EXHAUSTED = 1e-12  # residual below which the steps have seen all that the start contains
 
 
 class IterativeHessian(FactorisedHessian):
-    """As FactorisedHessian, but only its preconditioner is factorised, and a solve may meet negative curvature."""
+    """A FactorisedHessian whose preconditioner alone is factorised: a solve may meet negative curvature."""
 
     def __init__(self, potential: Potential, *, tolerance: float, reference_dt: float) -> None:
         self._scalar = ScalarPreconditioner(potential)
@@ -48,7 +50,7 @@ class IterativeHessian(FactorisedHessian):
         return super().assemble(x, convexity)
 
     def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
-        """Keep the values plus shift M/dt^2 at the last x; False if along normals that is not positive definite."""
+        """Keep the values plus shift M/dt^2; False if among normals that is not positive definite."""
         self._data, self._shift, self.downward = data, shift * self.metric, None
         along = self._pattern.along(data, self._normals)
         # A vertex without a normal, as between folded faces, takes no part.
@@ -58,7 +60,7 @@ class IterativeHessian(FactorisedHessian):
         return scalar and self._along_normals.factorise(along)
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the values kept last, b (3n,), until negative curvature is met: see `indefinite`."""
+        """Solve with the values kept last, b (3n,), until negative curvature is met: see `downward`."""
         residual = min(LARGEST_RESIDUAL, float(np.sqrt(np.abs(b).max(initial=0.0) / self._weight)))
         run = ConjugateGradients(self, b)
         while run.residual > residual and len(run.lengths) < MAX_PRODUCTS and run.step():
@@ -71,7 +73,7 @@ class IterativeHessian(FactorisedHessian):
         run = ConjugateGradients(self, np.random.default_rng(0).standard_normal(len(self.metric)))
         lowest, error = 0.0, np.inf
         while error > SETTLED * lowest and len(run.lengths) < MAX_PRODUCTS and run.step():
-            if len(run.lengths) % LOOK_AFTER == 0:
+            if len(run.lengths) % LOOK_AFTER == 0 or run.residual < EXHAUSTED:
                 lowest, error = run.lowest_eigenvalue()
         self.downward = run.downward
         self.settled = error <= SETTLED * lowest
@@ -92,7 +94,7 @@ class ConjugateGradients:
     """H x = b from x = 0, a step at a time; its numbers are those of Lanczos' method for P^-1 H.
 
     Attributes:
-        x: (3n,) the solution so far; after a first step without positive curvature, P^-1 b.
+        x: (3n,) the solution so far.
         downward: (3n,) direction along which the curvature is not positive, once one was met.
         residual: its norm in P^-1 as a share of that of b.
         lengths, ratios: of each step its length along p, and the residual's square over that before.

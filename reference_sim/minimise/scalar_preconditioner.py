@@ -1,4 +1,4 @@
-"""The n x n matrix that x, y and z share, factorised in place of the Hessian (Liu, Bouaziz and Kavan 2017)."""
+"""The n x n matrix that x, y and z share, in place of the Hessian (Liu, Bouaziz and Kavan 2017)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from ..linear_solver import analyse
 from ..potential import Potential
 
-# In units of M/dt^2 at 30 steps a second. Cloth that nothing holds needs it against its rigid motions alone; 1
-# in its place slows the soft bending modes down ten times.
+# In units of M/dt^2 at 30 steps a second. Cloth that nothing holds needs it against its rigid motions alone;
+# 1 in its place slows the soft bending modes down ten times.
 FLOOR = 1e-4
 
 
