@@ -74,8 +74,11 @@ REFERENCES = (
     "simulation-dt/8", *AGAIN,
 )  # fmt: skip
 FEW_REFERENCES = ("simulation", "simulation-1e-2", "simulation-dt/2", *FEW_AGAIN)
-FAMILIES = (("newton", 1), ("lbfgs", 5), ("snug+lbfgs", 1))  # iterations per unit of a preset's budgets
-OTHER_SOLVERS = ("gradient-descent-10", "vbd-20", "xpbd-40", "skinning+lbfgs-4", "snug+newton-2")
+# Iterations per unit of a preset's budgets.
+FAMILIES = (("newton", 1), ("lbfgs", 5), ("fast-lbfgs", 5), ("snug+fast-lbfgs", 1))
+OTHER_SOLVERS = (
+    "gradient-descent-10", "vbd-20", "xpbd-40", "skinning+lbfgs-4", "snug+lbfgs-2", "snug+newton-2",
+)  # fmt: skip
 EXTERNAL = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
 FAST = ("skinning", "snug", "supervised", "pbns")
 
@@ -153,7 +156,7 @@ SUITES = (
             "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4", "gradient-descent-40", "vbd-5",
             "vbd-80", "xpbd-10", "xpbd-160", "skinning+lbfgs-1", "skinning+lbfgs-2", "skinning+lbfgs-8",
             "skinning+newton-1", "skinning+newton-2", "skinning+newton-4", "skinning+newton-8",
-            "snug+newton-1", "snug+newton-4", "snug+newton-8",
+            "snug+newton-1", "snug+newton-4", "snug+newton-8", "snug+lbfgs-1", "snug+lbfgs-4", "snug+lbfgs-8",
         ),
     ),
     Suite(

@@ -21,8 +21,9 @@ import numpy as np
 
 from .group_search import search
 from .kernel_cache import njit
+from .triangle import SLIVER
 
-LEAF = 4  # faces in a leaf, at most
+LEAF = 16  # faces in a leaf, at most
 HALVINGS = 6  # of the longest side, for samples that nothing is remembered of
 
 
@@ -57,7 +58,7 @@ class FaceTree:
         _enclose(self._centroids[:, None], self._starts, self._rest_boxes)
         self._corners = np.empty((len(faces), 3, 3), centroids.dtype)
         self._boxes = np.empty_like(self._rest_boxes)
-        self._discs = np.empty((len(faces), 4))  # centre and radius of what holds each face
+        self._discs = np.empty((len(faces), 7))  # centre, radius and normal of the flat disc around each face
 
     def refit(self, positions: np.ndarray) -> None:
         """Take the mesh to positions (B, 3) [m]."""
@@ -73,6 +74,8 @@ class FaceTree:
         rest_points: np.ndarray | None = None,
         region: float = np.inf,
         exact: float = np.inf,
+        reach: np.ndarray | None = None,
+        sequence: np.ndarray | None = None,
     ) -> Closest:
         """Closest points of the mesh to points (S, 3) [m].
 
@@ -81,20 +84,29 @@ class FaceTree:
             centroid lies no farther away than `region` [m]; where there is none, all.
         exact: [m] a sample farther away than this may get any point at most twice as far as the closest: a
             remembered face then often does, for a third of the cost.
+        reach: (S,) [m] a sample farther away than this gets face -1, and its place and point mean nothing.
+        sequence: (S,) order to search in, see `in_sequence`. It changes the cost and no answer.
         """
         if rest_points is None:
             rest_points, region = points, np.inf
         points, rest_points = (np.ascontiguousarray(x, self._corners.dtype) for x in (points, rest_points))
         faces = np.full(len(points), -1) if hints is None else np.array(hints, np.int64)
-        # Neighbours one after another: they visit the same boxes, and do so together.
-        sequence = np.argsort(self._place[faces]) if hints is not None else _by_cells(points)
+        if sequence is None:
+            sequence = by_cells(points) if hints is None else self.in_sequence(faces)
+        reach = np.full(len(points), np.inf) if reach is None else np.ascontiguousarray(reach, np.float64)
         barycentric, closest = np.empty((len(points), 3)), np.empty((len(points), 3))
         search(
-            points, rest_points, float(region), float(exact), self._corners, self._discs, self._centroids,
+            points, rest_points, float(region), float(exact), reach, self._corners, self._discs, self._centroids,
             self._boxes, self._rest_boxes, self._starts, self._order, self._place, self._ascending, sequence,
             faces, barycentric, closest,
         )  # fmt: skip
         return Closest(faces, barycentric, closest)
+
+    def in_sequence(self, faces: np.ndarray) -> np.ndarray:
+        """Samples near these faces (S,) in an order (S,) that has neighbours one after another: they visit
+        the same boxes, and do so together.
+        """
+        return np.argsort(self._place[faces])
 
 
 def _halved(centroids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -112,7 +124,7 @@ def _halved(centroids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return order, starts
 
 
-def _by_cells(points: np.ndarray) -> np.ndarray:
+def by_cells(points: np.ndarray) -> np.ndarray:
     """Points (S, 3) in the order (S,) of cells of a grid, halved again and again like the faces."""
     if len(points) == 0:
         return np.empty(0, np.int64)
@@ -125,6 +137,7 @@ def _by_cells(points: np.ndarray) -> np.ndarray:
 
 @njit(cache=True)
 def _gather(positions, vertices, corners, discs):
+    s, t, n = np.empty(3), np.empty(3), np.empty(3)
     for place in range(len(vertices)):
         for i in range(3):
             centre = 0.0
@@ -132,13 +145,22 @@ def _gather(positions, vertices, corners, discs):
                 corners[place, a, i] = positions[vertices[place, a], i]
                 centre += corners[place, a, i]
             discs[place, i] = centre / 3.0
-        largest = 0.0
+            s[i] = np.float64(corners[place, 1, i]) - corners[place, 0, i]
+            t[i] = np.float64(corners[place, 2, i]) - corners[place, 0, i]
+        largest = ss = tt = nn = 0.0
         for a in range(3):
             squared = 0.0
             for i in range(3):
                 squared += (corners[place, a, i] - discs[place, i]) ** 2
             largest = max(largest, squared)
         discs[place, 3] = np.sqrt(largest)
+        for i in range(3):
+            n[i] = s[(i + 1) % 3] * t[(i + 2) % 3] - s[(i + 2) % 3] * t[(i + 1) % 3]
+            ss, tt, nn = ss + s[i] * s[i], tt + t[i] * t[i], nn + n[i] * n[i]
+        # The normal of a sliver is round-off: without one, its disc is a ball.
+        scale = 1.0 / np.sqrt(nn) if nn > SLIVER * ss * tt else 0.0
+        for i in range(3):
+            discs[place, 4 + i] = scale * n[i]
 
 
 @njit(cache=True)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from .block_places import BlockPlaces
 from .energies.energy import Energy
 from .kernel_cache import njit
 from .linear_solver import nested_dissection
@@ -97,7 +98,8 @@ class HessianPattern:
 
     def _widened(self, extra: np.ndarray) -> HessianPattern:
         wider = copy.copy(self)
-        wider.__dict__.pop("order", None)
+        for cached in ("order", "_constant"):
+            wider.__dict__.pop(cached, None)
         key = np.union1d(self._key, extra)
         moved = np.append(np.searchsorted(key, self._key), -1)  # slot -1, not stored, stays -1
         wider._slots = [moved[slots] for slots in self._slots]
@@ -136,17 +138,31 @@ class HessianPattern:
         changing: Hessians of the dynamic terms at x, which this pattern must cover. convexity: see
         Energy.active_hessian_blocks.
         """
-        data = np.zeros(len(self.indices))
+        data = self._constant.copy()
         for energy, slots in zip(self.energies, self._slots):
-            if energy.dynamic:
-                continue
-            pieces = energy.hessian_pieces(x, convexity) if self.block == 3 else [energy.scalar_stiffness(x)]
-            k = energy.stencils.shape[1]
-            for elements, blocks in pieces:
-                _scatter(elements, blocks, slots, k, self.block, self._base, self._stride, data)
+            if not (energy.dynamic or self.block in energy.constant):
+                self._add_term(energy, slots, x, convexity, data)
         for matrix in changing:
             self._add(matrix, data)
         return data
+
+    @cached_property
+    def _constant(self) -> np.ndarray:
+        """Values (nnz,) of the terms that give the same everywhere."""
+        data, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
+        for energy, slots in zip(self.energies, self._slots):
+            if self.block in energy.constant:
+                self._add_term(energy, slots, anywhere, 0.0, data)
+        return data
+
+    def _add_term(
+        self, energy: Energy, slots: np.ndarray, x: np.ndarray, convexity: float, data: np.ndarray
+    ) -> None:
+        places = BlockPlaces(slots, self._base, self._stride, self.block)
+        if self.block == 3:
+            energy.add_hessian(x, convexity, places, data)
+        else:
+            places.add(*energy.scalar_stiffness(x), data)
 
     def _add(self, hessian: sp.csc_matrix, data: np.ndarray) -> None:
         key, values = self._keys_of(hessian)
@@ -237,17 +253,3 @@ def _contract(key, n, base, stride, data, directions, values):
             for i in range(3):
                 total += directions[row, i] * data[at + i] * directions[column, j]
         values[k] = total
-
-
-@njit(cache=True)
-def _scatter(elements, blocks, slots, k, block, base, stride, data):
-    for n in range(elements.shape[0]):
-        e = elements[n]
-        for a in range(k):
-            for b in range(k):
-                slot = slots[e, a * k + b]
-                if slot >= 0:
-                    for j in range(block):
-                        at = base[slot] + j * stride[slot]
-                        for i in range(block):
-                            data[at + i] += blocks[n, block * a + i, block * b + j]

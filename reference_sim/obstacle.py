@@ -11,12 +11,13 @@ from functools import cached_property
 
 import igl
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .closed_mesh import check_closed
 from .closest_point import Closest, FaceTree
 from .cloth import MeshError
-from .kernel_cache import njit
 from .resume import fingerprint
+from .surface import carry, not_outside, plane_normals, vertex_normals
 
 DEFAULT_REGION = 0.20  # [m]
 
@@ -25,13 +26,32 @@ DEFAULT_REGION = 0.20  # [m]
 class Planes:
     """One contact plane per sample: points (S, 3) [m], unit outward normals (S, 3), and where it was found.
 
-    faces: (S,) face of the obstacle; barycentric: (S, 3) place on it.
+    faces: (S,) face of the obstacle; barycentric: (S, 3) place on it. Of a sample out of reach: the middle of
+    its home face, the one whose rest centroid is nearest to its rest position, and a plane FAR below it.
+    far: (S,) whether a sample is out of reach; None where none is.
     """
 
     points: np.ndarray
     normals: np.ndarray
     faces: np.ndarray
     barycentric: np.ndarray
+    far: np.ndarray | None = None
+
+
+@dataclass
+class Samples:
+    """What the rest positions (S, 3) [m] of samples decide, once for all frames.
+
+    home: (S,) the face whose rest centroid is nearest; met: (S,) whether it lies within the region;
+    sequence: (S,) order to search in; last: (S,) faces found last, -1 for none, where the next search begins:
+    this changes its cost and no answer.
+    """
+
+    rest: np.ndarray
+    home: np.ndarray
+    met: np.ndarray
+    sequence: np.ndarray
+    last: np.ndarray
 
 
 class Obstacle:
@@ -77,7 +97,8 @@ class Obstacle:
     def _forget(self) -> None:
         self._tree: FaceTree | None = None
         self._fitted = -1  # the frame that the tree is fitted to
-        self._last: dict[tuple[int, bool], np.ndarray] = {}  # found for so many points, in regions or not
+        self._samples: dict[int, Samples] = {}  # by their number
+        self._last: dict[int, np.ndarray] = {}  # faces found last for so many points without regions
 
     @property
     def frames(self) -> int:
@@ -103,12 +124,8 @@ class Obstacle:
         """Hash of everything that decides how it touches."""
         return fingerprint(self.positions, self.faces, self.rest_centroids, np.array(self.region))
 
-    def _nearest(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Closest:
-        """Closest points under the rule of regions.
-
-        Each search begins with the faces that the last one found for as many points: the simulator asks for
-        the same samples in every frame.
-        """
+    def _fit(self, frame: int) -> FaceTree:
+        """The search tree at `frame`."""
         frame = min(frame, self.frames - 1)
         if self._tree is None:
             centroids = self.rest_centroids
@@ -118,30 +135,75 @@ class Obstacle:
         if self._fitted != frame:
             self._tree.refit(self.at(frame))
             self._fitted = frame
-        if self.rest_centroids is None:
-            rest_points = None
-        kind = len(points), rest_points is not None
-        found = self._tree.nearest(
-            points, hints=self._last.get(kind), rest_points=rest_points, region=self.region
-        )
-        self._last[kind] = found.faces
+        return self._tree
+
+    def _nearest(
+        self, points: np.ndarray, frame: int, rest_points: np.ndarray | None, reach: np.ndarray | None = None
+    ) -> Closest:
+        """Closest points under the rule of regions; face -1 for samples out of reach, see `planes`.
+
+        Each search begins with the faces that the last one found for as many points: the simulator asks for
+        the same samples in every frame.
+        """
+        tree, region = self._fit(frame), self.region
+        if rest_points is None or self.rest_centroids is None:
+            found = tree.nearest(points, hints=self._last.get(len(points)))
+            self._last[len(points)] = found.faces
+            return found
+        samples = self._at_rest(rest_points)
+        rest, home = samples.rest, samples.home
+        found = tree.nearest(
+            points, hints=samples.last, rest_points=rest, region=region, sequence=samples.sequence,
+            reach=None if reach is None else np.where(samples.met, reach, np.inf),
+        )  # fmt: skip
+        deep = not_outside(found.faces, points, home, self.at(frame), self.faces)
+        if len(deep):
+            again = tree.nearest(points[deep], hints=home[deep], rest_points=rest[deep], region=region)
+            found.faces[deep], found.barycentric[deep] = again.faces, again.barycentric
+            found.points[deep] = again.points
+        samples.last = found.faces
         return found
 
-    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+    def _at_rest(self, rest_points: np.ndarray) -> Samples:
+        """The set of samples at rest there (S, 3) [m]."""
+        samples = self._samples.get(len(rest_points))
+        if samples is None or not np.array_equal(samples.rest, rest_points):
+            assert self._tree is not None and self.rest_centroids is not None
+            distance, home = cKDTree(self.rest_centroids).query(rest_points)
+            samples = Samples(
+                np.array(rest_points), home, distance <= self.region, self._tree.in_sequence(home), home
+            )
+            self._samples[len(rest_points)] = samples
+        return samples
+
+    def planes(
+        self,
+        points: np.ndarray,
+        frame: int,
+        rest_points: np.ndarray | None = None,
+        reach: np.ndarray | None = None,
+    ) -> Planes:
         """Contact planes at `frame` for samples at points (S, 3) with rest positions rest_points (S, 3).
 
         The plane goes through the closest allowed point of the surface; its normal points from there to the
         sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
         sample's own position.
+
+        reach: (S,) [m] a sample with no allowed face so near that lies outside by the plane of its home face
+            is out of reach, and its plane touches nothing. No effect without rest positions, or on a sample
+            for which the rule of regions allows the whole mesh.
         """
-        found = self._nearest(points, frame, rest_points)
-        vertices = self.at(frame)
+        found, vertices = self._nearest(points, frame, rest_points, reach), self.at(frame)
+        faces, barycentric, far = found.faces, found.barycentric, found.faces < 0
+        if far.any():
+            assert rest_points is not None
+            faces, barycentric[far] = np.where(far, self._at_rest(rest_points).home, faces), 1 / 3
         normals = np.empty_like(found.points)
-        _plane_normals(
-            points, found.points, found.faces, found.barycentric, vertices, self.faces,
+        plane_normals(
+            points, found.points, faces, barycentric, far, vertices, self.faces,
             vertex_normals(vertices, self.faces), normals,
         )  # fmt: skip
-        return Planes(found.points, normals, found.faces, found.barycentric)
+        return Planes(found.points, normals, faces, barycentric, far)
 
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
@@ -152,15 +214,16 @@ class Obstacle:
         The best known initial guess for a garment: the body's own motion, face by face.
         """
         found = self._nearest(points, frame - 1, rest_points)
-        faces = self.faces[found.faces]
-        corners = self.at(frame)[faces]
-        before, after = _face_frames(self.at(frame - 1)[faces]), _face_frames(corners)
-        local = np.einsum("sij,si->sj", before, points - found.points)
-        return np.einsum("sa,sai->si", found.barycentric, corners) + np.einsum("sij,sj->si", after, local)
+        carried = np.empty_like(found.points)
+        carry(
+            points, found.points, found.faces, found.barycentric, self.at(frame - 1), self.at(frame),
+            self.faces, carried,
+        )  # fmt: skip
+        return carried
 
     def signed_distance(self, points: np.ndarray, frame: int) -> np.ndarray:
         """True distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
-        distance = np.linalg.norm(points - self._nearest(points, frame).points, axis=1)
+        distance = np.linalg.norm(points - self._nearest(points, frame, None).points, axis=1)
         vertices = np.asfortranarray(self.at(frame))
         # Only what lies in the bounding box can be inside.
         low, high = vertices.min(axis=0), vertices.max(axis=0)
@@ -168,68 +231,3 @@ class Obstacle:
         winding = igl.fast_winding_number(vertices, self.faces, np.asfortranarray(points[boxed]))
         distance[boxed] *= np.where(np.asarray(winding).ravel() > 0.5, -1.0, 1.0)
         return distance
-
-
-def _face_frames(corners: np.ndarray) -> np.ndarray:
-    """Orthonormal frames (N, 3, 3), axes as columns, of triangles (N, 3, 3)."""
-    first = corners[:, 1] - corners[:, 0]
-    first = first / np.linalg.norm(first, axis=1, keepdims=True)
-    normal = np.cross(first, corners[:, 2] - corners[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.stack([first, np.cross(normal, first), normal], axis=-1)
-
-
-@njit(cache=True, error_model="numpy")
-def _cross_of_face(x, i, j, k):
-    """Twice the area of a triangle times its normal."""
-    a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-    b0, b1, b2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
-
-
-@njit(cache=True, error_model="numpy")
-def vertex_normals(positions, faces):
-    """Unit normals (B, 3) of the vertices of a mesh (B, 3) [m], (F, 3): of its faces, weighted by area."""
-    normals = np.zeros_like(positions)
-    for f in range(len(faces)):
-        n = _cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
-        for a in range(3):
-            for c in range(3):
-                normals[faces[f, a], c] += n[c]
-    for v in range(len(normals)):
-        _normalise(normals[v])
-    return normals
-
-
-@njit(cache=True, error_model="numpy")
-def _normalise(v):
-    length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 1e-30
-    v[0], v[1], v[2] = v[0] / length, v[1] / length, v[2] / length
-    return length
-
-
-@njit(cache=True, error_model="numpy")
-def _plane_normals(points, closest, found, barycentric, vertices, faces, of_vertices, normals):
-    """normals (S, 3): from the closest point to the sample, turned outwards."""
-    offset, smooth = np.empty(3), np.empty(3)
-    for s in range(len(points)):
-        i, j, k = faces[found[s], 0], faces[found[s], 1], faces[found[s], 2]
-        u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
-        for c in range(3):
-            smooth[c] = u * of_vertices[i, c] + v * of_vertices[j, c] + w * of_vertices[k, c]
-            offset[c] = points[s, c] - closest[s, c]
-        _normalise(smooth)
-        length = _normalise(offset)
-        cosine = offset[0] * smooth[0] + offset[1] * smooth[1] + offset[2] * smooth[2]
-        # Within a micrometre, or looking along the surface, the offset has no direction to trust.
-        if not (length > 1e-6 and np.abs(cosine) > 0.3):
-            normals[s] = smooth
-            continue
-        if min(u, v, w) > 0.0:  # inside the face its normal is the direction, and has no cancellation
-            n = _cross_of_face(vertices, i, j, k)
-            side = np.sign(n[0] * offset[0] + n[1] * offset[1] + n[2] * offset[2])
-            for c in range(3):
-                offset[c] = side * n[c]
-            _normalise(offset)
-        for c in range(3):
-            normals[s, c] = np.sign(cosine) * offset[c]

@@ -51,6 +51,7 @@ KNOWN = {
     "snug-dynamic": Style("", "#CC3311", "o"),
     "newton": Style("Newton", "#D55E00", "P"),
     "lbfgs": Style("L-BFGS", "#CC79A7", "X"),
+    "fast-lbfgs": Style("Fast L-BFGS", "#BB5566", "X", "--"),
     "gradient-descent": Style("Gradient descent", "#7A5C00", "p"),
     "vbd": Style("Vertex block descent", "#44AA99", ">"),
     "xpbd": Style("XPBD", "#332288", "<"),
@@ -58,6 +59,7 @@ KNOWN = {
     "simulation-dt": Style("Simulation with smaller steps", "#882255", "*"),
     # Solvers that start from another method have the colour of that method.
     "snug+lbfgs": Style("SNUG + L-BFGS", "", "X", "-."),
+    "snug+fast-lbfgs": Style("SNUG + fast L-BFGS", "", "X", "--"),
     "snug+newton": Style("SNUG + Newton", "", "P", "-."),
     "snug-dynamic+lbfgs": Style("SNUG, dynamic + L-BFGS", "", "X", "-."),
     "skinning+lbfgs": Style("Skinning + L-BFGS", "", "X", "-."),

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference_sim.obstacle import vertex_normals
+from reference_sim.surface import vertex_normals
 from snug.contact import Patch
 
 MARGIN = 2e-3  # [m]

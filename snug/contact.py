@@ -4,7 +4,7 @@ The loss needs, for each contact sample x of each frame, a plane (closest body p
 that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So an
 anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the frame
 carry it to a plane in no time. Near the skin it walks to where its sample is now, whenever the energy is
-taken (snug.surface_walk), and a few frames of each batch search anew from the current prediction, with the
+taken (reference_sim.surface_walk), and a few frames of each batch search anew from the current prediction, with the
 simulator's own search and its rule of regions. All positions are float32, relative to the pelvis.
 With thousands of frames cached, an anchor has four bytes, two of them for its face: barycentric
 coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
@@ -21,7 +21,7 @@ from reference_sim.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
 from reference_sim.obstacle import DEFAULT_REGION
 from snug.contact_kernels import PARTS, byte_normals, contact_energy, interpolated_planes
-from snug.surface_walk import SLACK, triangle_adjacency
+from reference_sim.surface_walk import SLACK, triangle_adjacency
 
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from reference_sim.kernel_cache import njit
-from reference_sim.obstacle import vertex_normals
-from snug.surface_walk import walk_to_foot
+from reference_sim.surface import vertex_normals
+from reference_sim.surface_walk import walk_to_foot
 
 PARTS = 255.0  # of a barycentric coordinate
 

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from snug.contact import PARTS, ContactCache, Patch
-from snug.surface_walk import CROSSINGS, SLACK
+from reference_sim.surface_walk import CROSSINGS, SLACK
 
 NEAREST = 3  # body vertices whose faces are tried for each sample
 CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances
@@ -71,7 +71,7 @@ class TensorContactCache:
         self, samples: Tensor, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor, *,
         reach: float,
     ) -> None:  # fmt: skip
-        """Anchors of frames (N,) go to where snug.surface_walk.walk_to_foot takes them for samples
+        """Anchors of frames (N,) go to where reference_sim.surface_walk.walk_to_foot takes them for samples
         (N, S, 3): those of samples less than `reach` and SLACK above their planes. positions, normals: see
         `planes`.
         """

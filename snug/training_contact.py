@@ -1,6 +1,6 @@
 """Contact planes of batches of a training set, from cached anchors, queried anew as the network learns.
 
-Anchors walk with their samples in every step (snug.surface_walk). Searched, for skin that no walk would find,
+Anchors walk with their samples in every step (reference_sim.surface_walk). Searched, for skin that no walk would find,
 are the middle frames of a few windows in a step. What is found there is propagated to the frames around it
 that show almost the same pose. Propagated farther, an anchor from where the thigh was elsewhere
 claims a contact that is none, or misses a thigh that stands in the hem.

@@ -9,7 +9,7 @@ from meshes import grid, random_rotation, sphere
 
 from reference_sim.closest_point import FaceTree
 from reference_sim.group_search import GROUP
-from reference_sim.obstacle import vertex_normals
+from reference_sim.surface import vertex_normals
 from reference_sim.triangle import closest_on_triangle
 
 
@@ -131,6 +131,28 @@ def test_what_is_remembered_changes_nothing(name):
             warm = tree.nearest(points, hints=hints, **rest)
             assert (warm.faces == cold.faces).all()
             assert (warm.barycentric == cold.barycentric).all() and (warm.points == cold.points).all()
+
+
+@pytest.mark.parametrize("name", ["soup 400", "sphere", "sheet"])
+def test_within_reach_answers_are_exact_and_beyond_there_are_none(name):
+    """Bit for bit, each sample with a reach of its own, whatever is remembered."""
+    positions, faces = mesh(name)
+    tree, points = tree_of(positions, faces), samples(positions, faces)
+    generator = np.random.default_rng(7)
+    centroids = positions[faces].mean(axis=1)
+    home = centroids[generator.integers(0, len(faces), len(points))] + 0.1
+    for rest in ({}, {"rest_points": home, "region": 0.7}):
+        exact = tree.nearest(points, **rest)
+        distance = np.linalg.norm(points - exact.points, axis=1)
+        reach = distance * generator.uniform(0.5, 1.5, len(points))
+        reach[distance < 1e-9] = np.inf  # of these round-off decides
+        near = distance < reach
+        assert 0.3 < near.mean() < 0.95
+        for hints in (None, exact.faces, generator.integers(-1, len(faces), len(points))):
+            found = tree.nearest(points, hints=hints, reach=reach, **rest)
+            assert (found.faces[near] == exact.faces[near]).all() and (found.faces[~near] == -1).all()
+            assert (found.points[near] == exact.points[near]).all()
+            assert (found.barycentric[near] == exact.barycentric[near]).all()
 
 
 @pytest.mark.parametrize("region", [0.2, 0.7, 2.0])

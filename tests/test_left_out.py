@@ -116,7 +116,7 @@ def test_what_is_not_declared_is_not_evaluated(monkeypatch):
     rim = np.flatnonzero((np.abs(points[:, :2] - 0.5) > 0.499).any(axis=1))
     cloth = Cloth(points, faces, Material(), pins=rim)
     for term in (BendHinge, ContactPenalty):
-        for name in ("__init__", "prepare", "value_and_gradient", "active_hessian_blocks"):
+        for name in ("__init__", "prepare", "value_and_gradient", "active_hessian_blocks", "add_hessian"):
             monkeypatch.setattr(term, name, asked)
     assert simulate(cloth, [StretchStVK(cloth)], frames=3).status == "converged"
     monkeypatch.setattr(Inertia, "value_and_gradient", asked)

@@ -9,7 +9,7 @@ from tasks_by_hand import small_scene
 from benchmarks.methods.warm_started import FromElsewhere, WarmStarted
 from benchmarks.metrics.step import first_guess
 from benchmarks.minimisers.block_descent import VertexBlockDescent
-from benchmarks.minimisers.elements import contacts, hinges, membrane, terms_of, weights
+from benchmarks.minimisers.elements import contacts, hinges, membrane, weights
 from benchmarks.minimisers.kernels import block, depth, fold, strain
 from benchmarks.minimisers.xpbd import XPBD
 from benchmarks.scenes.free_fall import exact_fall
@@ -25,6 +25,7 @@ from reference_sim.energies import (
     Step,
     StretchStVK,
 )
+from reference_sim.known_terms import terms_of
 from reference_sim.minimise import Newton, make_minimiser
 
 DT = 1 / 30

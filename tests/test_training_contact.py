@@ -13,7 +13,7 @@ from snug.contact import ContactCache
 from snug.recipe import DEFAULT
 from snug.skeleton import JOINT
 from snug.skinning import skin
-from snug.surface_walk import triangle_adjacency
+from reference_sim.surface_walk import triangle_adjacency
 from snug.trainer import Trainer
 from snug.training_contact import FIRST_NEAR, FIRST_PROPAGATED, NEAR, PROPAGATED
 

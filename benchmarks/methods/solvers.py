@@ -31,7 +31,7 @@ _LBFGS: dict[str, Any] = {
 
 def _truncated(
     family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *, module: str,
-    counted: str = "iterations", **options: Any,
+    counted: str = "iterations", dtype: str = "float64", **options: Any,
 ) -> tuple[MethodEntry, ...]:  # fmt: skip
     """One entry for each number of iterations, which is the option `counted` of the module."""
     return tuple(
@@ -41,6 +41,7 @@ def _truncated(
             description=description.format(_counted(count, unit)),
             module=module,
             options={counted: count, **options},
+            dtype=dtype,
             truncated=True,
             role="solver",
             family=family,
@@ -53,7 +54,7 @@ def _truncated(
 def warm_started(
     base: str, label: str, solver: str, *, trained: str | None, pairing_group: str = ""
 ) -> tuple[MethodEntry, ...]:
-    """A network or skinning, and some iterations of "newton" or "lbfgs" from there."""
+    """A network or skinning, and some iterations of "newton", "lbfgs" or "fast-lbfgs" from there."""
     return tuple(
         MethodEntry(
             name=f"{base}+{solver}-{count}",
@@ -79,7 +80,7 @@ def _counted(count: int, unit: str) -> str:
     return f"{count} {unit}{'s' * (count > 1)}"
 
 
-_LABELS = {"newton": "Newton", "lbfgs": "L-BFGS"}
+_LABELS = {"newton": "Newton", "lbfgs": "L-BFGS", "fast-lbfgs": "fast L-BFGS"}
 
 SOLVERS = (
     *(
@@ -151,6 +152,11 @@ SOLVERS = (
         (5, 10, 20, 40), **_LBFGS, memory=10,
     ),
     *_truncated(
+        "fast-lbfgs", "Fast L-BFGS", "iteration",
+        "L-BFGS compiled as a whole, float32, sliding contact planes, stopped after {}", (5, 10, 20, 40),
+        module="benchmarks.methods.fast_lbfgs", dtype="float32",
+    ),
+    *_truncated(
         "gradient-descent", "Gradient descent", "iteration",
         "preconditioned gradient descent, stopped after {}", (10, 40), **_LBFGS, memory=0,
     ),
@@ -180,4 +186,5 @@ SOLVERS = (
     *warm_started("skinning", "Skinning", "newton", trained=None),
     *warm_started("snug", "SNUG", "lbfgs", trained="snug", pairing_group="snug"),
     *warm_started("snug", "SNUG", "newton", trained="snug", pairing_group="snug"),
+    *warm_started("snug", "SNUG", "fast-lbfgs", trained="snug", pairing_group="snug"),
 )  # fmt: skip

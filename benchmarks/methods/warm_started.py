@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,11 @@ from ..results import model_path
 from ..scene import BuiltScene
 from .simulation import Simulation
 
+if TYPE_CHECKING:
+    from snug.carried_residual import CarriedResidual
+
 SKINNING = "skinning"
+SHARE = 0.6  # of the last residual
 
 
 class FromElsewhere:
@@ -39,26 +43,57 @@ class FromElsewhere:
         return self._inner.minimise(start)
 
 
+class WithResidual(FromElsewhere):
+    """The same, and SHARE of what the inner minimiser added to the last frame, carried by the skin.
+
+    first: (V, 3) [m] what the start of the scene adds to frame 0 from elsewhere.
+    """
+
+    def __init__(
+        self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray, first: np.ndarray,
+        carry: CarriedResidual,
+    ) -> None:  # fmt: skip
+        super().__init__(inner, starts, pins)
+        self._added, self._carry, self._frame = first, carry, 0
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        self._frame += 1
+        given = next(self._starts)
+        start = given + SHARE * self._carry.carried(self._added, self._frame)
+        start[self._pins] = x0[self._pins]
+        result = self._inner.minimise(start)
+        self._added = result.positions - given
+        return result
+
+
 @dataclass
 class WarmStarted(Method):
-    """A simulation whose steps start at frames from elsewhere and are cut short."""
+    """A simulation whose steps start at frames from elsewhere and are cut short.
+
+    residual: whether the last frame's residual is carried. simulation: what does the steps.
+    """
 
     guess: str
     path: Path
     solver: dict[str, Any]
-    simulation: Simulation = field(init=False)
+    residual: bool = False
+    simulation: Simulation = field(default_factory=lambda: Simulation(options={}))
     of_guess: Callable[[int], object] = field(init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
         frames = self._frames(scene)
+        carry = self._carry(scene) if self.residual else None
 
         def from_elsewhere(potential: Potential, **options: Any) -> FromElsewhere:
             starts = frames()
-            next(starts)  # frame 0 is the scene's start, as for every solver
-            inner = make_minimiser(potential, **self.solver)
-            return FromElsewhere(inner, starts, np.asarray(potential.cloth.pins))
+            first = next(starts)  # frame 0 is the scene's start, as for every solver
+            inner, pins = make_minimiser(potential, **self.solver), np.asarray(potential.cloth.pins)
+            if carry is None:
+                return FromElsewhere(inner, starts, pins)
+            assert scene.start is not None
+            return WithResidual(inner, starts, pins, scene.start - first, carry)
 
-        self.simulation = Simulation(options={"method": from_elsewhere})
+        self.simulation.options = {"method": from_elsewhere}
         self.simulation.prepare(scene)
 
     def run(self) -> Trajectory:
@@ -87,8 +122,29 @@ class WarmStarted(Method):
         return predictions(model, dressed, motion, betas, before=before)
 
 
+    def _carry(self, scene: BuiltScene) -> CarriedResidual:
+        from snug.carried_residual import CarriedResidual
+        from snug.dressed_body import DressedBody
+        from snug.recipe import DEFAULT
+
+        assert scene.dressed is not None
+        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        transforms = dressed.transforms(scene.dressed.motion.poses, scene.dressed.betas)
+        return CarriedResidual(dressed.weights(DEFAULT.smoothing), transforms)
+
+
 def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:
-    """`iterations` of "newton" or "lbfgs" from the network of kind `guess`, or from "skinning"."""
+    """`iterations` of "newton", "lbfgs" or "fast-lbfgs" from the network of kind `guess`, or from "skinning".
+
+    With "fast-lbfgs" the last residual is carried.
+    """
     options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
+    path, fast = model_path(models, guess, seed), solver == "fast-lbfgs"
+    if fast:
+        from reference_sim.compiled import CompiledLBFGS
+
+        from .fast_lbfgs import FastSimulation
+
+        return WarmStarted(guess, path, options | {"method": CompiledLBFGS}, fast, FastSimulation(options={}))
     options |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
-    return WarmStarted(guess, model_path(models, guess, seed), options)
+    return WarmStarted(guess, path, options)

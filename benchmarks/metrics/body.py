@@ -53,7 +53,7 @@ def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[n
     """
     import igl
 
-    from reference_sim.obstacle import vertex_normals
+    from reference_sim.surface import vertex_normals
 
     points = np.asfortranarray(x + OFF * vertex_normals(x, faces))
     return np.asarray(igl.fast_winding_number(np.asfortranarray(x), faces, points)).ravel() > 0.5

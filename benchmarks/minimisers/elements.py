@@ -3,48 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from reference_sim import Potential
-    from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Inertia, StretchStVK
+    from reference_sim.energies import BendHinge, ContactPenalty, StretchStVK
+    from reference_sim.known_terms import Terms
     from reference_sim.minimise import Result
     from reference_sim.minimise.descent import Descent
 
 
-# By the names of the classes: a term that the potential does not have is not even imported.
-KINDS = {
-    "Inertia": "inertia", "Gravity": "gravity", "StretchStVK": "strain", "BendHinge": "bending",
-    "ContactPenalty": "contact",
-}  # fmt: skip
 FAR = 100.0  # [m] from the guess: nowhere
-
-
-@dataclass(frozen=True)
-class Terms:
-    """The terms of a potential by kind; None where it has no such term."""
-
-    inertia: Inertia
-    gravity: Gravity | None
-    strain: StretchStVK | None
-    bending: BendHinge | None
-    contact: ContactPenalty | None
-
-
-def terms_of(potential: Potential, sweeper: str) -> Terms:
-    """The terms that the sweeps know. Raises ValueError naming the term that `sweeper` has no sweep for."""
-    found: dict[str, Energy | None] = dict.fromkeys(KINDS.values())
-    for energy in potential.energies:
-        kind = KINDS.get(type(energy).__name__)
-        if kind is None or found[kind] is not None:
-            raise ValueError(f"{sweeper} has no sweep for the term {energy.name!r}: use newton or lbfgs")
-        found[kind] = energy
-    if found["inertia"] is None:
-        raise ValueError(f"{sweeper} takes steps in time: the potential needs inertia")
-    return Terms(**found)  # type: ignore[arg-type]
 
 
 def membrane(term: StretchStVK | None) -> tuple:

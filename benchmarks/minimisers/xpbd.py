@@ -22,10 +22,11 @@ from __future__ import annotations
 import numpy as np
 
 from reference_sim import Potential
+from reference_sim.known_terms import terms_of
 from reference_sim.minimise import Result
 from reference_sim.minimise.descent import Descent
 
-from .elements import contacts, hinges, membrane, swept, terms_of, weights
+from .elements import contacts, hinges, membrane, swept, weights
 from .kernels import sweep_constraints
 
 

@@ -11,20 +11,21 @@ prints it (eq. 11): some three times as stiff.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..block_places import BlockPlaces
 from ..cloth import Cloth
 from ..kernel_cache import njit
+from ..lanes import LANES, add_blocks, arctan2
 from .energy import Energy
 
 if TYPE_CHECKING:
     from torch import Tensor
 
 SCALINGS = ("length_area", "none")
-PIECE = 1 << 14  # hinges whose blocks, 1152 bytes each, are in memory at once
+BLOCKS = 39  # rows of lanes before those of the blocks, in _hessian
 
 
 class BendHinge(Energy):
@@ -84,20 +85,15 @@ class BendHinge(Energy):
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """grad theta grad theta^T is never negative; the term with Hess theta is reduced by `convexity`."""
-        return self._piece(x, convexity, slice(None))
+        blocks = np.zeros((len(self.stencils), 12, 12))
+        self.add_hessian(x, convexity, BlockPlaces.one_by_one(len(blocks), 4), blocks.reshape(-1))
+        return np.arange(len(blocks)), blocks
 
-    def hessian_pieces(
-        self, x: np.ndarray, convexity: float = 0.0
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        for start in range(0, len(self.stencils), PIECE):
-            yield self._piece(x, convexity, slice(start, start + PIECE))
-
-    def _piece(self, x: np.ndarray, convexity: float, piece: slice) -> tuple[np.ndarray, np.ndarray]:
-        hinges = np.arange(len(self.stencils))[piece]
-        blocks = np.empty((len(hinges), 12, 12))
-        stencils, stiffness, rest = self.stencils[piece], self.stiffness[piece], self.rest_angles[piece]
-        _hessian(x, stencils, stiffness, rest, convexity, blocks)
-        return hinges, blocks
+    def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
+        _hessian(
+            x, self.stencils, self.stiffness, self.rest_angles, convexity, places.slots, places.base,
+            places.stride, data,
+        )  # fmt: skip
 
 
 def _wrap(angle):
@@ -107,37 +103,7 @@ def _wrap(angle):
     return torch.remainder(angle + np.pi, 2 * np.pi) - np.pi
 
 
-@njit(cache=True, inline="always")
-def _half(x, i0, i1, i2, m, w):
-    """One face of a hinge: m = n/|n|^2 and the weights w_a with d theta/d x_a = +- w_a m.
-
-    Moving the tip along the normal by h (its height over the edge) turns the face by one radian; the edge's
-    ends take the opposite motion in proportion to the barycentric place of the tip's foot.
-    """
-    ex, ey, ez = x[i1, 0] - x[i0, 0], x[i1, 1] - x[i0, 1], x[i1, 2] - x[i0, 2]
-    rx, ry, rz = x[i2, 0] - x[i0, 0], x[i2, 1] - x[i0, 1], x[i2, 2] - x[i0, 2]
-    length = np.sqrt(ex * ex + ey * ey + ez * ez)
-    nx, ny, nz = ey * rz - ez * ry, ez * rx - ex * rz, ex * ry - ey * rx
-    n2 = nx * nx + ny * ny + nz * nz
-    m[0], m[1], m[2] = nx / n2, ny / n2, nz / n2
-    t = (ex * rx + ey * ry + ez * rz) / length
-    w[0], w[1], w[2] = length - t, t, -length
-    return length, n2
-
-
-@njit(cache=True, inline="always")
-def _angle(x, i0, i1, length, mA, nA2, mB, nB2):
-    """Dihedral angle from m = n/|n|^2 of both faces; the second one points the other way."""
-    cx = mB[1] * mA[2] - mB[2] * mA[1]
-    cy = mB[2] * mA[0] - mB[0] * mA[2]
-    cz = mB[0] * mA[1] - mB[1] * mA[0]
-    ex, ey, ez = x[i1, 0] - x[i0, 0], x[i1, 1] - x[i0, 1], x[i1, 2] - x[i0, 2]
-    scale = nA2 * nB2
-    sine = scale * (cx * ex + cy * ey + cz * ez) / length
-    return np.arctan2(sine, -scale * (mA[0] * mB[0] + mA[1] * mB[1] + mA[2] * mB[2]))
-
-
-@njit(cache=True, inline="always")
+@njit(cache=True, inline="always", error_model="numpy")
 def _from_rest(theta, rest):
     """theta - theta_0 in [-pi, pi)."""
     theta -= rest
@@ -147,91 +113,157 @@ def _from_rest(theta, rest):
 @njit(cache=True, error_model="numpy")
 def dihedral_angles(x, hinges):
     """(H,) signed dihedral angles [rad] of positions x (V, 3); 0 is flat."""
-    mA, mB, w = np.empty(3), np.empty(3), np.empty(3)
-    angles = np.empty(hinges.shape[0])
-    for h in range(hinges.shape[0]):
-        i0, i1, i2, i3 = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
-        length, nA2 = _half(x, i0, i1, i2, mA, w)
-        _, nB2 = _half(x, i0, i1, i3, mB, w)
-        angles[h] = _angle(x, i0, i1, length, mA, nA2, mB, nB2)
+    angles, e, r, s = np.empty(len(hinges)), np.empty(3), np.empty(3), np.empty(3)
+    for h in range(len(hinges)):
+        for i in range(3):
+            e[i] = x[hinges[h, 1], i] - x[hinges[h, 0], i]
+            r[i] = x[hinges[h, 2], i] - x[hinges[h, 0], i]
+            s[i] = x[hinges[h, 3], i] - x[hinges[h, 0], i]
+        a, b = np.cross(e, r), np.cross(s, e)
+        sine = np.sum(np.cross(a, b) * e) / np.sqrt(np.sum(e * e))
+        angles[h] = np.arctan2(sine, np.sum(a * b))
     return angles
 
 
 @njit(cache=True, error_model="numpy")
 def _gradient(x, hinges, stiffness, rest, gradient):
-    mA, mB, wA, wB = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    total = 0.0
-    for h in range(hinges.shape[0]):
-        i0, i1, i2, i3 = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
-        length, nA2 = _half(x, i0, i1, i2, mA, wA)
-        _, nB2 = _half(x, i0, i1, i3, mB, wB)
-        theta = _from_rest(_angle(x, i0, i1, length, mA, nA2, mB, nB2), rest[h])
-        total += 0.5 * stiffness[h] * theta * theta
-        s = stiffness[h] * theta
-        for i in range(3):
-            gradient[i0, i] += s * (wA[0] * mA[i] - wB[0] * mB[i])
-            gradient[i1, i] += s * (wA[1] * mA[i] - wB[1] * mB[i])
-            gradient[i2, i] += s * wA[2] * mA[i]
-            gradient[i3, i] -= s * wB[2] * mB[i]
+    """LANES hinges side by side, in vector instructions: from corners, stiffness and rest angle in u to
+    forces and energy. An incomplete group is filled up with the last hinge.
+    """
+    L, count, total = LANES, len(hinges), 0.0
+    u = np.empty(14 * L)
+    for begin in range(0, count, L):
+        for n in range(L):
+            h = min(begin + n, count - 1)
+            for a in range(4):
+                for i in range(3):
+                    u[(3 * a + i) * L + n] = x[hinges[h, a], i]
+            u[12 * L + n], u[13 * L + n] = stiffness[h], rest[h]
+        for n in range(L):
+            ex, ey, ez = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
+            rx, ry, rz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
+            sx, sy, sz = u[9 * L + n] - u[n], u[10 * L + n] - u[L + n], u[11 * L + n] - u[2 * L + n]
+            length = np.sqrt(ex * ex + ey * ey + ez * ez)
+            ax, ay, az = ey * rz - ez * ry, ez * rx - ex * rz, ex * ry - ey * rx
+            bx, by, bz = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
+            cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            sine = (cx * ex + cy * ey + cz * ez) / length
+            theta = _from_rest(arctan2(sine, ax * bx + ay * by + az * bz), u[13 * L + n])
+            s = u[12 * L + n] * theta
+            u[12 * L + n] = 0.5 * s * theta
+            # d theta / d x_a = w_a n/|n|^2 of each face, w as in _hessian.
+            a, b = s / (ax * ax + ay * ay + az * az), s / (bx * bx + by * by + bz * bz)
+            foot_a, foot_b = (ex * rx + ey * ry + ez * rz) / length, (ex * sx + ey * sy + ez * sz) / length
+            a0, b0, a1, b1 = (length - foot_a) * a, (length - foot_b) * b, foot_a * a, foot_b * b
+            a2, b2 = -length * a, -length * b
+            u[n], u[L + n], u[2 * L + n] = a0 * ax + b0 * bx, a0 * ay + b0 * by, a0 * az + b0 * bz
+            u[3 * L + n], u[4 * L + n] = a1 * ax + b1 * bx, a1 * ay + b1 * by
+            u[5 * L + n] = a1 * az + b1 * bz
+            u[6 * L + n], u[7 * L + n], u[8 * L + n] = a2 * ax, a2 * ay, a2 * az
+            u[9 * L + n], u[10 * L + n], u[11 * L + n] = b2 * bx, b2 * by, b2 * bz
+        for n in range(min(L, count - begin)):
+            total += u[12 * L + n]
+            for a in range(4):
+                for i in range(3):
+                    gradient[hinges[begin + n, a], i] += u[(3 * a + i) * L + n]
     return total
 
 
-@njit(cache=True, inline="always")
-def _add_half_hessian(x, i0, i1, i2, tip, scale, m, n2, w, length, D, B):
-    """Add scale * d(w_a m)/dx_b of one face to the element's matrix B.
-
-    d(w_a m)/dx_b = m dw_a/dx_b^T + w_a (dm/dn) (c_b x .), with dm/dn = (I - 2 n n^T/|n|^2)/|n|^2 and the
-    vectors c_b of dn = sum_b c_b x dx_b. D is scratch for dm/dx_b.
-    """
-    for b in range(3):
-        column = 3 * tip if b == 2 else 3 * b
-        c = D[3]  # c_b, then the derivatives of the tip's foot t and of the edge's length
-        for i in range(3):
-            e, r = x[i1, i] - x[i0, i], x[i2, i] - x[i0, i]
-            unit = e / length
-            along = (r - w[1] * unit) / length
-            if b == 1:
-                c[i], D[4, i], D[5, i] = -r, along, unit
-            elif b == 2:
-                c[i], D[4, i], D[5, i] = e, unit, 0.0
-            else:
-                c[i], D[4, i], D[5, i] = r - e, -along - unit, -unit
-        D[0, 0], D[0, 1], D[0, 2] = 0.0, -c[2] / n2, c[1] / n2
-        D[1, 0], D[1, 1], D[1, 2] = c[2] / n2, 0.0, -c[0] / n2
-        D[2, 0], D[2, 1], D[2, 2] = -c[1] / n2, c[0] / n2, 0.0
-        for j in range(3):
-            mN = 2.0 * n2 * (m[0] * D[0, j] + m[1] * D[1, j] + m[2] * D[2, j])
-            dt, dL = D[4, j], D[5, j]
-            for i in range(3):
-                dm = scale * (D[i, j] - m[i] * mN)
-                sm = scale * m[i]
-                B[i, column + j] += sm * (dL - dt) + w[0] * dm
-                B[3 + i, column + j] += sm * dt + w[1] * dm
-                B[3 * tip + i, column + j] += -sm * dL + w[2] * dm
-
-
 @njit(cache=True, error_model="numpy")
-def _hessian(x, hinges, stiffness, rest, convexity, blocks):
-    """k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta].
+def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
+    """k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta], LANES hinges side by side.
 
-    The two halves of Hess theta are symmetric only in their sum.
+    With the edge's length L and direction e, the foot t of a face's tip, m = n/|n|^2, p = m x e, the weights
+    w = (L - t, t, -L) and signs r = (-1, 1, 0) of the edge's ends and the tip, and c = |n|^2 / (2 L^2), the
+    face's part of block a, b of Hess theta is +- m y^T + z m^T with
+
+        y = (w_a w_b + r_a r_b c) p - r_a w_b e / L,   z = (w_a w_b + r_a r_b c) p - r_b w_a e / L
+
+    but for antisymmetric parts that cancel between both faces.
     """
-    mA, mB, wA, wB = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    g, D = np.empty(12), np.empty((6, 3))
-    for h in range(hinges.shape[0]):
-        i0, i1, i2, i3 = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
-        length, nA2 = _half(x, i0, i1, i2, mA, wA)
-        _, nB2 = _half(x, i0, i1, i3, mB, wB)
-        theta = _from_rest(_angle(x, i0, i1, length, mA, nA2, mB, nB2), rest[h])
-        for i in range(3):
-            g[i] = wA[0] * mA[i] - wB[0] * mB[i]
-            g[3 + i] = wA[1] * mA[i] - wB[1] * mB[i]
-            g[6 + i] = wA[2] * mA[i]
-            g[9 + i] = -wB[2] * mB[i]
-        B = blocks[h]
-        for i in range(12):
-            for j in range(12):
-                B[i, j] = stiffness[h] * g[i] * g[j]
-        s = (1.0 - convexity) * stiffness[h] * theta
-        _add_half_hessian(x, i0, i1, i2, 2, s, mA, nA2, wA, length, D, B)
-        _add_half_hessian(x, i0, i1, i3, 3, -s, mB, nB2, wB, length, D, B)
+    L, count = LANES, len(hinges)
+    u = np.empty((BLOCKS + 90) * L)
+    for begin in range(0, count, L):
+        for n in range(L):
+            h = min(begin + n, count - 1)
+            for a in range(4):
+                for i in range(3):
+                    u[(3 * a + i) * L + n] = x[hinges[h, a], i]
+            u[12 * L + n], u[13 * L + n] = stiffness[h], rest[h]
+        for n in range(L):
+            ex, ey, ez = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
+            rx, ry, rz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
+            sx, sy, sz = u[9 * L + n] - u[n], u[10 * L + n] - u[L + n], u[11 * L + n] - u[2 * L + n]
+            length = np.sqrt(ex * ex + ey * ey + ez * ez)
+            ax, ay, az = ey * rz - ez * ry, ez * rx - ex * rz, ex * ry - ey * rx
+            bx, by, bz = ey * sz - ez * sy, ez * sx - ex * sz, ex * sy - ey * sx
+            cx, cy, cz = by * az - bz * ay, bz * ax - bx * az, bx * ay - by * ax
+            sine = (cx * ex + cy * ey + cz * ez) / length
+            theta = _from_rest(arctan2(sine, -(ax * bx + ay * by + az * bz)), u[13 * L + n])
+            u[13 * L + n] = (1.0 - convexity) * u[12 * L + n] * theta
+            na, nb, square = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, length * length
+            ax, ay, az, bx, by, bz = ax / na, ay / na, az / na, bx / nb, by / nb, bz / nb
+            a1, b1 = (ex * rx + ey * ry + ez * rz) / length, (ex * sx + ey * sy + ez * sz) / length
+            a0, b0 = length - a1, length - b1
+            # Gradients of theta; m and w of both faces; e / L; p of both; c of both.
+            u[n], u[L + n], u[2 * L + n] = a0 * ax - b0 * bx, a0 * ay - b0 * by, a0 * az - b0 * bz
+            u[3 * L + n], u[4 * L + n] = a1 * ax - b1 * bx, a1 * ay - b1 * by
+            u[5 * L + n] = a1 * az - b1 * bz
+            u[6 * L + n], u[7 * L + n], u[8 * L + n] = -length * ax, -length * ay, -length * az
+            u[9 * L + n], u[10 * L + n], u[11 * L + n] = length * bx, length * by, length * bz
+            u[14 * L + n], u[15 * L + n], u[16 * L + n] = ax, ay, az
+            u[17 * L + n], u[18 * L + n], u[19 * L + n] = bx, by, bz
+            u[20 * L + n], u[21 * L + n], u[22 * L + n], u[23 * L + n] = a0, a1, -length, 0.0
+            u[24 * L + n], u[25 * L + n], u[26 * L + n], u[27 * L + n] = b0, b1, 0.0, -length
+            u[28 * L + n], u[29 * L + n], u[30 * L + n] = ex / square, ey / square, ez / square
+            ex, ey, ez = ex / length, ey / length, ez / length
+            u[31 * L + n], u[32 * L + n] = ay * ez - az * ey, az * ex - ax * ez
+            u[33 * L + n], u[34 * L + n] = ax * ey - ay * ex, by * ez - bz * ey
+            u[35 * L + n], u[36 * L + n] = bz * ex - bx * ez, bx * ey - by * ex
+            u[37 * L + n], u[38 * L + n] = 0.5 * na / square, 0.5 * nb / square
+            _block(u, n, 0, 0, 0, -1.0, -1.0)
+            _block(u, n, 1, 1, 0, 1.0, -1.0)
+            _block(u, n, 2, 1, 1, 1.0, 1.0)
+            _block(u, n, 3, 2, 0, 0.0, -1.0)
+            _block(u, n, 4, 2, 1, 0.0, 1.0)
+            _block(u, n, 5, 2, 2, 0.0, 0.0)
+            _block(u, n, 6, 3, 0, 0.0, -1.0)
+            _block(u, n, 7, 3, 1, 0.0, 1.0)
+            _block(u, n, 8, 3, 2, 0.0, 0.0)
+            _block(u, n, 9, 3, 3, 0.0, 0.0)
+        for n in range(min(L, count - begin)):
+            add_blocks(u, BLOCKS, n, begin + n, 4, slots, base, stride, data)
+
+
+@njit(cache=True, inline="always")
+def _block(u, n, place, a, b, ra, rb):
+    """Block of corners a, b of the hinge in lane n, from what _hessian has put into u."""
+    L = LANES
+    k, s = u[12 * L + n], u[13 * L + n]
+    wa, wb, va, vb = u[(20 + a) * L + n], u[(20 + b) * L + n], u[(24 + a) * L + n], u[(24 + b) * L + n]
+    ax, ay, az, bx, by, bz = (
+        u[14 * L + n], u[15 * L + n], u[16 * L + n], u[17 * L + n], u[18 * L + n], u[19 * L + n]
+    )  # fmt: skip
+    ex, ey, ez = u[28 * L + n], u[29 * L + n], u[30 * L + n]
+    c, d = s * (wa * wb + ra * rb * u[37 * L + n]), -s * (va * vb + ra * rb * u[38 * L + n])
+    px, py, pz = c * u[31 * L + n], c * u[32 * L + n], c * u[33 * L + n]
+    qx, qy, qz = d * u[34 * L + n], d * u[35 * L + n], d * u[36 * L + n]
+    gx, gy, gz = k * u[3 * b * L + n], k * u[(3 * b + 1) * L + n], k * u[(3 * b + 2) * L + n]
+    f = -s * ra * wb
+    yx, yy, yz = px + f * ex + wa * gx, py + f * ey + wa * gy, pz + f * ez + wa * gz
+    f = s * ra * vb
+    hx, hy, hz = qx + f * ex - va * gx, qy + f * ey - va * gy, qz + f * ez - va * gz
+    f = -s * rb * wa
+    zx, zy, zz = px + f * ex, py + f * ey, pz + f * ez
+    f = s * rb * va
+    tx, ty, tz = qx + f * ex, qy + f * ey, qz + f * ez
+    at = (BLOCKS + 9 * place) * L + n
+    u[at] = ax * yx + zx * ax + bx * hx + tx * bx
+    u[at + L] = ax * yy + zx * ay + bx * hy + tx * by
+    u[at + 2 * L] = ax * yz + zx * az + bx * hz + tx * bz
+    u[at + 3 * L] = ay * yx + zy * ax + by * hx + ty * bx
+    u[at + 4 * L] = ay * yy + zy * ay + by * hy + ty * by
+    u[at + 5 * L] = ay * yz + zy * az + by * hz + ty * bz
+    u[at + 6 * L] = az * yx + zz * ax + bz * hx + tz * bx
+    u[at + 7 * L] = az * yy + zz * ay + bz * hy + tz * by
+    u[at + 8 * L] = az * yz + zz * az + bz * hz + tz * bz

@@ -6,6 +6,7 @@
 The exact distance to a moving body has jumps where a sample is pinched between two limbs, and Newton's
 method does not survive them; so each sample gets one plane per step, taken at the initial guess and frozen
 (`Obstacle.planes`), and this energy is the distance to that plane. The true signed distance is a metric.
+A sample that cannot meet the body within the step gets a plane out of its way.
 
 Samples sit on vertices, edge midpoints and face centroids, because a coarse mesh whose vertices are outside
 still cuts through a shoulder with its edges. a_s makes k a density: each of the three kinds of sample
@@ -21,15 +22,19 @@ import scipy.sparse as sp
 
 from ..cloth import Cloth
 from ..kernel_cache import njit
+from ..material import GRAVITY
+from ..surface import FAR
 from .energy import Energy, Step
 
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from ..block_places import BlockPlaces
     from ..obstacle import Planes
 
 DEFAULT_STIFFNESS = 3.4e6  # [J/m^5]: 2500 J/m^3 on a vertex of a T-shirt with 1000 vertices
 DEFAULT_MARGIN = 4e-3  # [m]
+SLACK = 0.01  # [m] that forces may move a sample in a step, beyond its flight
 
 
 class ContactPenalty(Energy):
@@ -78,8 +83,9 @@ class ContactPenalty(Energy):
         self.planes: Planes | None = None
         self.step: Step | None = None  # that the planes belong to
         # Until a step is prepared every plane lies far below its sample: no contact. Finite also as float32.
-        self.points = np.tile([0.0, -1e30, 0.0], (len(self.stencils), 1))
+        self.points = np.tile([0.0, -FAR, 0.0], (len(self.stencils), 1))
         self.normals = np.tile([0.0, 1.0, 0.0], (len(self.stencils), 1))
+        self._all = self._near = np.arange(len(self.stencils))  # samples whose planes are not so far
 
     def parameters(self) -> dict[str, Any]:
         return {
@@ -91,9 +97,21 @@ class ContactPenalty(Energy):
     def prepare(self, step: Step) -> None:
         if step.obstacle is None:
             raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
-        planes = step.obstacle.planes(self.sample_matrix @ step.guess, step.frame, self.rest_samples)
+        samples, reach = self.sample_matrix @ step.guess, self._reach(step)
+        planes = step.obstacle.planes(samples, step.frame, self.rest_samples, reach)
         self.planes, self.points, self.normals = planes, planes.points, planes.normals
+        self._near = self._all if planes.far is None else np.flatnonzero(~planes.far)
         self.step = step
+
+    def _reach(self, step: Step) -> np.ndarray:
+        """(S,) [m] from the guess within which a sample may meet the body in this step.
+
+        Left alone it flies to x + dt v, its weight pulls it another g dt^2 down, and a pin takes it along.
+        """
+        way = step.previous + step.dt * step.velocity - step.guess
+        flight = np.linalg.norm(self.sample_matrix @ way, axis=1)
+        pulled = np.linalg.norm(way[self.cloth.pins], axis=1).max(initial=0.0)
+        return np.maximum(flight, pulled) + GRAVITY * step.dt**2 + self.margin + SLACK
 
     def energy(self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None) -> Tensor:
         """x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S) [J]; default: the prepared planes."""
@@ -116,26 +134,36 @@ class ContactPenalty(Energy):
     def value_and_gradient(
         self, x: np.ndarray, points: np.ndarray | None = None, normals: np.ndarray | None = None
     ) -> tuple[float, np.ndarray]:
-        gradient = np.zeros_like(x)
+        gradient, near = np.zeros_like(x), self._near if points is None else self._all
         c = self.points if points is None else points
         n = self.normals if normals is None else normals
-        value = _gradient(x, self.stencils, self.weights, self.stiffness, self.margin, c, n, gradient)
+        value = _gradient(x, near, self.stencils, self.weights, self.stiffness, self.margin, c, n, gradient)
         return value, gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
         return self.expanded(*self.active_hessian_blocks(x))
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        return _hessian(
-            x, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals
+        elements, curvatures = self._curvatures(x)
+        along = (self.weights[elements, :, None] * self.normals[elements, None, :]).reshape(-1, 9)
+        return elements, curvatures[:, None, None] * along[:, :, None] * along[:, None, :]
+
+    def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
+        _add_hessian(
+            *self._curvatures(x), self.weights, self.normals, places.slots, places.base, places.stride, data
         )
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The curvature along the normal, taken in every direction; for samples in contact at x."""
-        elements, blocks = self.active_hessian_blocks(x)
-        normals = self.normals[elements]
-        along = np.einsum("naibj,ni,nj->nab", blocks.reshape(-1, 3, 3, 3, 3), normals, normals)
-        return elements, along
+        elements, curvatures = self._curvatures(x)
+        w = self.weights[elements]
+        return elements, curvatures[:, None, None] * w[:, :, None] * w[:, None, :]
+
+    def _curvatures(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Samples in contact at x (n,) and their curvatures along the normal (n,) [N/m]."""
+        return _curvatures(
+            x, self._near, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals
+        )
 
 
 def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -170,9 +198,9 @@ def _depth(x, stencil, weight, margin, c, n):
 
 
 @njit(cache=True)
-def _gradient(x, stencils, weights, stiffness, margin, points, normals, gradient):
+def _gradient(x, near, stencils, weights, stiffness, margin, points, normals, gradient):
     total = 0.0
-    for s in range(stencils.shape[0]):
+    for s in near:
         depth = _depth(x, stencils[s], weights[s], margin, points[s], normals[s])
         if depth > 0.0:
             total += stiffness[s] * depth * depth * depth
@@ -184,24 +212,28 @@ def _gradient(x, stencils, weights, stiffness, margin, points, normals, gradient
 
 
 @njit(cache=True)
-def _hessian(x, stencils, weights, stiffness, margin, points, normals):
-    """6 k a_s depth n n^T, spread by the sample's weights; only samples in contact have a block."""
-    elements = np.empty(stencils.shape[0], dtype=np.int64)
-    depths = np.empty(stencils.shape[0])
-    count = 0
-    for s in range(stencils.shape[0]):
+def _curvatures(x, near, stencils, weights, stiffness, margin, points, normals):
+    """6 k a_s depth of the samples in contact."""
+    elements, curvatures, count = np.empty(len(near), np.int64), np.empty(len(near)), 0
+    for s in near:
         depth = _depth(x, stencils[s], weights[s], margin, points[s], normals[s])
         if depth > 0.0:
-            elements[count], depths[count] = s, depth
+            elements[count], curvatures[count] = s, 6.0 * stiffness[s] * depth
             count += 1
-    blocks = np.empty((count, 9, 9))
-    for k in range(count):
+    return elements[:count], curvatures[:count]
+
+
+@njit(cache=True)
+def _add_hessian(elements, curvatures, weights, normals, slots, base, stride, data):
+    """Each curvature times n n^T, spread by the sample's weights."""
+    for k in range(len(elements)):
         s = elements[k]
-        curvature = 6.0 * stiffness[s] * depths[k]
         for a in range(3):
             for b in range(3):
-                w = curvature * weights[s, a] * weights[s, b]
-                for i in range(3):
-                    for j in range(3):
-                        blocks[k, 3 * a + i, 3 * b + j] = w * normals[s, i] * normals[s, j]
-    return elements[:count], blocks
+                w, slot = curvatures[k] * weights[s, a] * weights[s, b], slots[s, 3 * a + b]
+                if slot < 0 or w == 0.0:
+                    continue
+                for j in range(3):
+                    for i in range(3):
+                        at = base[slot] + j * stride[slot] + i
+                        data[at] += w * normals[s, i] * normals[s, j]

@@ -7,7 +7,6 @@ holds every override to the default. Torch is imported only where the definition
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
     from torch import Tensor
 
+    from ..block_places import BlockPlaces
     from ..cloth import Cloth
     from ..obstacle import Obstacle
 
@@ -46,6 +46,8 @@ class Energy:
         stencils: (N, k) vertex indices of each element.
         dynamic: True where the vertices that the term couples change with x, as the pairs of a contact do.
             Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks.
+        constant: block sizes (3: Hessian, 1: scalar stiffness) of which the term gives the same at every x
+            and in every step.
         remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
             judged without preparing the one before it.
     """
@@ -54,6 +56,7 @@ class Energy:
     cloth: Cloth
     stencils: np.ndarray
     dynamic: bool = False
+    constant: tuple[int, ...] = ()
     remembers: bool = False
 
     def energy(self, x: Tensor) -> Tensor:
@@ -127,11 +130,12 @@ class Energy:
             blocks = (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
         return np.arange(len(self.stencils)), blocks
 
-    def hessian_pieces(
-        self, x: np.ndarray, convexity: float = 0.0
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """What active_hessian_blocks gives, in pieces where all at once would take much memory."""
-        yield self.active_hessian_blocks(x, convexity)
+    def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
+        """Add the blocks of active_hessian_blocks to the values of a matrix.
+
+        A closed form may do so without storing them first.
+        """
+        places.add(*self.active_hessian_blocks(x, convexity), data)
 
     def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
         """Of a dynamic term: its second derivatives (3V, 3V) [N/m] at x (V, 3), as active_hessian_blocks."""

@@ -23,6 +23,7 @@ class Gravity(Energy):
     """
 
     name = "gravity"
+    constant = (3,)
 
     def __init__(self, cloth: Cloth, origin_height: float = 0.0, *, acceleration: float = GRAVITY) -> None:
         self.cloth = cloth

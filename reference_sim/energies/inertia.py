@@ -20,6 +20,7 @@ class Inertia(Energy):
     """Incremental kinetic term [J] of each vertex; `prepare` (or the argument x_hat) sets the target."""
 
     name = "inertia"
+    constant = (1, 3)
 
     def __init__(self, cloth: Cloth, dt: float) -> None:
         if not (np.isfinite(dt) and dt > 0):

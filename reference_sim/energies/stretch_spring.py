@@ -18,6 +18,7 @@ class StretchSpring(Energy):
     """Spring energy [J] of each edge of `cloth`; stiffness [N/m] is the same for all edges."""
 
     name = "spring"
+    constant = (1,)
 
     def __init__(self, cloth: Cloth, *, stiffness: float = 15.0) -> None:
         self.cloth = cloth

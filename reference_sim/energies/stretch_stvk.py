@@ -14,18 +14,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..block_places import BlockPlaces
 from ..cloth import Cloth
 from ..kernel_cache import njit
+from ..lanes import LANES, add_blocks
 from .energy import Energy
 
 if TYPE_CHECKING:
     from torch import Tensor
 
 
+BLOCKS = 29  # rows of lanes before those of the blocks, in _hessian
+
+
 class StretchStVK(Energy):
     """StVK membrane energy [J] of each face of `cloth`."""
 
     name = "strain"
+    constant = (1,)
 
     def __init__(self, cloth: Cloth) -> None:
         self.cloth = cloth
@@ -60,12 +66,20 @@ class StretchStVK(Energy):
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Negative curvature comes from compressive stress alone, so only that is reduced by `convexity`."""
-        blocks = np.empty((len(self.stencils), 9, 9))
+        blocks = np.zeros((len(self.stencils), 9, 9))
+        self.add_hessian(x, convexity, BlockPlaces.one_by_one(len(blocks), 3), blocks.reshape(-1))
+        return np.arange(len(blocks)), blocks
+
+    def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
         stress = self._predicted_stress
         if stress is None:
             stress = self._stress(x, np.zeros_like(x))
-        _hessian(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, convexity, stress, blocks)
-        return np.arange(len(blocks)), blocks
+        if convexity > 0:
+            stress = _less_compressed(stress, 1 - convexity)
+        _hessian(
+            x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, stress, places.slots, places.base,
+            places.stride, data,
+        )  # fmt: skip
 
     def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
         self._predicted_stress = self._stress(x, step)
@@ -103,43 +117,77 @@ def _deformation(x, face, D, fa, fb):
     return G00, G11, G01
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gradient(x, faces, Dm_inverse, areas, lam, mu, gradient):
-    """dE/dx_a = A F S b_a with S = lambda tr(G) I + 2 mu G and b_a the gradient of the hat function."""
-    total = 0.0
-    fa, fb = np.empty(3), np.empty(3)
-    for f in range(faces.shape[0]):
-        D = Dm_inverse[f]
-        G00, G11, G01 = _deformation(x, faces[f], D, fa, fb)
-        trace = G00 + G11
-        total += areas[f] * (0.5 * lam * trace * trace + mu * (G00 * G00 + G11 * G11 + 2 * G01 * G01))
-        S00, S11, S01 = lam * trace + 2 * mu * G00, lam * trace + 2 * mu * G11, 2 * mu * G01
-        for i in range(3):
-            P0 = areas[f] * (fa[i] * S00 + fb[i] * S01)
-            P1 = areas[f] * (fa[i] * S01 + fb[i] * S11)
-            g1 = P0 * D[0, 0] + P1 * D[0, 1]
-            g2 = P0 * D[1, 0] + P1 * D[1, 1]
-            gradient[faces[f, 1], i] += g1
-            gradient[faces[f, 2], i] += g2
-            gradient[faces[f, 0], i] -= g1 + g2
+    """dE/dx_a = A F S b_a with S = lambda tr(G) I + 2 mu G and b_a the gradient of the hat function.
+
+    LANES faces side by side, in vector instructions: from corners, Dm^-1 and area in u to forces and energy.
+    An incomplete group is filled up with the last face.
+    """
+    L, count, total = LANES, len(faces), 0.0
+    u = np.empty(14 * L)
+    for begin in range(0, count, L):
+        for n in range(L):
+            f = min(begin + n, count - 1)
+            for a in range(3):
+                for i in range(3):
+                    u[(3 * a + i) * L + n] = x[faces[f, a], i]
+            for i in range(2):
+                for j in range(2):
+                    u[(9 + 2 * i + j) * L + n] = Dm_inverse[f, i, j]
+            u[13 * L + n] = areas[f]
+        for n in range(L):
+            ax, ay, az = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
+            bx, by, bz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
+            d00, d01, d10, d11 = u[9 * L + n], u[10 * L + n], u[11 * L + n], u[12 * L + n]
+            area = u[13 * L + n]
+            px, py, pz = ax * d00 + bx * d10, ay * d00 + by * d10, az * d00 + bz * d10
+            qx, qy, qz = ax * d01 + bx * d11, ay * d01 + by * d11, az * d01 + bz * d11
+            G00 = 0.5 * (px * px + py * py + pz * pz - 1.0)
+            G11 = 0.5 * (qx * qx + qy * qy + qz * qz - 1.0)
+            G01 = 0.5 * (px * qx + py * qy + pz * qz)
+            trace = G00 + G11
+            square = G00 * G00 + G11 * G11 + 2 * G01 * G01
+            u[13 * L + n] = area * (0.5 * lam * trace * trace + mu * square)
+            S00, S11 = area * (lam * trace + 2 * mu * G00), area * (lam * trace + 2 * mu * G11)
+            S01 = area * (2 * mu * G01)
+            ux, uy, uz = px * S00 + qx * S01, py * S00 + qy * S01, pz * S00 + qz * S01
+            vx, vy, vz = px * S01 + qx * S11, py * S01 + qy * S11, pz * S01 + qz * S11
+            ax, ay, az = ux * d00 + vx * d01, uy * d00 + vy * d01, uz * d00 + vz * d01
+            bx, by, bz = ux * d10 + vx * d11, uy * d10 + vy * d11, uz * d10 + vz * d11
+            u[n], u[L + n], u[2 * L + n] = -ax - bx, -ay - by, -az - bz
+            u[3 * L + n], u[4 * L + n], u[5 * L + n] = ax, ay, az
+            u[6 * L + n], u[7 * L + n], u[8 * L + n] = bx, by, bz
+        for n in range(min(L, count - begin)):
+            total += u[13 * L + n]
+            for a in range(3):
+                for i in range(3):
+                    gradient[faces[begin + n, a], i] += u[(3 * a + i) * L + n]
     return total
 
 
-@njit(cache=True, inline="always")
-def _less_compressed(S00, S11, S01, keep):
-    """The symmetric matrix S with its negative eigenvalues times `keep`."""
-    mean, half = 0.5 * (S00 + S11), 0.5 * (S00 - S11)
-    radius = np.sqrt(half * half + S01 * S01)
-    high, low = mean + radius, mean - radius
-    if low >= 0.0:
-        return S00, S11, S01
-    low *= keep
-    if high < 0.0:
-        high *= keep
-    # S = mean I + radius R with a reflection R; at radius 0 any R will do.
-    scale = 0.5 * (high - low) / radius if radius > 0.0 else 0.0
-    mean = 0.5 * (high + low)
-    return mean + scale * half, mean - scale * half, scale * S01
+@njit(cache=True)
+def _less_compressed(stress, keep):
+    """Of stresses S00, S11, S01 (F, 3) as symmetric matrices, the negative eigenvalues times `keep`."""
+    reduced = stress.copy()
+    for f in range(len(stress)):
+        mean, half = 0.5 * (stress[f, 0] + stress[f, 1]), 0.5 * (stress[f, 0] - stress[f, 1])
+        radius = np.sqrt(half * half + stress[f, 2] * stress[f, 2])
+        high, low = mean + radius, mean - radius
+        if low >= 0.0:
+            continue
+        low *= keep
+        if high < 0.0:
+            high *= keep
+        # S = mean I + radius R with a reflection R; at radius 0 any R will do.
+        scale = 0.5 * (high - low) / radius if radius > 0.0 else 0.0
+        mean = 0.5 * (high + low)
+        reduced[f, 0], reduced[f, 1], reduced[f, 2] = (
+            mean + scale * half,
+            mean - scale * half,
+            scale * stress[f, 2],
+        )
+    return reduced
 
 
 @njit(cache=True)
@@ -157,34 +205,71 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
         stress[f, 0], stress[f, 1], stress[f, 2] = trace + 2 * mu * G00, trace + 2 * mu * G11, 2 * mu * G01
 
 
-@njit(cache=True)
-def _hessian(x, faces, Dm_inverse, areas, lam, mu, convexity, stress, blocks):
-    """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)]."""
-    b = np.empty((3, 2))
-    Fb = np.empty((3, 3))
-    fa, fb = np.empty(3), np.empty(3)
-    for f in range(faces.shape[0]):
-        D = Dm_inverse[f]
-        _deformation(x, faces[f], D, fa, fb)
-        S00, S11, S01 = stress[f, 0], stress[f, 1], stress[f, 2]
-        if convexity > 0.0:
-            S00, S11, S01 = _less_compressed(S00, S11, S01, 1.0 - convexity)
-        for k in range(2):
-            b[1, k], b[2, k] = D[0, k], D[1, k]
-            b[0, k] = -D[0, k] - D[1, k]
-        for a in range(3):
-            for i in range(3):
-                Fb[a, i] = fa[i] * b[a, 0] + fb[i] * b[a, 1]
-        for a in range(3):
-            for c in range(a + 1):
-                bSb = b[a, 0] * (S00 * b[c, 0] + S01 * b[c, 1]) + b[a, 1] * (S01 * b[c, 0] + S11 * b[c, 1])
-                bb = b[a, 0] * b[c, 0] + b[a, 1] * b[c, 1]
+@njit(cache=True, error_model="numpy")
+def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, data):
+    """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)], LANES faces
+    side by side; stress (F, 3) holds S00, S11, S01.
+    """
+    L, count = LANES, len(faces)
+    u = np.empty((BLOCKS + 54) * L)
+    for begin in range(0, count, L):
+        for n in range(L):
+            f = min(begin + n, count - 1)
+            for a in range(3):
                 for i in range(3):
-                    for j in range(3):
-                        value = lam * Fb[a, i] * Fb[c, j] + mu * (
-                            Fb[c, i] * Fb[a, j] + bb * (fa[i] * fa[j] + fb[i] * fb[j])
-                        )
-                        if i == j:
-                            value += bSb
-                        blocks[f, 3 * a + i, 3 * c + j] = areas[f] * value
-                        blocks[f, 3 * c + j, 3 * a + i] = areas[f] * value
+                    u[(3 * a + i) * L + n] = x[faces[f, a], i]
+                u[(13 + a) * L + n] = areas[f] * stress[f, a]
+            for i in range(2):
+                for j in range(2):
+                    u[(9 + 2 * i + j) * L + n] = Dm_inverse[f, i, j]
+            u[16 * L + n] = areas[f]
+        for n in range(L):
+            ax, ay, az = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
+            bx, by, bz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
+            d00, d01, d10, d11 = u[9 * L + n], u[10 * L + n], u[11 * L + n], u[12 * L + n]
+            px, py, pz = ax * d00 + bx * d10, ay * d00 + by * d10, az * d00 + bz * d10
+            qx, qy, qz = ax * d01 + bx * d11, ay * d01 + by * d11, az * d01 + bz * d11
+            # F b_a; b_a; F F^T, of which the six entries on and below the diagonal.
+            e0, e1 = -d00 - d10, -d01 - d11
+            u[n], u[L + n], u[2 * L + n] = px * e0 + qx * e1, py * e0 + qy * e1, pz * e0 + qz * e1
+            u[3 * L + n], u[4 * L + n] = px * d00 + qx * d01, py * d00 + qy * d01
+            u[5 * L + n], u[6 * L + n] = pz * d00 + qz * d01, px * d10 + qx * d11
+            u[7 * L + n], u[8 * L + n] = py * d10 + qy * d11, pz * d10 + qz * d11
+            u[17 * L + n], u[18 * L + n] = e0, e1
+            u[19 * L + n], u[20 * L + n], u[21 * L + n], u[22 * L + n] = d00, d01, d10, d11
+            u[23 * L + n], u[24 * L + n] = px * px + qx * qx, py * px + qy * qx
+            u[25 * L + n], u[26 * L + n] = py * py + qy * qy, pz * px + qz * qx
+            u[27 * L + n], u[28 * L + n] = pz * py + qz * qy, pz * pz + qz * qz
+            _block(u, n, 0, 0, 0, lam, mu)
+            _block(u, n, 1, 1, 0, lam, mu)
+            _block(u, n, 2, 1, 1, lam, mu)
+            _block(u, n, 3, 2, 0, lam, mu)
+            _block(u, n, 4, 2, 1, lam, mu)
+            _block(u, n, 5, 2, 2, lam, mu)
+        for n in range(min(L, count - begin)):
+            add_blocks(u, BLOCKS, n, begin + n, 3, slots, base, stride, data)
+
+
+@njit(cache=True, inline="always")
+def _block(u, n, place, a, c, lam, mu):
+    """Block of corners a, c of the face in lane n, from what _hessian has put into u."""
+    L = LANES
+    ax, ay, az = u[3 * a * L + n], u[(3 * a + 1) * L + n], u[(3 * a + 2) * L + n]
+    cx, cy, cz = u[3 * c * L + n], u[(3 * c + 1) * L + n], u[(3 * c + 2) * L + n]
+    a0, a1, c0, c1 = (
+        u[(17 + 2 * a) * L + n], u[(18 + 2 * a) * L + n], u[(17 + 2 * c) * L + n], u[(18 + 2 * c) * L + n]
+    )  # fmt: skip
+    s00, s11, s01, area = u[13 * L + n], u[14 * L + n], u[15 * L + n], u[16 * L + n]
+    s = a0 * (s00 * c0 + s01 * c1) + a1 * (s01 * c0 + s11 * c1)
+    l, m = lam * area, mu * area
+    b = m * (a0 * c0 + a1 * c1)
+    at = (BLOCKS + 9 * place) * L + n
+    u[at] = (l + m) * (ax * cx) + b * u[23 * L + n] + s
+    u[at + L] = l * (ax * cy) + m * (cx * ay) + b * u[24 * L + n]
+    u[at + 2 * L] = l * (ax * cz) + m * (cx * az) + b * u[26 * L + n]
+    u[at + 3 * L] = l * (ay * cx) + m * (cy * ax) + b * u[24 * L + n]
+    u[at + 4 * L] = (l + m) * (ay * cy) + b * u[25 * L + n] + s
+    u[at + 5 * L] = l * (ay * cz) + m * (cy * az) + b * u[27 * L + n]
+    u[at + 6 * L] = l * (az * cx) + m * (cz * ax) + b * u[26 * L + n]
+    u[at + 7 * L] = l * (az * cy) + m * (cz * ay) + b * u[27 * L + n]
+    u[at + 8 * L] = (l + m) * (az * cz) + b * u[28 * L + n] + s

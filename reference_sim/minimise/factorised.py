@@ -95,6 +95,7 @@ class FactorisedDescent(Descent):
     ) -> None:
         super().__init__(potential, x, after=after, observe=observe)
         self.hessian = hessian
+        self.factorised = False  # whether the last factorisation exists, to solve with
 
     def assemble(self, convexity: float) -> np.ndarray:
         """Values (nnz,) of the Hessian here."""
@@ -107,10 +108,10 @@ class FactorisedDescent(Descent):
     def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
         """As the Hessian's."""
         start = time.perf_counter()
-        done = self.hessian.factorise(data, shift)
+        self.factorised = self.hessian.factorise(data, shift)
         self.factorisations += 1
         self.seconds["factorise"] += time.perf_counter() - start
-        return done
+        return self.factorised
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """As the Hessian's."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 
 import numpy as np
 
+from ..kernel_cache import njit
+
 LEAST_CURVATURE = 1e-10  # of |s| |y|: pairs of negative curvature would make the estimate indefinite
+FAST = {"reassoc", "contract", "nsz"}  # sums in vector instructions
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> float:
@@ -19,32 +21,57 @@ class LBFGSHistory:
     """The last `memory` pairs of a step s (3n,) [m] and the change y (3n,) [N] of the gradient along it."""
 
     def __init__(self, memory: int) -> None:
-        self._pairs: deque[tuple[np.ndarray, np.ndarray, float]] = deque(maxlen=memory)
+        self._memory = memory
+        self._pairs = np.empty((0, 2, 0))  # (memory, 2, 3n) s and y, from the first pair on
+        self._curvatures = np.empty(memory)  # s . y
+        self._count = 0  # of pairs added; the last lies at (count - 1) % memory
 
     def __len__(self) -> int:
-        return len(self._pairs)
+        return min(self._count, self._memory)
 
     def clear(self) -> None:
-        self._pairs.clear()
+        self._count = 0
 
     def add(self, s: np.ndarray, y: np.ndarray) -> None:
         """Remember a pair, if its curvature is positive."""
         curvature = dot(s, y)
-        if curvature > LEAST_CURVATURE * np.sqrt(dot(s, s) * dot(y, y)):
-            self._pairs.append((s, y, 1.0 / curvature))
+        if self._memory and curvature > LEAST_CURVATURE * np.sqrt(dot(s, s) * dot(y, y)):
+            if self._pairs.shape[2] != len(s):
+                self._pairs = np.empty((self._memory, 2, len(s)))
+            place = self._count % self._memory
+            self._pairs[place, 0], self._pairs[place, 1], self._curvatures[place] = s, y, curvature
+            self._count += 1
 
     def direction(self, g: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """-H g (3n,) by the two-loop recursion (Nocedal and Wright 2006, algorithm 7.4).
 
         solve applies the first guess of the inverse Hessian, which the pairs correct.
         """
-        q = -g
-        alphas = []
-        for s, y, rho in reversed(self._pairs):
-            alpha = rho * dot(s, q)
-            alphas.append(alpha)
-            q = q - alpha * y
+        q, alphas = -g, np.empty(len(self))
+        order = np.arange(self._count - len(self), self._count) % max(self._memory, 1)  # oldest first
+        _first_loop(self._pairs, self._curvatures, order, q, alphas)
         p = solve(q)
-        for (s, y, rho), alpha in zip(self._pairs, reversed(alphas)):
-            p += (alpha - rho * dot(y, p)) * s
+        _second_loop(self._pairs, self._curvatures, order, p, alphas)
         return p
+
+
+@njit(cache=True, fastmath=FAST)
+def _first_loop(pairs, curvatures, order, q, alphas):
+    for k in range(len(order) - 1, -1, -1):
+        s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
+        for i in range(len(q)):
+            total += s[i] * q[i]
+        alphas[k] = total / curvatures[order[k]]
+        for i in range(len(q)):
+            q[i] -= alphas[k] * y[i]
+
+
+@njit(cache=True, fastmath=FAST)
+def _second_loop(pairs, curvatures, order, p, alphas):
+    for k in range(len(order)):
+        s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
+        for i in range(len(p)):
+            total += y[i] * p[i]
+        share = alphas[k] - total / curvatures[order[k]]
+        for i in range(len(p)):
+            p[i] += share * s[i]

@@ -143,7 +143,7 @@ class Run(FactorisedDescent):
                 return self.result("stalled", "no convexified Newton direction lowers the energy")
             self.iterations += 1
             self.show()
-            if self.n.reuse and not self.predicting:
+            if self.n.reuse and self.factorised and not self.predicting:
                 self.history.clear()
                 self.history.add((self.x - x)[self.free].ravel(), self.g - g)
                 self.reuse_factorisation(tolerance)

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference_sim.kernel_cache import njit
-from reference_sim.triangle import closest_on_triangle
+from .kernel_cache import njit
+from .triangle import closest_on_triangle
 
 SLACK = 0.001  # m: beyond the margin, and still followed
 CROSSINGS = 12  # sides that an anchor may cross at a time: some 15 cm

@@ -1,0 +1,219 @@
+"""python -m benchmarks.speedup: how much faster this code is than an earlier commit, in one table.
+
+Each row is one measurement of `benchmarks.run`, made by the code of then in a checkout of its own and by the
+code here, in turn on one machine: its time before and after, their ratio, and what the time bought.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import statistics
+import subprocess
+import sys
+import tarfile
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from .results import ResultsError, RunFolder
+from .run_options import Parser
+from .timing import THREADS
+
+PROGRAM = "benchmarks.speedup"
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = """examples:
+  python -m benchmarks.speedup 937ace5                     every row, about an hour
+  python -m benchmarks.speedup 937ace5 --rows solver --turns 3
+  python -m benchmarks.speedup 937ace5 --rows inference,training -o speedup.csv
+
+Nothing else should be at work on the machine.
+exit status: 0 measured; 1 a run failed; 2 no such commit or row: one line says which."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One row of the table, or one for each scene.
+
+    group: what --rows names. arguments: of benchmarks.run. before, after: the methods compared. time: the
+    metric that is divided; bought: what must not grow with it.
+    """
+
+    group: str
+    title: str
+    arguments: tuple[str, ...]
+    before: str
+    after: str
+    time: str
+    bought: str
+
+
+CLIPS = (
+    "tshirt/sudden_stop@clip", "tshirt/spin_jump@clip", "tshirt/turning_stop@clip", "skirt/turning_stop@clip",
+    "tunic/turning_stop@clip", "out_of_distribution/arms_crossed",
+)  # fmt: skip
+_ON_CLIPS = ("--scenes", ",".join(CLIPS))
+_GAP = {"time": "cost/frame", "bought": "gap/energy"}
+_SOLVERS = tuple(
+    Measurement(
+        "solver", title, ("--suite", "speed", *_ON_CLIPS, "--methods", "simulation,skinning,{method}"), before,
+        after, **_GAP,
+    )
+    for title, before, after in (
+        ("L-BFGS, 10 iterations", "lbfgs-10", "lbfgs-10"),
+        ("the same, compiled", "lbfgs-10", "fast-lbfgs-10"),
+    )
+)  # fmt: skip
+_HYBRIDS = (
+    Measurement(
+        "hybrid", "SNUG and 2 iterations", ("--suite", "speed", "--scenes", ",".join(CLIPS[:3]), "--methods",
+        "simulation,skinning,snug,{method}"), "snug+lbfgs-2", "snug+fast-lbfgs-2", **_GAP,
+    ),
+)  # fmt: skip
+
+
+def _performance(group: str, case: str, method: str, time: str, bought: str) -> Measurement:
+    arguments = ("--suite", "performance", "--scenes", case, "--methods", method)
+    return Measurement(group, case, arguments, method, method, f"performance/{time}", f"performance/{bought}")
+
+
+MEASUREMENTS = (
+    *_SOLVERS,
+    *_HYBRIDS,
+    *(_performance("inference", f"inference/{n}", "snug", "inference", "inference_p95") for n in (1000, 4400)),
+    *(
+        _performance("reference", case, "simulation", "frame", "converged_frames")
+        for case in ("garment/walk-1000", "garment/run-1000", "garment/walk-4400", "sheet/64x64")
+    ),
+    *(
+        _performance("training", f"training_step/{n}", "snug", "training_step", "training_step_least")
+        for n in (1000, 4400)
+    ),
+    *(
+        _performance("size", f"scaling/{n}x{n}", "simulation", "iteration", "process_memory")
+        for n in (64, 128, 256)
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the table: times and what they bought, of one scene."""
+
+    row: str
+    scene: str
+    before: float
+    after: float
+    ratio: float
+    bought_before: float
+    bought_after: float
+    unit: str
+
+
+class SpeedupError(RuntimeError):
+    """A commit that is not there, or a run that failed; one line says which."""
+
+
+def check_out(commit: str, folder: Path) -> Path:
+    """The tree of a commit in that folder. Raises SpeedupError."""
+    archive = folder / "before.tar"
+    with archive.open("wb") as stream:
+        made = subprocess.run(["git", "archive", commit], cwd=ROOT, stdout=stream, stderr=subprocess.PIPE)
+    if made.returncode:
+        raise SpeedupError(f"{commit}: no such commit here: {made.stderr.decode().strip()}")
+    tree = folder / "before"
+    with tarfile.open(archive) as tar:
+        tar.extractall(tree, filter="data")
+    return tree
+
+
+def measured(tree: Path, words: Sequence[str], folder: Path) -> RunFolder:
+    """A run of the code in that tree. Raises SpeedupError."""
+    environment = os.environ | dict.fromkeys(THREADS, "1") | {"PYTHONPATH": str(tree)}
+    command = [sys.executable, "-m", "benchmarks.run", *words, "--fresh", "-o", str(folder)]
+    made = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True)
+    if made.returncode not in (0, 1) or not (folder / "results.csv").is_file():
+        last = (made.stderr.strip() or made.stdout.strip()).splitlines()[-1:]
+        raise SpeedupError(f"{' '.join(command[2:])}: exit status {made.returncode}: {' '.join(last)}")
+    return RunFolder(folder)
+
+
+def _values(run: RunFolder, method: str, metric: str) -> dict[str, float]:
+    """By scene."""
+    rows = (row for row in run.read_rows() if row.metric == metric and row.method == method)
+    return {row.scene: row.value for row in rows if row.value is not None}
+
+
+def compared(what: Measurement, before: Path, folder: Path, turns: int) -> list[Line]:
+    """Both codes in turn; medians over the turns. Raises SpeedupError."""
+    found: list[list[dict[str, float]]] = [[], [], [], []]
+    for turn in range(turns):
+        for side, (tree, method) in enumerate(((before, what.before), (ROOT, what.after))):
+            words = [word.format(method=method) for word in what.arguments]
+            run = measured(tree, words, folder / f"{what.title} {method} {turn} {side}".replace("/", "-"))
+            for place, metric in enumerate((what.time, what.bought)):
+                found[2 * place + side].append(_values(run, method, metric))
+    scenes = [scene for scene in found[0][0] if all(scene in values for side in found for values in side)]
+    lines = []
+    for scene in scenes:
+        b, a, bb, ba = (statistics.median(values[scene] for values in side) for side in found)
+        lines.append(Line(what.title, scene, b, a, a / b, bb, ba, what.bought))
+    return lines
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    parser = Parser(
+        prog=f"python -m {PROGRAM}",
+        description="Measure an earlier commit and this code in turn: times, ratios, and what they bought.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    groups = sorted({what.group for what in MEASUREMENTS})
+    parser.add_argument("commit", help="to compare with")
+    parser.add_argument("--rows", metavar="NAME,...", default=",".join(groups), help="default: %(default)s")
+    parser.add_argument("--turns", type=int, default=1, help="of both; medians are given (default 1)")
+    parser.add_argument("-o", "--out", metavar="FILE", help="write the table there as CSV")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    parser = make_parser()
+    options = parser.parse_args(arguments)
+    wanted, known = options.rows.split(","), {what.group for what in MEASUREMENTS}
+    if unknown := set(wanted) - known:
+        parser.error(f"--rows {min(unknown)}: choose from {', '.join(sorted(known))}")
+    lines: list[Line] = []
+    with tempfile.TemporaryDirectory() as name:
+        try:
+            before = check_out(options.commit, Path(name))
+            for what in MEASUREMENTS:
+                if what.group in wanted:
+                    print(f"{what.title}: measuring", file=sys.stderr, flush=True)
+                    lines += compared(what, before, Path(name), max(options.turns, 1))
+        except (SpeedupError, ResultsError) as error:
+            print(f"{PROGRAM}: {error}", file=sys.stderr)
+            return 2 if not lines and "no such commit" in str(error) else 1
+    _show(lines)
+    if options.out:
+        with open(options.out, "w", newline="", encoding="utf-8") as stream:
+            writer = csv.DictWriter(stream, list(Line.__dataclass_fields__), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(vars(line) for line in lines)
+    return 0
+
+
+def _show(lines: Sequence[Line]) -> None:
+    print("| what | scene | before | after | ratio | bought before | after | |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    for line in lines:
+        numbers = (line.before, line.after, line.ratio, line.bought_before, line.bought_after)
+        print(f"| {line.row} | {line.scene} | {' | '.join(f'{x:.3g}' for x in numbers)} | {line.unit} |")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,322 @@
+"""An obstacle whose contact planes follow their samples over the surface, and are searched in rotation.
+
+From frame to frame the closest point of a sample moves little. So it slides (surface_walk) from where it was
+to the foot of its sample, which finds it wherever the surface is one smooth sheet. What sliding cannot find is
+another limb that came near. Against that, in each frame:
+
+- one group of neighbouring samples in ROTATION is searched exactly, another one each time;
+- a sample tries its neighbours' faces where its own is too far: distances of two samples to one surface differ
+  by no more than the samples are apart;
+- a sample whose place is farther away than the step's reach looks for another surface within that reach;
+- a sample deeper than DEEP below its plane is searched exactly: that is where a false plane costs most.
+
+What the rotation finds reaches its neighbours by the second rule in the same frame. A plane is therefore that
+of a place near the closest point, not always of the closest. The exact search (obstacle.Obstacle) is the
+oracle; tests/test_compiled.py states how far they differ over hard motions.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..closest_point import FaceTree, by_cells
+from ..group_search import GROUP
+from ..kernel_cache import njit
+from ..obstacle import Obstacle, Planes
+from ..surface import carry, plane_normals, vertex_normals
+from ..surface_walk import triangle_adjacency, walk_to_foot
+
+ROTATION = 16
+FAR, SELDOM = 0.03, 4  # [m] samples farther away slide in one frame of so many only, and ride in the others
+DEEP = 2e-3  # [m] below the plane
+SLACK = 1e-4  # [m] by which a neighbour's distance must be the better one to be tried
+NEIGHBOURS = 4
+SWEEPS = 2  # of the trying of neighbours: what was found spreads by so many samples
+
+
+class SlidingObstacle(Obstacle):
+    """The same body and the same rule of regions as `obstacle`, with remembered places in between.
+
+    Its answers depend on what it was asked before. Frames are asked for in order; after a jump, and for the
+    first time, everything is searched.
+    """
+
+    def __init__(self, obstacle: Obstacle) -> None:
+        self.__dict__.update(copy.copy(obstacle).__dict__)
+        self._forget()
+
+    def _forget(self) -> None:
+        super()._forget()
+        self._kinds: dict[tuple[int, bool], _Anchors] = {}
+        self._patch: _Patch | None = None
+        self._none_far = np.zeros(0, bool)
+        self._posed: tuple[int, np.ndarray, np.ndarray] | None = None  # frame, vertices, their normals
+
+    def start_again(self) -> None:
+        """Forget all places, as before a first frame."""
+        for anchors in self._kinds.values():
+            anchors.forget()
+
+    def _pose(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices and normals at a frame, with the tree fitted to it."""
+        if self._posed is None or self._posed[0] != frame:
+            assert self._patch is not None
+            vertices = self._patch.posed(self.at(frame))
+            self._patch.tree.refit(vertices)
+            self._posed = frame, vertices, vertex_normals(vertices, self._patch.faces)
+        return self._posed[1:]
+
+    def _anchors(self, points: np.ndarray, rest_points: np.ndarray | None) -> _Anchors:
+        if self.rest_centroids is None:
+            rest_points = None
+        kind = len(points), rest_points is not None
+        if kind not in self._kinds:
+            if self._patch is None:
+                self._patch = _Patch(self, rest_points)
+            self._kinds[kind] = _Anchors(points if rest_points is None else rest_points, rest_points)
+        return self._kinds[kind]
+
+    def planes(
+        self,
+        points: np.ndarray,
+        frame: int,
+        rest_points: np.ndarray | None = None,
+        reach: np.ndarray | None = None,
+    ) -> Planes:
+        """As the exact ones. Without `reach`, other limbs are found by the rotation alone."""
+        frame = min(frame, self.frames - 1)
+        anchors = self._anchors(points, rest_points)
+        assert self._patch is not None
+        vertices, of_vertices = self._pose(frame)
+        anchors.follow(points, frame, self._patch, vertices, self.region, reach)
+        normals = np.empty_like(points)
+        if len(self._none_far) < len(points):
+            self._none_far = np.zeros(len(points), bool)
+
+        def set_normals(at: np.ndarray | slice) -> None:
+            some = np.empty_like(normals[at])
+            plane_normals(
+                points[at], anchors.closest[at], anchors.faces[at], anchors.barycentric[at],
+                self._none_far[: len(some)], vertices, self._patch.faces, of_vertices, some,
+            )  # fmt: skip
+            normals[at] = some
+
+        set_normals(slice(None))
+        deep = np.flatnonzero(_gaps(points, anchors.closest, normals) < -DEEP)
+        if len(deep):
+            anchors.search(deep, points, self._patch, self.region)
+            set_normals(deep)
+        anchors.frame = frame
+        faces = self._patch.numbers[anchors.faces]
+        return Planes(anchors.closest.copy(), normals, faces, anchors.barycentric.copy())
+
+    def transported(
+        self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
+    ) -> np.ndarray:
+        """As the exact one. Points that are the first of a larger set of samples ride with the places of
+        those, where they were when planes were last asked for.
+        """
+        before, after = (min(f, self.frames - 1) for f in (frame - 1, frame))
+        anchors = self._anchors(points, rest_points)
+        assert self._patch is not None
+        vertices, _ = self._pose(before)
+        leader = next((a for a in self._kinds.values() if a.frame == before and a.leads(anchors)), None)
+        if leader is None:
+            leader = anchors
+            anchors.follow(points, before, self._patch, vertices, self.region)
+            anchors.frame = after
+        out = np.empty_like(points)
+        carry(
+            points, leader.closest, leader.faces, leader.barycentric, vertices,
+            self._patch.posed(self.at(after)), self._patch.faces, out,
+        )  # fmt: skip
+        return out
+
+
+class _Patch:
+    """The faces that some sample may meet, and a tree of them."""
+
+    def __init__(self, obstacle: Obstacle, rest_points: np.ndarray | None) -> None:
+        centroids = obstacle.rest_centroids
+        if centroids is None:
+            centroids = obstacle.at(0)[obstacle.faces].mean(axis=1)
+        self.numbers = np.arange(len(obstacle.faces))
+        if rest_points is not None:
+            near = cKDTree(rest_points).query(centroids, distance_upper_bound=obstacle.region)[0]
+            alone = cKDTree(centroids).query(rest_points)[0].max() > obstacle.region
+            if not alone:  # a sample without a face in its region meets all
+                self.numbers = np.flatnonzero(np.isfinite(near))
+        self.vertices, faces = np.unique(obstacle.faces[self.numbers], return_inverse=True)
+        self.faces = np.ascontiguousarray(faces.reshape(-1, 3))
+        self.centroids = np.ascontiguousarray(centroids[self.numbers])
+        self.adjacency = triangle_adjacency(self.faces)
+        self.tree = FaceTree(self.faces, self.centroids)
+
+    def posed(self, positions: np.ndarray) -> np.ndarray:
+        """Its own vertices among those of the body."""
+        return positions[self.vertices]
+
+
+class _Anchors:
+    """The place of each of S samples on the patch."""
+
+    def __init__(self, home: np.ndarray, rest_points: np.ndarray | None) -> None:
+        count = len(home)
+        self.rest_points = rest_points
+        self.home = np.ascontiguousarray(home)
+        near = cKDTree(home).query(home, k=min(NEIGHBOURS + 1, count))[1].reshape(count, -1)
+        self.neighbours = np.ascontiguousarray(near[:, 1:])
+        self._order = by_cells(home)
+        self._led: dict[int, bool] = {}
+        self.barycentric, self.closest = np.zeros((count, 3)), np.zeros((count, 3))
+        self.distance = np.zeros(count)
+        self.forget()
+
+    def leads(self, other: _Anchors) -> bool:
+        """Whether the other's samples are the first of these."""
+        if id(other) not in self._led:
+            first = self.home[: len(other.home)]
+            self._led[id(other)] = other is not self and np.array_equal(first, other.home)
+        return self._led[id(other)]
+
+    def forget(self) -> None:
+        self.faces = np.full(len(self.home), -1)
+        self.frame = -9  # that the places belong to
+        self.turn = 0
+
+    def follow(
+        self,
+        points: np.ndarray,
+        frame: int,
+        patch: _Patch,
+        vertices: np.ndarray,
+        region: float,
+        reach: np.ndarray | None = None,
+    ) -> None:
+        """Take the places to the samples' at points (S, 3) [m], the body's vertices (B, 3) at `frame`.
+
+        reach: (S,) [m] within which no surface is missed by a sample whose own place is farther away.
+        """
+        if frame not in (self.frame, self.frame + 1):
+            self.search(self._order, points, patch, region)
+            return
+        limit = np.inf if self.rest_points is None else region * region
+        state = self.faces, self.barycentric, self.closest, self.distance
+        skin = vertices, patch.faces, patch.adjacency, patch.centroids
+        _slide(points, self.turn, *skin, self.home, limit, *state)
+        groups = np.arange(-(-len(points) // GROUP))[self.turn :: ROTATION]
+        which = (GROUP * groups[:, None] + np.arange(GROUP)).ravel()
+        self.search(self._order[which[which < len(points)]], points, patch, region)
+        if reach is not None:
+            far = self._order[(self.distance > reach)[self._order]]
+            self.search(far, points, patch, region, reach)
+        self.turn = (self.turn + 1) % ROTATION
+        _ask_neighbours(points, self.neighbours, *skin, self.home, limit, *state)
+
+    def search(
+        self,
+        which: np.ndarray,
+        points: np.ndarray,
+        patch: _Patch,
+        region: float,
+        reach: np.ndarray | None = None,
+    ) -> None:
+        """Exact closest points for some samples; with a reach (S,) [m], for those that have one within it."""
+        if not len(which):
+            return
+        rest = None if self.rest_points is None else self.rest_points[which]
+        hints: Any = self.faces[which]
+        found = patch.tree.nearest(
+            points[which],
+            hints=None if (hints < 0).any() else hints,
+            rest_points=rest,
+            region=region,
+            reach=None if reach is None else reach[which],
+            sequence=np.arange(len(which)),
+        )
+        known = found.faces >= 0
+        which = which[known]
+        self.faces[which] = found.faces[known]
+        self.barycentric[which], self.closest[which] = found.barycentric[known], found.points[known]
+        self.distance[which] = np.linalg.norm(points[which] - self.closest[which], axis=1)
+
+
+@njit(cache=True, inline="always")
+def _set(s, points, face, v, w, vertices, faces, barycentric, closest):
+    """Put the place of sample s on a face; returns its distance."""
+    u, squared = 1.0 - v - w, 0.0  # weights are rounded to float32, their sum is not
+    barycentric[s, 0], barycentric[s, 1], barycentric[s, 2] = u, v, w
+    i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+    for c in range(3):
+        closest[s, c] = u * vertices[i, c] + v * vertices[j, c] + w * vertices[k, c]
+        squared += (points[s, c] - closest[s, c]) ** 2
+    return np.sqrt(squared)
+
+
+@njit(cache=True, error_model="numpy")
+def _slide(
+    points, turn, vertices, faces, adjacency, centroids, home, reach, anchors, barycentric, closest, distance
+):
+    corners = np.empty((1, 3, 3))
+    for s in range(len(points)):
+        if distance[s] > FAR and (s + turn) % SELDOM != 0:
+            v, w = barycentric[s, 1], barycentric[s, 2]
+            distance[s] = _set(s, points, anchors[s], v, w, vertices, faces, barycentric, closest)
+            if distance[s] > FAR:
+                continue
+        face, v, w = walk_to_foot(
+            points[s, 0], points[s, 1], points[s, 2], np.uint32(anchors[s]), vertices, faces, adjacency,
+            centroids, home[s], reach, corners,
+        )  # fmt: skip
+        anchors[s] = face
+        distance[s] = _set(s, points, face, v, w, vertices, faces, barycentric, closest)
+
+
+@njit(cache=True, error_model="numpy")
+def _ask_neighbours(
+    points, neighbours, vertices, faces, adjacency, centroids, home, reach, anchors, barycentric, closest,
+    distance,
+):  # fmt: skip
+    """Let samples that are too far try the faces of their neighbours."""
+    corners = np.empty((1, 3, 3))
+    for _ in range(SWEEPS):
+        for s in range(len(points)):
+            for n in neighbours[s]:
+                excess = distance[s] - distance[n] - SLACK
+                if excess <= 0.0:
+                    continue
+                apart = 0.0
+                for c in range(3):
+                    apart += (points[s, c] - points[n, c]) ** 2
+                if excess * excess <= apart:
+                    continue
+                squared = 0.0
+                for c in range(3):
+                    squared += (centroids[anchors[n], c] - home[s, c]) ** 2
+                if squared > reach:
+                    continue
+                face, v, w = walk_to_foot(
+                    points[s, 0], points[s, 1], points[s, 2], np.uint32(anchors[n]), vertices, faces,
+                    adjacency, centroids, home[s], reach, corners,
+                )  # fmt: skip
+                before = barycentric[s, 1], barycentric[s, 2]
+                tried = _set(s, points, face, v, w, vertices, faces, barycentric, closest)
+                if tried < distance[s]:
+                    anchors[s], distance[s] = face, tried
+                else:
+                    _set(s, points, anchors[s], before[0], before[1], vertices, faces, barycentric, closest)
+
+
+@njit(cache=True)
+def _gaps(points, closest, normals):
+    gaps = np.empty(len(points))
+    for s in range(len(points)):
+        gap = 0.0
+        for c in range(3):
+            gap += normals[s, c] * (points[s, c] - closest[s, c])
+        gaps[s] = gap
+    return gaps

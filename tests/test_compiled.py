@@ -1,0 +1,235 @@
+"""The compiled solver beside what it approximates: energies, factor, iterations, planes, whole roll-outs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from meshes import box, patch
+from tasks_by_hand import small_scene
+
+from benchmarks.scenes.sheet import square_sheet
+from benchmarks.scenes.sheet_on_sphere import sphere
+from reference_sim import Cloth, Material, Obstacle, Potential, simulate
+from reference_sim.compiled import CompiledLBFGS, SlidingObstacle
+from reference_sim.compiled.iteration import evaluate
+from reference_sim.compiled.scalar_factor import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.compiled.sliding_obstacle import ROTATION
+from reference_sim.energies import (
+    AreaBarrier,
+    BendHinge,
+    ContactPenalty,
+    Gravity,
+    Inertia,
+    Step,
+    StretchStVK,
+)
+from reference_sim.minimise import LBFGS
+
+DT = 1 / 30
+
+
+def pressed(seed: int, *, pins: tuple[int, ...] = (0, 6)) -> tuple[Potential, np.ndarray]:
+    """All terms in the midst of a step, a moving sheet pressed into a sphere; its guess."""
+    positions, faces = square_sheet(9, 0.3)
+    positions[:, 1] += 0.098
+    cloth = Cloth(positions, faces, Material(), pins=pins)
+    angles = np.random.default_rng(seed).uniform(-1, 1, len(cloth.hinges))
+    terms = [StretchStVK(cloth), BendHinge(cloth, rest_angles=angles), Gravity(cloth), ContactPenalty(cloth)]
+    potential = Potential([*terms, Inertia(cloth, DT)])
+    velocity = np.random.default_rng(seed + 1).normal(0, 0.2, positions.shape)
+    velocity[cloth.pins] = 0.0
+    guess = positions + DT * velocity
+    potential.prepare(Step(positions, velocity, guess, DT, Obstacle(*sphere(0.1, 12))))
+    return potential, guess
+
+
+def in_float32(solver: CompiledLBFGS, x0: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Energies and gradient of the compiled kernels at x0 + u."""
+    solver.max_iterations = 0
+    solver.minimise(x0)  # freezes edges and planes at x0
+    energies, gradient = np.zeros(5), np.empty(u.size, np.float32)
+    target = (solver._terms.inertia.x_hat - x0).astype(np.float32).ravel()
+    evaluate(
+        u.astype(np.float32).ravel(), target, solver._vertices, solver._membrane, solver._lame, solver._hinges,
+        solver._frozen_contact(x0, target), gradient, solver._scratch, energies,
+    )  # fmt: skip
+    return energies, gradient.reshape(u.shape)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("size", [0.0, 1e-3, 2e-2])
+def test_each_energy_and_its_gradient_is_that_of_its_definition(seed, size):
+    potential, x0 = pressed(seed)
+    u = np.random.default_rng(seed).normal(0, size, x0.shape).astype(np.float32).astype(float)
+    energies, gradient = in_float32(CompiledLBFGS(potential, max_iterations=1), x0, u)
+    values, gradients = zip(*(energy.value_and_gradient(x0 + u) for energy in potential.energies))
+    names = [energy.name for energy in potential.energies]
+    value = dict(zip(names, values))
+    weight = potential.cloth.masses * 9.81
+    value["gravity"] = float(weight @ u[:, 1])  # from x0 on
+    assert value["collision"] > 0
+    order = ("inertia", "gravity", "strain", "bending", "collision")
+    for name, found in zip(order, energies):
+        assert found == pytest.approx(value[name], rel=2e-5, abs=1e-9), name
+    whole = sum(gradients)
+    whole[potential.cloth.pins] = 0.0
+    assert np.abs(gradient - whole).max() < 3e-6 * np.abs(whole).max()
+
+
+@pytest.mark.parametrize("degrees", [-179.9, -120, -60, -1e-3, 0, 1e-3, 44, 46, 89, 91, 150, 179.9])
+def test_a_hinge_has_its_angle_all_the_way_round(degrees):
+    angle = np.radians(degrees)
+    x = np.array([[0, 0, 0], [1, 0, 0], [0.3, 0, 0.8], [0.6, -0.7 * np.sin(angle), -0.7 * np.cos(angle)]])
+    cloth = Cloth(
+        np.array([[0, 0, 0], [1, 0, 0], [0.3, 0, 0.8], [0.6, 0, -0.7]]), np.array([[0, 2, 1], [0, 1, 3]])
+    )
+    potential = Potential([BendHinge(cloth), Inertia(cloth, DT)])
+    energies, gradient = in_float32(CompiledLBFGS(potential, max_iterations=1), x, np.zeros_like(x))
+    value, exact = potential.energies[0].value_and_gradient(x)
+    stiffness = potential.energies[0].stiffness[0]
+    assert value == pytest.approx(0.5 * stiffness * angle**2, rel=1e-9, abs=1e-20)
+    assert energies[3] == pytest.approx(value, rel=1e-6, abs=1e-13 * stiffness)
+    inertia = potential.energies[1].value_and_gradient(x)[1]
+    assert np.abs(gradient - exact - inertia).max() < 1e-5 * max(np.abs(exact + inertia).max(), stiffness)
+
+
+@pytest.mark.parametrize("cells, pinned", [(2, 0), (6, 0), (6, 5)])
+def test_the_factor_solves(cells, pinned):
+    rng = np.random.default_rng(cells + pinned)
+    positions, faces = patch(cells, cells)
+    number = np.full(len(positions), -1)
+    free = np.sort(rng.permutation(len(positions))[pinned:])
+    number[free] = np.arange(len(free))
+    stencils, n = number[faces], len(free)
+    pattern = ScalarPattern(n, [stencils])
+    parts = rng.normal(size=(len(faces), 3, 3))
+    parts = parts @ parts.transpose(0, 2, 1)
+    dense, values = np.eye(n), np.zeros(pattern.entries)
+    values[len(pattern.row_columns) :] = 1.0
+    for stencil, part in zip(stencils, parts):
+        kept = stencil >= 0
+        dense[np.ix_(stencil[kept], stencil[kept])] += part[np.ix_(kept, kept)]
+    places = pattern.places(stencils)
+    np.add.at(values, places[places >= 0], parts[places >= 0])
+    L, D, b = np.empty(len(pattern.rows)), np.empty(n), np.zeros((n, WIDTH))
+    structure = (
+        pattern.row_starts, pattern.row_columns, pattern.factor_rows, pattern.factor_columns, pattern.starts,
+        pattern.rows,
+    )  # fmt: skip
+    room = np.zeros(n), np.empty(n, np.int64)
+    assert factorise(values, *structure, L, D, *room)
+    right = rng.normal(size=(n, 3))
+    b[:, :3] = right[pattern.order]
+    solve(pattern.starts, pattern.rows, L, D, b)
+    solution = np.empty_like(right)
+    solution[pattern.order] = b[:, :3]
+    assert np.abs(dense @ solution - right).max() < 1e-10
+    values[len(pattern.row_columns) :] -= 100.0
+    assert not factorise(values, *structure, L, D, *room)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("iterations", [1, 5, 10])
+def test_iterations_are_those_of_the_exact_solver(seed, iterations):
+    potential, guess = pressed(seed)
+    exact = LBFGS(potential, max_iterations=iterations, finish=False, switch=1e-9).minimise(guess)
+    found = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
+    assert found.iterations == iterations == exact.iterations and found.status == "max_iterations"
+    start, reached = potential.value(guess), potential.value(found.positions)
+    assert start - reached == pytest.approx(start - exact.energy, rel=2e-3)
+    assert np.abs(found.positions - exact.positions).max() < 0.02 * np.abs(exact.positions - guess).max()
+    assert np.array_equal(found.positions[potential.cloth.pins], guess[potential.cloth.pins])
+    assert found.terms == pytest.approx(potential.terms(found.positions), rel=1e-4, abs=1e-8)
+
+
+def test_many_iterations_end_at_the_minimum():
+    potential, guess = pressed(5)
+    found = CompiledLBFGS(potential, max_iterations=400).minimise(guess)
+    least = LBFGS(potential).minimise(guess)
+    assert least.status == "converged"
+    assert potential.value(found.positions) - least.energy < 1e-6 * (potential.value(guess) - least.energy)
+
+
+def test_what_it_has_no_kernel_for_is_refused_by_name():
+    potential, _ = pressed(0)
+    cloth = potential.cloth
+    with pytest.raises(ValueError, match="area_barrier"):
+        CompiledLBFGS(Potential([AreaBarrier(cloth), Inertia(cloth, DT)]), max_iterations=5)
+    with pytest.raises(ValueError, match="inertia"):
+        CompiledLBFGS(Potential([StretchStVK(cloth)]), max_iterations=5)
+
+
+def test_energies_that_are_no_numbers_are_a_recorded_failure():
+    potential, guess = pressed(0)
+    guess[40] = 1e30
+    result = CompiledLBFGS(potential, max_iterations=5).minimise(guess)
+    assert result.status == "diverged"
+
+
+def two_boxes(way: float, frames: int) -> Obstacle:
+    """A slab below, and a box that comes down on it from above."""
+    low, faces = box((-0.5, -0.1, -0.5), (0.5, 0.0, 0.5))
+    high, _ = box((-0.1, 0.3, -0.1), (0.1, 0.5, 0.1))
+    both = np.concatenate([faces, faces + len(low)])
+    steps = np.linspace(0, way, frames)
+    return Obstacle(
+        np.stack([np.concatenate([low, high - [0, step, 0]]) for step in steps]), both
+    )
+
+
+def test_a_limb_that_comes_near_is_found_by_the_rotation_and_told_to_neighbours():
+    frames = 40
+    exact = two_boxes(0.28, frames)
+    sliding = SlidingObstacle(exact)
+    points, _ = square_sheet(20, 0.16)
+    points[:, 1] += 0.05 - points[:, 1].mean()
+    late = []
+    for frame in range(frames):
+        near = exact.planes(points, frame)
+        found = sliding.planes(points, frame)
+        distance = [np.linalg.norm(points - planes.points, axis=1) for planes in (near, found)]
+        assert (distance[1] >= distance[0] - 1e-9).all()
+        late.append(int((distance[1] > distance[0] + 1e-3).sum()))
+    assert max(late) > 0  # it is an approximation,
+    assert late[-1] == 0 and max(np.convolve(np.array(late) > 0, np.ones(ROTATION + 1))) <= ROTATION
+
+
+def test_a_rigid_motion_is_followed_exactly_and_repeated_to_the_bit():
+    body, faces = sphere(0.1, 16)
+    turns = np.linspace(0, 2.0, 30)
+    positions = np.stack([
+        body @ np.array([[np.cos(t), 0, np.sin(t)], [0, 1, 0], [-np.sin(t), 0, np.cos(t)]]) + [t, 0, 0]
+        for t in turns
+    ])  # fmt: skip
+    exact, sliding = Obstacle(positions, faces), SlidingObstacle(Obstacle(positions, faces))
+
+    def carried(obstacle):
+        x = np.random.default_rng(0).normal(size=(200, 3))
+        x *= 0.103 / np.linalg.norm(x, axis=1, keepdims=True)
+        x += positions[0].mean(axis=0)
+        for frame in range(1, len(turns)):
+            x = obstacle.transported(x, frame)
+            obstacle.planes(x, frame)
+        return x
+
+    first = carried(sliding)
+    assert np.abs(first - carried(exact)).max() < 1e-9
+    sliding.start_again()
+    assert np.array_equal(first, carried(sliding))
+
+
+@pytest.mark.parametrize("name", ["hanging_sheet", "sheet_on_sphere", "flag"])
+def test_whole_roll_outs_stay_beside_the_exact_ones(name):
+    scene = small_scene(name, cells=10, frames=25)
+    common = {
+        "dt": scene.dt, "frames": scene.frames, "start": scene.start, "velocity": scene.start_velocity,
+        "pin_positions": scene.pin_positions, "max_iterations": 20,
+    }  # fmt: skip
+    exact = simulate(
+        scene.cloth, scene.energies, obstacle=scene.obstacle, method="lbfgs", finish=False, **common
+    )
+    sliding = None if scene.obstacle is None else SlidingObstacle(scene.obstacle)
+    found = simulate(scene.cloth, scene.energies, obstacle=sliding, method=CompiledLBFGS, **common)
+    assert found.frames == exact.frames == 25
+    span = np.abs(exact.positions - exact.positions[0]).max()
+    assert np.abs(found.positions - exact.positions).max() < 0.05 * span
