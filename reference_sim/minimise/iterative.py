@@ -17,8 +17,8 @@ import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
 from ..linear_solver import analyse
-from ..obstacle import vertex_normals
 from ..potential import Potential
+from ..surface import vertex_normals
 from .descent import mean_weight
 from .factorised import FactorisedHessian
 from .lbfgs_history import dot
