@@ -6,9 +6,9 @@ resists there. So the normals get the true Hessian among themselves. Cloth that 
 the steps, crumpled cloth up to as many.
 
 How exactly a system is solved follows from the size of its right-hand side (Nocedal and Wright 2006,
-algorithm 7.1). A direction of negative curvature ends a solve: the matrix is not positive definite. That it
-is, nothing proves but a factorisation. Lanczos' method from a random start, which finds the ends of the
-spectrum first, estimates the lowest curvature.
+algorithm 7.1). A direction of negative curvature ends a solve, and what was found until then goes down all
+the same. That there is none, nothing proves but a factorisation: Lanczos' method from a random start, which
+finds the ends of the spectrum first, estimates the lowest curvature.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class ConjugateGradients:
     """H x = b from x = 0, a step at a time; its numbers are those of Lanczos' method for P^-1 H.
 
     Attributes:
-        x: (3n,) the solution so far.
+        x: (3n,) the solution so far; P^-1 b where the curvature along that is not positive.
         downward: (3n,) direction along which the curvature is not positive, once one was met.
         residual: its norm in P^-1 as a share of that of b.
         lengths, ratios: of each step its length along p, and the residual's square over that before.
@@ -116,6 +116,7 @@ class ConjugateGradients:
         curvature = dot(self._p, product)
         if not curvature > 0:
             self.downward = self._p
+            self.x = self.x if self.lengths else self._p
             return False
         length = self._square / curvature
         self.x += length * self._p

@@ -215,11 +215,9 @@ class Run(FactorisedDescent):
         """-H^-1 g with the first projection, then shift, that makes H positive definite; its level."""
         shift = 0.0
         # A singular Hessian, as of cloth that may move rigidly, needs no projection. Inertia excludes it.
-        while (
-            p := self.newton_step(
-                data, shift or (self.hessian.tiny_shift(data) if self.hessian.static else 0.0)
-            )
-        ) is None:
+        while not self.factorise(
+            data, shift or (self.hessian.tiny_shift(data) if self.hessian.static else 0.0)
+        ):
             if projection + 1 < len(CONVEXITY):
                 projection += 1
                 data = self.assemble(CONVEXITY[projection])
@@ -227,14 +225,8 @@ class Run(FactorisedDescent):
                 return np.full_like(self.g, np.nan), projection
             else:
                 shift = max(4 * shift, 1.0)
-        return p, projection
-
-    def newton_step(self, data: np.ndarray, shift: float | np.ndarray) -> np.ndarray | None:
-        """-(H + shift M/dt^2)^-1 g (3n,); None where that is found not to be positive definite."""
-        if not self.factorise(data, shift):
-            return None
         p = self.solve(-self.g)
-        return p if self.hessian.downward is None else None
+        return p, projection
 
     def line_search_step(self, projection: int, predicted: bool) -> bool:
         """One step by line search, at rising projection levels, then with rising shifts, until there is one.
@@ -246,8 +238,8 @@ class Run(FactorisedDescent):
         if projection == len(CONVEXITY):
             projection, shift = projection - 1, 1.0
         while shift <= MAX_SHIFT:
-            p = self.newton_step(self.assemble(CONVEXITY[projection]), shift)
-            if p is not None:
+            if self.factorise(self.assemble(CONVEXITY[projection]), shift):
+                p = self.solve(-self.g)
                 slope = dot(self.g, p)
                 if np.isfinite(slope) and slope < 0 and self.line_search(p, slope):
                     self.projection_level, self.raised = projection, projection > first
