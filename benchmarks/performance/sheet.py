@@ -90,10 +90,11 @@ def frames(settings: Settings, *, side: int) -> dict[str, float]:
 
 def scaling(settings: Settings, *, side: int, frames: int) -> dict[str, float]:
     """Cost of an iteration over the first frames of the fall, by L-BFGS alone and by Newton's method."""
-    cloth, smallest = regular_sheet(side), regular_sheet(SMALLEST)
+    smallest = regular_sheet(SMALLEST)
     iteration_seconds(smallest, LBFGS, 1, 1)  # compiles
     base = peak_memory()
     small = iteration_seconds(smallest, LBFGS, 1, settings.repeats)
+    cloth = regular_sheet(side)
     lbfgs = iteration_seconds(cloth, LBFGS, 1, settings.repeats)
     memory = peak_memory() - base
     iteration_seconds(regular_sheet(4), {}, 1, 1)
