@@ -324,10 +324,10 @@ def test_no_matrix_is_factorised_twice_and_no_step_measured_twice():
 def test_without_a_preconditioner_newton_takes_over_at_once():
     potential, x = hanging()
     minimiser = make_minimiser(potential, "lbfgs")
-    minimiser._solver.factorise = lambda data: False
+    minimiser.preconditioner.factorise = lambda data: False
     assert_minimum(potential, x, minimiser.minimise(x))
     alone = make_minimiser(potential, "lbfgs", finish=False)
-    alone._solver.factorise = lambda data: False
+    alone.preconditioner.factorise = lambda data: False
     assert alone.minimise(x).status == "stalled"
 
 

@@ -49,6 +49,9 @@ METRICS = (
     *_metrics(
         _metric("iteration", "ms", "Iteration", "time of an iteration of Newton's method"),
         _metric("iteration_per_vertex", "us", "Per vertex", "the same over the number of vertices"),
+        _metric("lbfgs_iteration", "ms", "L-BFGS", "time of an iteration of L-BFGS alone"),
+        _metric("lbfgs_slope", "1", "Slope", "its log-log slope over vertices, from 32 x 32 on"),
+        _metric("lbfgs_memory", "kB", "A vertex", "most memory of cloth and L-BFGS together, a vertex"),
         table="scaling",
     ),
     *_metrics(

@@ -29,14 +29,14 @@ SIMULATOR = (
     *(
         Microbenchmark(
             name=f"scaling/{side}x{side}",
-            description=f"an iteration of Newton's method, and memory, of {side * side} vertices",
+            description=f"an iteration of L-BFGS and of Newton's method, memory: {side * side} vertices",
             module=f"{_HERE}.sheet",
             function="scaling",
-            options={"side": side},
+            options={"side": side, "frames": frames},
             repeats=repeats,
             smoke=side == 32,
         )
-        for side, repeats in ((32, 5), (64, 5), (128, 5), (256, 3))
+        for side, frames, repeats in ((32, 4, 5), (64, 4, 5), (128, 4, 5), (256, 4, 3), (512, 1, 1))
     ),
     *(
         Microbenchmark(

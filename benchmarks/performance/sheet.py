@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +14,12 @@ from reference_sim import Cloth, Material, Potential, Result
 from reference_sim.energies import BendHinge, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import Minimiser, make_minimiser
 
+from ..memory import peak_memory
 from .microbenchmark import Settings
 
 FRAMES = 30
-FIRST_FRAMES = 4  # of the fall, for the cost of an iteration
+LBFGS = {"method": "lbfgs", "finish": False, "max_iterations": 30}  # alone, as many iterations at every size
+SMALLEST = 32  # vertices a side: from there slopes are taken
 DT = 1 / 30
 NOISE = 1e-4  # [m] of the flat start, which would otherwise be a saddle
 
@@ -34,11 +39,12 @@ class Fall:
     """Backward Euler from a flat start moved by noise; every step gives its Result and time."""
 
     cloth: Cloth
+    options: Mapping[str, Any] = field(default_factory=dict)  # of the minimiser
 
     def __post_init__(self) -> None:
         cloth = self.cloth
         self.potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), Inertia(cloth, DT)])
-        self.minimiser: Minimiser = make_minimiser(self.potential, "newton")
+        self.minimiser: Minimiser = make_minimiser(self.potential, **self.options)
         self.x = cloth.rest_positions + np.random.default_rng(0).normal(0, NOISE, cloth.rest_positions.shape)
         self.x[cloth.pins] = cloth.rest_positions[cloth.pins]
         self.v = np.zeros_like(self.x)
@@ -82,18 +88,35 @@ def frames(settings: Settings, *, side: int) -> dict[str, float]:
     }
 
 
-def scaling(settings: Settings, *, side: int) -> dict[str, float]:
-    """Cost of an iteration over the first frames of the fall, in all and per vertex."""
+def scaling(settings: Settings, *, side: int, frames: int) -> dict[str, float]:
+    """Cost of an iteration over the first frames of the fall, by L-BFGS alone and by Newton's method."""
+    smallest = regular_sheet(SMALLEST)
+    iteration_seconds(smallest, LBFGS, 1, 1)  # compiles
+    base = peak_memory()
+    small = iteration_seconds(smallest, LBFGS, 1, settings.repeats)
     cloth = regular_sheet(side)
-    Fall(regular_sheet(4)).step()  # compiles
-    costs = []
-    for _ in range(settings.repeats):
-        fall = Fall(cloth)
-        steps = [fall.step() for _ in range(FIRST_FRAMES)]
-        costs.append(sum(s for _, s in steps) / sum(r.iterations for r, _ in steps))
-    iteration = float(np.median(costs))
-    return {
+    lbfgs = iteration_seconds(cloth, LBFGS, 1, settings.repeats)
+    memory = peak_memory() - base
+    iteration_seconds(regular_sheet(4), {}, 1, 1)
+    newton = iteration_seconds(cloth, {}, frames, settings.repeats)
+    found = {
         "vertices": cloth.vertex_count,
-        "iteration": 1e3 * iteration,
-        "iteration_per_vertex": 1e6 * iteration / cloth.vertex_count,
+        "iteration": 1e3 * newton,
+        "iteration_per_vertex": 1e6 * newton / cloth.vertex_count,
+        "lbfgs_iteration": 1e3 * lbfgs,
     }
+    ratio = cloth.vertex_count / smallest.vertex_count
+    if ratio > 1:
+        found["lbfgs_slope"] = math.log(lbfgs / small) / math.log(ratio)
+        found["lbfgs_memory"] = 1e3 * memory / cloth.vertex_count
+    return found
+
+
+def iteration_seconds(cloth: Cloth, options: Mapping[str, Any], frames: int, repeats: int) -> float:
+    """Time of an iteration [s] over the first frames of the fall; the median of repeats."""
+    costs = []
+    for _ in range(repeats):
+        fall = Fall(cloth, options)
+        steps = [fall.step() for _ in range(frames)]
+        costs.append(sum(seconds for _, seconds in steps) / sum(result.iterations for result, _ in steps))
+    return float(np.median(costs))

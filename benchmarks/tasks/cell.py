@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..memory import peak_memory
 from ..method import Method, MethodEntry
 from ..results import RunFolder
 from ..scene import BuiltScene, Scene
@@ -284,24 +285,6 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
     return status, reason
-
-
-def peak_memory() -> float:
-    """Most memory that this process has held at once [MB].
-
-    Linux keeps it per memory image; ru_maxrss there would still hold what the parent had before this process
-    loaded its own program.
-    """
-    import resource
-
-    try:
-        for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
-            if line.startswith("VmHWM:"):
-                return float(line.split()[1]) * 1024 / 1e6
-    except OSError:
-        pass  # not Linux
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak * (1 if sys.platform == "darwin" else 1024) / 1e6
 
 
 def loaded() -> list[str]:

@@ -30,11 +30,18 @@ def convergence_check(
         why = f"round-off: residual {residual:.1e} above tolerance {tolerance:.1e}"
     if run.factorise(data, run.hessian.tiny_shift(data)):
         step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
-        if step <= step_tolerance or residual == 0.0:
-            return replace(run.result("converged", f"{why}, Newton step {step:.1e} m"), relaxed=relaxed)
-        if not run.factorise(data, 0.0):  # no step along such a direction can be told from another
-            return replace(run.result("converged", f"{why}, a direction without curvature"), relaxed=relaxed)
-        return None
+        small = step <= step_tolerance or residual == 0.0
+        if small and run.hessian.downward is None:
+            run.look_for_negative_curvature()
+        if run.hessian.downward is None:
+            if not small and run.factorise(data, 0.0):
+                return None
+            # Without curvature no step can be told from another.
+            found = f"Newton step {step:.1e} m" if small else "a direction without curvature"
+            why = f"{why}, {found}{run.hessian.evidence}"
+            if not run.hessian.settled:
+                return run.result("stalled", why)
+            return replace(run.result("converged", why), relaxed=relaxed)
     if escape_saddle(run, data, FIRST_ESCAPE * step_tolerance):
         run.iterations += 1
         run.show()
@@ -43,19 +50,14 @@ def convergence_check(
 
 
 def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bool:
-    """Step along the most negative curvature direction, found by inverse iteration.
+    """Step along a direction of negative curvature: the one that was met, or else the most negative one.
 
     length: of the first step tried [m].
     """
-    shift = 1.0
-    while not run.factorise(data, shift):
-        shift *= 4
-        if shift > LAST_SHIFT:
-            return False
-    v = np.random.default_rng(0).standard_normal(len(run.g))
-    for _ in range(POWER):
-        v = run.solve(run.hessian.metric * v)
-        v /= np.abs(v).max()
+    met = run.hessian.downward
+    v = most_negative(run, data) if met is None else met / np.abs(met).max()
+    if v is None:
+        return False
     v *= -1.0 if dot(v, run.g) > 0 else 1.0
     step = run.spread(length * v)
     scale = run.potential.largest_step(run.x, step)
@@ -67,3 +69,20 @@ def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bo
             return True
         scale *= 0.5
     return False
+
+
+def most_negative(run: FactorisedDescent, data: np.ndarray) -> np.ndarray | None:
+    """The direction (3n,) of most negative curvature, by inverse iteration; None if no shift outdoes it."""
+    shift = 1.0
+    while not run.factorise(data, shift):
+        shift *= 4
+        if shift > LAST_SHIFT:
+            return None
+    v = np.random.default_rng(0).standard_normal(len(run.g))
+    for _ in range(POWER):
+        v = run.solve(run.hessian.metric * v)
+        met = run.hessian.downward
+        v = v / np.abs(v).max() if met is None else met / np.abs(met).max()
+        if met is not None:
+            break
+    return v

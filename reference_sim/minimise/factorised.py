@@ -23,7 +23,12 @@ class FactorisedHessian:
         flat: curvature [N/m] below which a direction gains less than the tolerance over the cloth's
             width.
         static: whether the potential has no inertia, so that rigid motions may have no curvature.
+        downward: (3n,) direction along which the last solve or look met no positive curvature, if any.
+        settled, evidence: whether the last look for negative curvature came to an end, and what it found.
     """
+
+    downward: np.ndarray | None = None
+    settled, evidence = True, ""
 
     def __init__(self, potential: Potential, *, tolerance: float, reference_dt: float) -> None:
         cloth = potential.cloth
@@ -59,6 +64,13 @@ class FactorisedHessian:
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation: b (3n,)."""
         return self._solver.solve(b)
+
+    def precondition(self, r: np.ndarray) -> np.ndarray:
+        """A first guess (3n,) of the solution for r (3n,): here the solution."""
+        return self.solve(r)
+
+    def look_for_negative_curvature(self) -> None:
+        """Nothing to look for: the last factorisation was proof of none."""
 
     def stiffest(self, data: np.ndarray) -> float:
         """Largest entry of the diagonal [N/m]."""
@@ -107,3 +119,16 @@ class FactorisedDescent(Descent):
         x = self.hessian.solve(b)
         self.seconds["solve"] += time.perf_counter() - start
         return x
+
+    def precondition(self, r: np.ndarray) -> np.ndarray:
+        """As the Hessian's."""
+        start = time.perf_counter()
+        x = self.hessian.precondition(r)
+        self.seconds["solve"] += time.perf_counter() - start
+        return x
+
+    def look_for_negative_curvature(self) -> None:
+        """As the Hessian's."""
+        start = time.perf_counter()
+        self.hessian.look_for_negative_curvature()
+        self.seconds["solve"] += time.perf_counter() - start

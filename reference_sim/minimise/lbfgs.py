@@ -14,12 +14,12 @@ import time
 
 import numpy as np
 
-from ..linear_solver import analyse
 from ..potential import Potential
 from .descent import Descent, Observer
 from .lbfgs_history import LBFGSHistory
-from .newton import FIRST_SHIFT, Newton
+from .newton import Newton
 from .result import Result, check_tolerance
+from .scalar_preconditioner import ScalarPreconditioner
 
 SWITCH = 1.0  # relative residual
 
@@ -34,7 +34,7 @@ class LBFGS:
         switch: relative residual at which Newton takes over.
         patience: iterations after which it takes over in any case.
         finish: whether Newton takes over at all. Without it the result can only be "max_iterations",
-            "stalled" or "timeout": nothing but a factorised Hessian can say "converged".
+            "stalled" or "timeout": nothing but a look at the curvature can say "converged".
         timeout: seconds, for both together.
         observe: called with every point (V, 3) [m] that either of them kept, the start included.
 
@@ -55,7 +55,6 @@ class LBFGS:
         timeout: float = float("inf"),
         observe: Observer | None = None,
     ) -> None:
-        cloth = potential.cloth
         self.potential, self.memory, self.timeout = potential, memory, timeout
         check_tolerance(tolerance)
         self.observe = observe
@@ -63,10 +62,7 @@ class LBFGS:
         self.switch = max(switch, tolerance) if finish else tolerance
         if not any(energy.has_scalar_stiffness for energy in potential.energies):
             raise ValueError("LBFGS: no term of this potential has a scalar stiffness to precondition with")
-        self._pattern = potential.pattern(cloth.free, block=1)
-        self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
-        # Without inertia and pins rigid motions would leave the preconditioner singular.
-        self._floor = FIRST_SHIFT * cloth.masses[cloth.free] * 30**2
+        self.preconditioner = ScalarPreconditioner(potential)
         self._newton: Newton | None = None
         if finish:
             self._newton = Newton(
@@ -110,10 +106,9 @@ class _Run(Descent):
 
     def precondition(self) -> bool:
         start = time.perf_counter()
-        data = self.o._pattern.assemble(self.x)
-        data[self.o._pattern.diagonal] += self.o._floor
+        data = self.o.preconditioner.assemble(self.x)
         middle = time.perf_counter()
-        done = self.o._solver.factorise(data)
+        done = self.o.preconditioner.factorise(data)
         self.factorisations += 1
         self.seconds["assemble"] += middle - start
         self.seconds["factorise"] += time.perf_counter() - middle
@@ -121,6 +116,6 @@ class _Run(Descent):
 
     def solve(self, q: np.ndarray) -> np.ndarray:
         start = time.perf_counter()
-        p = self.o._solver.solve(q.reshape(-1, 3)).ravel()  # x, y and z share one matrix
+        p = self.o.preconditioner.solve(q)
         self.seconds["solve"] += time.perf_counter() - start
         return p

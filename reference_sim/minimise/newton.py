@@ -28,13 +28,11 @@ from ..potential import Potential
 from .convergence_check import convergence_check
 from .descent import Descent, Observer, approximate_wolfe, sufficient_decrease
 from .factorised import FactorisedDescent, FactorisedHessian
+from .iterative import LARGEST_FACTORISED, IterativeHessian
 from .lbfgs_history import LBFGSHistory, dot
 from .result import Result, check_tolerance
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
-# In units of M/dt^2. A static cloth that nothing holds needs a shift against its rigid motions alone; begun
-# at 1 instead, that shift slows the soft bending modes down ten times.
-FIRST_SHIFT = 1e-4
 MAX_SHIFT = 1e12  # beyond it a step is shorter than round-off
 STEP_TOLERANCE = 1e-3  # of a mean edge length
 WATCHDOG_AFTER = 20  # iterations: most steps of a garment are done by then, and sooner so
@@ -75,8 +73,10 @@ class Newton:
         check_tolerance(tolerance)
         self.potential, self.reuse, self.observe = potential, reuse, observe
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
-        self.first_level = len(CONVEXITY) - 1 if start_projected else 0
-        self.hessian = FactorisedHessian(potential, tolerance=tolerance, reference_dt=reference_dt)
+        small = 3 * int(potential.cloth.free.sum()) <= LARGEST_FACTORISED
+        kind = FactorisedHessian if small else IterativeHessian
+        self.hessian = kind(potential, tolerance=tolerance, reference_dt=reference_dt)
+        self.first_level = len(CONVEXITY) - 1 if start_projected and small else 0
         self.step_tolerance = STEP_TOLERANCE * float(potential.cloth.edge_lengths.mean())
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:
@@ -155,7 +155,7 @@ class Run(FactorisedDescent):
         """Quasi-Newton steps on the last factorisation, until a new one would serve better."""
         norms = [self.gradient_norm()]
         while norms[-1] > tolerance and self.iterations < self.n.max_iterations:
-            if self.late(self.n.timeout) or not self.quasi_newton_step(self.history, self.solve):
+            if self.late(self.n.timeout) or not self.quasi_newton_step(self.history, self.precondition):
                 return
             self.iterations += 1
             self.quasi_newton_steps += 1

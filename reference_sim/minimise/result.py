@@ -16,7 +16,8 @@ class Result:
     Attributes:
         positions: (V, 3) [m], the best found.
         status: one of STATUSES. "converged" means: gradient within tolerance, the unregularised Newton step
-            negligible, and no negative curvature left.
+            negligible, and no negative curvature left. A factorisation proves the last of these; of meshes
+            too large for one it is an estimate, and the reason says so.
         reason: one line in words.
         relaxed: whether round-off let a residual above the tolerance count as converged: see the reason.
         iterations, factorisations: counts.

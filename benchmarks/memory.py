@@ -1,0 +1,24 @@
+"""What a process has taken of the memory."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+
+def peak_memory() -> float:
+    """Most memory that this process has held at once [MB].
+
+    Linux keeps it per memory image; ru_maxrss there would still hold what the parent had before this process
+    loaded its own program.
+    """
+    import resource
+
+    try:
+        for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
+            if line.startswith("VmHWM:"):
+                return float(line.split()[1]) * 1024 / 1e6
+    except OSError:
+        pass  # not Linux
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak * (1 if sys.platform == "darwin" else 1024) / 1e6
