@@ -2,10 +2,8 @@
 
 The closed forms are those beside the definitions in `reference_sim.energies`; what differs is the order of
 the work. Training evaluates one mesh in some fifty configurations, so each element is worked out for LANES
-of them side by side: positions are laid out (configurations / LANES, V, 3, LANES), the innermost loop has a
-fixed length and no branch, and the compiler turns it into vector instructions. For 48 shirts of 1000
-vertices bending takes 1.7 instead of 6.4 ms and strain 0.8 instead of 1.6 on one core with AVX-512.
-tests/test_loss.py holds both to the definitions.
+of them side by side (snug.lanes): the innermost loop has a fixed length and no branch, and the compiler turns
+it into vector instructions. tests/test_loss.py holds them to the definitions.
 """
 
 from __future__ import annotations
@@ -18,8 +16,8 @@ import numpy as np
 
 from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
 from reference_sim.kernel_cache import njit
+from snug.lanes import LANES
 
-LANES = 16
 # No assumption on NaN or infinity: the guard of training must see them.
 FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -39,7 +37,7 @@ Kernel = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @lru_cache(maxsize=16)
 def batched_kernel(energy: Energy) -> Kernel | None:
-    """x (N, V, 3) float32 -> values (N,) [J], gradients (N, V, 3) [N] of this energy; None if it has none."""
+    """x (V, 3, C, LANES) float32 -> values (C, LANES) [J], gradients like x [N]; None if it has no kernel."""
     make = KERNELS.get(type(energy))
     return make(energy) if make else None
 
@@ -62,26 +60,20 @@ def _weight(energy: Any) -> Kernel:
 
     def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         gradients = np.zeros_like(x)
-        gradients[..., 1] = weights
-        return x[..., 1] @ weights - zero, gradients
+        gradients[:, 1] = weights[:, None, None]
+        heights = x[:, 1].reshape(len(x), -1)
+        return (weights @ heights - zero).reshape(x.shape[2:]), gradients
 
     return run
 
 
 def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Kernel:
-    stencils = stencils.astype(np.int32)
+    stencils = stencils.astype(np.uint32)  # for a signed index is first asked whether it counts from the end
 
     def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        count, vertices = len(x), x.shape[1]
-        blocks = -(-count // LANES)
-        if blocks * LANES > count:  # the last configuration fills the last block
-            x = np.concatenate([x, np.repeat(x[-1:], blocks * LANES - count, axis=0)])
-        laid = x.reshape(blocks, LANES, vertices, 3).transpose(0, 2, 3, 1).reshape(blocks, vertices, -1)
-        laid, values = np.ascontiguousarray(laid), np.empty((blocks, LANES), np.float32)
-        gradients = np.zeros_like(laid)
-        kernel(laid, stencils, *constants, values, gradients)
-        gradients = gradients.reshape(blocks, vertices, 3, LANES).transpose(0, 3, 1, 2)
-        return values.ravel()[:count], gradients.reshape(-1, vertices, 3)[:count]
+        values, gradients = np.empty(x.shape[2:], np.float32), np.zeros_like(x)
+        kernel(x, stencils, *constants, values, gradients)
+        return values, gradients
 
     return run
 
@@ -111,15 +103,17 @@ def _arctan2(y: np.float32, x: np.float32) -> np.float32:
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _take(x: np.ndarray, i: int, u: np.ndarray, corner: int) -> None:
-    for j in range(3 * LANES):
-        u[3 * LANES * corner + j] = x[i, j]
+def _take(x: np.ndarray, i: np.uint32, block: int, u: np.ndarray, corner: int) -> None:
+    for axis in range(3):
+        for n in range(LANES):
+            u[(3 * corner + axis) * LANES + n] = x[i, axis, block, n]
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _give(u: np.ndarray, corner: int, gradient: np.ndarray, i: int) -> None:
-    for j in range(3 * LANES):
-        gradient[i, j] += u[3 * LANES * corner + j]
+def _give(u: np.ndarray, corner: int, gradient: np.ndarray, i: np.uint32, block: int) -> None:
+    for axis in range(3):
+        for n in range(LANES):
+            gradient[i, axis, block, n] += u[(3 * corner + axis) * LANES + n]
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -134,12 +128,12 @@ def _bending(
     """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, see bend_hinge._half."""
     L = LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
-    for block in range(len(x)):
+    for block in range(x.shape[2]):
         total[:] = 0.0
         for h in range(len(hinges)):
             k, angle = stiffness[h], rest[h]
             for corner in range(4):
-                _take(x[block], hinges[h, corner], u, corner)
+                _take(x, hinges[h, corner], block, u, corner)
             for n in range(L):
                 ex, ey, ez = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
                 rx, ry, rz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
@@ -167,7 +161,7 @@ def _bending(
             for n in range(L):
                 total[n] += energy[n]
             for corner in range(4):
-                _give(u, corner, gradients[block], hinges[h, corner])
+                _give(u, corner, gradients, hinges[h, corner], block)
         values[block] = total
 
 
@@ -185,13 +179,13 @@ def _strain(
     """E = A (lambda/2 tr(G)^2 + mu tr(G^2)), dE/dx_a = A F S b_a, see stretch_stvk._gradient."""
     L = LANES
     u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)
-    for block in range(len(x)):
+    for block in range(x.shape[2]):
         total[:] = 0.0
         for f in range(len(faces)):
             d00, d01, d10, d11 = Dm_inverse[f, 0], Dm_inverse[f, 1], Dm_inverse[f, 2], Dm_inverse[f, 3]
             area = areas[f]
             for corner in range(3):
-                _take(x[block], faces[f, corner], u, corner)
+                _take(x, faces[f, corner], block, u, corner)
             for n in range(L):
                 ax, ay, az = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
                 bx, by, bz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
@@ -216,5 +210,5 @@ def _strain(
             for n in range(L):
                 total[n] += energy[n]
             for corner in range(3):
-                _give(u, corner, gradients[block], faces[f, corner])
+                _give(u, corner, gradients, faces[f, corner], block)
         values[block] = total

@@ -160,13 +160,14 @@ class ContactCache:
         *,
         walk: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Contact energy of garments x (N, V, 3) float32 [m] in frames (N,), with the planes of `planes`.
+        """Contact energy of garments x (V, 3, C, LANES) float32 [m] in frames (N,), lane by lane, with the
+        planes of `planes`.
 
-        -> values (N,) [J], gradients (N, V, 3) [N], float32. walk: anchors near the skin first walk to
-        where their samples are, and are remembered there. A sample that is out of reach costs no more than
-        the look at its anchor, and no plane is stored.
+        -> values (C, LANES) [J], gradients like x [N], float32; zero in lanes beyond the last frame. walk:
+        anchors near the skin first walk to where their samples are, and are remembered there. A sample that
+        is out of reach costs no more than the look at its anchor, and no plane is stored.
         """
-        values, gradients = np.empty(len(x), np.float32), np.zeros_like(x)
+        values, gradients = np.zeros(x.shape[2:], np.float32), np.zeros_like(x)
         contact_energy(
             x,
             *_samples(contact),

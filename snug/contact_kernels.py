@@ -2,13 +2,45 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 
 from reference_sim.kernel_cache import njit
 from reference_sim.obstacle import vertex_normals
+from snug.lanes import LANES
 from snug.surface_walk import walk_to_foot
 
 PARTS = 255.0  # of a barycentric coordinate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def rows_of_three(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
+    """u rows[i] + v rows[j] + w rows[k], three numbers; rows of three lie one after the other in a flat float32
+    array, and one number more after the last.
+
+    Each row is one load of four numbers, the compiler on its own makes three of it.
+    """
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        four, wide = ir.VectorType(ir.FloatType(), 4), ir.IntType(64)
+        start = context.make_array(signature.args[0])(context, builder, args[0]).data
+        total = None
+        for row, weight in zip(args[1:4], args[4:]):
+            place = builder.mul(builder.zext(row, wide), ir.Constant(wide, 3))
+            numbers = builder.load(builder.bitcast(builder.gep(start, [place]), four.as_pointer()), align=4)
+            spread = ir.Constant(four, ir.Undefined)
+            for n in range(4):
+                spread = builder.insert_element(spread, weight, ir.IntType(32)(n))
+            term = builder.fmul(spread, numbers, flags=("contract",))
+            total = term if total is None else builder.fadd(total, term, flags=("contract",))
+        parts = [builder.extract_element(total, ir.IntType(32)(n)) for n in range(3)]
+        return context.make_tuple(builder, signature.return_type, parts)
+
+    return types.UniTuple(types.float32, 3)(rows, i, j, k, u, v, w), built
 
 
 @njit(cache=True, error_model="numpy")
@@ -69,18 +101,17 @@ def _above(
     face: np.uint32,
     parts: np.ndarray,
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-    """Height of a sample above its anchor's plane, times the length of the normal; and that normal."""
+    """Height of a sample above its anchor's plane, times the length of the normal; and that normal.
+
+    skin, m: positions and normals of the body, flat as `rows_of_three` wants them.
+    """
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
     whole = np.float32(1.0) / np.float32(PARTS)
     v, w = whole * np.float32(parts[0]), whole * np.float32(parts[1])
     u = np.float32(1.0) - v - w
-    x0 -= u * skin[i, 0] + v * skin[j, 0] + w * skin[k, 0]
-    x1 -= u * skin[i, 1] + v * skin[j, 1] + w * skin[k, 1]
-    x2 -= u * skin[i, 2] + v * skin[j, 2] + w * skin[k, 2]
-    n0 = u * m[i, 0] + v * m[j, 0] + w * m[k, 0]
-    n1 = u * m[i, 1] + v * m[j, 1] + w * m[k, 1]
-    n2 = u * m[i, 2] + v * m[j, 2] + w * m[k, 2]
-    return n0 * x0 + n1 * x1 + n2 * x2, n0, n1, n2
+    c0, c1, c2 = rows_of_three(skin, i, j, k, u, v, w)
+    n0, n1, n2 = rows_of_three(m, i, j, k, u, v, w)
+    return n0 * (x0 - c0) + n1 * (x1 - c1) + n2 * (x2 - c2), n0, n1, n2
 
 
 # No assumption on NaN or infinity: the guard of training must see them.
@@ -92,30 +123,39 @@ def contact_energy(
     slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:  # fmt: skip
-    """k max(margin - d, 0)^power of each sample, summed: values (N,), and added up: gradients (N, V, 3).
+    """k max(margin - d, 0)^power of each sample, summed: values (C, LANES), and added up: gradients like x.
 
-    stencils, faces: uint32, for a signed index is first asked whether it counts from the end.
+    x (V, 3, C, LANES). stencils, faces: uint32, for a signed index is first asked whether it counts from the
+    end. Most samples are out of reach, and for them it is the loads that count: what they read of a frame is
+    first laid together.
     """
     # Normals have 127 times unit length, within 0.9 by rounding.
     reach = np.float32(128.0) * (margin + slack if walk else margin)
     zero, corners = np.float32(0.0), np.empty((1, 3, 3), np.float32)
-    for n in range(len(x)):
-        garment, gradient, skin, m = x[n], gradients[n], positions[rows[n]], normals[rows[n]]
+    size = positions.shape[1]
+    garment = np.zeros(3 * len(x) + 1, np.float32)
+    skin, m = np.zeros(3 * size + 1, np.float32), np.zeros(3 * size + 1, np.float32)
+    for n in range(len(frames)):
+        block, lane = n // LANES, n % LANES
+        for v in range(len(x)):
+            for c in range(3):
+                garment[3 * v + c] = x[v, c, block, lane]
+        skin[: 3 * size] = positions[rows[n]].ravel()
+        m[: 3 * size] = normals[rows[n]].ravel()
+        body = positions[rows[n]]
         anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
         total = 0.0
         for s in range(len(stencils)):
             face = np.uint32(anchors[s])
             a, b, c = stencils[s, 0], stencils[s, 1], stencils[s, 2]
             p, q, r = weights[s, 0], weights[s, 1], weights[s, 2]
-            x0 = p * garment[a, 0] + q * garment[b, 0] + r * garment[c, 0]
-            x1 = p * garment[a, 1] + q * garment[b, 1] + r * garment[c, 1]
-            x2 = p * garment[a, 2] + q * garment[b, 2] + r * garment[c, 2]
+            x0, x1, x2 = rows_of_three(garment, a, b, c, p, q, r)
             along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, face, parts[s])
             if along >= reach:
                 continue
             if walk and along < reach:  # not a sample that is no number
                 face, v, w = walk_to_foot(
-                    x0, x1, x2, face, skin, faces, adjacency, centroids, homes[s], region, corners
+                    x0, x1, x2, face, body, faces, adjacency, centroids, homes[s], region, corners
                 )
                 anchors[s] = face
                 parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))
@@ -132,7 +172,7 @@ def contact_energy(
             total += force * depth
             force *= -np.float32(power) / length
             for corner, share in ((a, p), (b, q), (c, r)):
-                gradient[corner, 0] += share * force * n0
-                gradient[corner, 1] += share * force * n1
-                gradient[corner, 2] += share * force * n2
-        values[n] = total
+                gradients[corner, 0, block, lane] += share * force * n0
+                gradients[corner, 1, block, lane] += share * force * n1
+                gradients[corner, 2, block, lane] += share * force * n2
+        values[block, lane] = total

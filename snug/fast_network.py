@@ -65,7 +65,7 @@ class FastGRU(torch.autograd.Function):
         ctx.layers = len(state)
         ends = torch.stack(last)
         ctx.mark_non_differentiable(ends)
-        return x.transpose(0, 1).contiguous(), ends
+        return x.transpose(0, 1), ends
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
@@ -128,19 +128,25 @@ def _cell_back(
 
 
 class FastLinear(torch.autograd.Function):
-    """apply(x (..., k), weight (m, k), bias (m,)) -> (..., m): nn.Linear by `product`."""
+    """apply(x (N, T, k), weight (m, k), bias (m,)) -> (N, T, m): nn.Linear by `product`, its result laid out
+    as (m, T, N), see snug.lanes.
+    """
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-        ctx.save_for_backward(x, weight)
-        return product(x.flatten(0, -2), weight, bias).view(*x.shape[:-1], -1)
+        count, frames = x.shape[:2]
+        rows = x.transpose(0, 1).flatten(0, 1)
+        ctx.save_for_backward(rows, weight)
+        y = product(weight, rows).add_(bias[:, None])
+        return y.view(-1, frames, count).permute(2, 1, 0)
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
-        x, weight = ctx.saved_tensors
-        y = above[0].flatten(0, -2)
-        to_x = product(y, weight.t()).view(x.shape)
-        return to_x, product(y.t(), x.flatten(0, -2).t()), y.sum(0)
+        rows, weight = ctx.saved_tensors
+        count, frames, _ = above[0].shape
+        y = above[0].permute(2, 1, 0).flatten(1)
+        to_x = product(y.t(), weight.t()).view(frames, count, -1).transpose(0, 1)
+        return to_x, product(y, rows.t()), y.sum(1)
 
 
 def run_gru(gru: nn.GRU, x: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor]:

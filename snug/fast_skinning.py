@@ -1,7 +1,8 @@
 """`snug.skinning.skin` in closed form for many frames of one garment: what training on a CPU runs.
 
-The transforms of all vertices are one matrix product, laid out (12, V) a frame, so that the loop over
-vertices is one of vector instructions. tests/test_skinning.py holds values and gradients to `skin`.
+Each vertex hangs on a few joints, and its transform is blended from those alone, for snug.lanes.LANES frames
+at a time; the derivative blends it again, which takes less time than to keep it. tests/test_skinning.py holds
+values and gradients to `skin`.
 """
 
 from __future__ import annotations
@@ -13,51 +14,102 @@ import torch
 from torch import Tensor
 
 from reference_sim.kernel_cache import njit
-from snug.fast_network import product
+from snug.lanes import LANES, laid, unlaid
+
+
+class JointWeights:
+    """Skinning weights (V, J) without their zeros: joints and values (K,) of vertex v from starts[v] on."""
+
+    def __init__(self, weights: Tensor) -> None:
+        vertices, joints = weights.cpu().nonzero(as_tuple=True)
+        counts = np.bincount(vertices.numpy(), minlength=len(weights))
+        self.starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.uint32)
+        self.joints = joints.numpy().astype(np.uint32)
+        self.values = weights[vertices, joints].numpy().astype(np.float32)
 
 
 class FastSkin(torch.autograd.Function):
-    """apply(points (..., V, 3) [m], weights (V, J), transforms (..., J, 3, 4)) -> (..., V, 3) [m], float32.
+    """apply(points (N, T, V, 3) [m], weights, transforms (N, T, J, 3, 4)) -> (N, T, V, 3) [m], float32.
 
     Differentiable once, by the points alone.
     """
 
     @staticmethod
-    def forward(ctx: Any, points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-        entries = transforms.flatten(-2).transpose(-1, -2).reshape(-1, weights.shape[1])
-        blended = product(entries, weights).view(-1, 12, len(weights)).numpy()
-        posed = torch.empty_like(points, memory_format=torch.contiguous_format)
-        _posed(points.detach().reshape(-1, *points.shape[-2:]).numpy(), blended, _frames(posed))
-        ctx.blended = blended
-        return posed
+    def forward(ctx: Any, points: Tensor, weights: JointWeights, transforms: Tensor) -> Tensor:
+        ctx.weights, ctx.transforms = weights, laid(transforms.flatten(-2))
+        rest = laid(points)
+        posed = np.empty_like(rest)
+        _posed(rest, weights.starts, weights.joints, weights.values, ctx.transforms, posed)
+        return unlaid(posed, *points.shape[:2])
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
-        back = torch.empty_like(above[0], memory_format=torch.contiguous_format)
-        _turned_back(_frames(above[0].contiguous()), ctx.blended, _frames(back))
-        return back, None, None
-
-
-def _frames(x: Tensor) -> np.ndarray:
-    return x.view(-1, *x.shape[-2:]).numpy()
+        weights, forces = ctx.weights, laid(above[0])
+        back = np.empty_like(forces)
+        _turned_back(forces, weights.starts, weights.joints, weights.values, ctx.transforms, back)
+        return unlaid(back, *above[0].shape[:2]), None, None
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
-    for n in range(len(points)):
-        p, b, q = points[n], blended[n], out[n]
-        for v in range(len(p)):
-            x, y, z = p[v, 0], p[v, 1], p[v, 2]
+def _blended(
+    starts: np.ndarray,
+    joints: np.ndarray,
+    values: np.ndarray,
+    transforms: np.ndarray,
+    v: int,
+    block: int,
+    b: np.ndarray,
+) -> None:
+    """The transforms (12, LANES) of vertex v, from those of all joints (J, 12, C, LANES)."""
+    b[:] = 0.0
+    for k in range(starts[v], starts[v + 1]):
+        joint, weight = joints[k], values[k]
+        for entry in range(12):
+            for n in range(LANES):
+                b[entry, n] += weight * transforms[joint, entry, block, n]
+
+
+@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def _posed(
+    points: np.ndarray,
+    starts: np.ndarray,
+    joints: np.ndarray,
+    values: np.ndarray,
+    transforms: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    b = np.empty((12, LANES), np.float32)
+    for block in range(points.shape[2]):
+        for v in range(len(points)):
+            _blended(starts, joints, values, transforms, v, block, b)
             for c in range(3):
-                q[v, c] = b[4 * c, v] * x + b[4 * c + 1, v] * y + b[4 * c + 2, v] * z + b[4 * c + 3, v]
+                for n in range(LANES):
+                    out[v, c, block, n] = (
+                        b[4 * c, n] * points[v, 0, block, n]
+                        + b[4 * c + 1, n] * points[v, 1, block, n]
+                        + b[4 * c + 2, n] * points[v, 2, block, n]
+                        + b[4 * c + 3, n]
+                    )
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _turned_back(above: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
+def _turned_back(
+    above: np.ndarray,
+    starts: np.ndarray,
+    joints: np.ndarray,
+    values: np.ndarray,
+    transforms: np.ndarray,
+    out: np.ndarray,
+) -> None:
     """Gradients by the points: the transpose of each rotation part."""
-    for n in range(len(above)):
-        g, b, q = above[n], blended[n], out[n]
-        for v in range(len(g)):
-            x, y, z = g[v, 0], g[v, 1], g[v, 2]
+    b = np.empty((12, LANES), np.float32)
+    for block in range(above.shape[2]):
+        for v in range(len(above)):
+            _blended(starts, joints, values, transforms, v, block, b)
             for c in range(3):
-                q[v, c] = b[c, v] * x + b[4 + c, v] * y + b[8 + c, v] * z
+                for n in range(LANES):
+                    out[v, c, block, n] = (
+                        b[c, n] * above[v, 0, block, n]
+                        + b[4 + c, n] * above[v, 1, block, n]
+                        + b[8 + c, n] * above[v, 2, block, n]
+                    )

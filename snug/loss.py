@@ -40,6 +40,7 @@ from reference_sim.energies import (
 from snug.baselines.springs import SquaredContact, spring_terms
 from snug.batched_kernels import KERNELS, batched_kernel
 from snug.device import CPU
+from snug.lanes import laid, unlaid
 from snug.recipe import TERMS, Recipe
 from snug.trainable_energies import find_energy
 
@@ -81,30 +82,32 @@ def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
 class ClosedForm(torch.autograd.Function):
     """energy summed over its elements, for each configuration of a batch, by its numba kernel.
 
-    apply(x (..., V, 3), energy, *frame data (..., S, 3) numpy) -> (...) [J]. Differentiable once, by x alone.
-    energy may also be a function of numpy x (N, V, 3) that gives values (N,) and gradients (N, V, 3) itself.
+    apply(x (N, T, V, 3), energy, *frame data (N, T, S, 3) numpy) -> (N, T) [J]. Differentiable once, by x
+    alone. energy may also be a function of x as snug.lanes lays it, that gives values and gradients itself.
     """
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, energy: Any, *frame_data: np.ndarray) -> Tensor:
-        flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
+        ctx.extra = len(frame_data)
         together = energy if callable(energy) else None
-        if together is None and flat.dtype == np.float32 and not frame_data:
+        if together is None and x.dtype == torch.float32 and not frame_data:
             together = batched_kernel(energy)
         if together is not None:
-            values, gradients = together(flat)
-        else:
-            rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
-            values, gradients = np.empty(len(flat), flat.dtype), np.empty_like(flat)
-            for n in range(len(flat)):
-                values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
+            values, gradients = (unlaid(found, *x.shape[:2]) for found in together(laid(x)))
+            ctx.gradients = gradients
+            return values
+        flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
+        rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
+        values, gradients = np.empty(len(flat), flat.dtype), np.empty_like(flat)
+        for n in range(len(flat)):
+            values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
         ctx.gradients = torch.from_numpy(gradients).reshape(x.shape)
-        ctx.extra = len(frame_data)
         return torch.from_numpy(values).reshape(x.shape[:-2])
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
-        return above[0][..., None, None] * ctx.gradients, None, *([None] * ctx.extra)
+        # Gradients first: the product then lies in memory as they do.
+        return ctx.gradients * above[0][..., None, None], None, *([None] * ctx.extra)
 
 
 class ClosedInertia(torch.autograd.Function):
@@ -117,13 +120,14 @@ class ClosedInertia(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, ahead: Tensor, stiffness: Tensor, detached: bool) -> Tensor:
         a = torch.sub(x[:, 2:], x[:, 1:-1], alpha=2).add_(x[:, :-2]).sub_(ahead[:, 2:, None])
-        ctx.force, ctx.detached = stiffness * a, detached
+        ctx.force, ctx.detached = a * stiffness, detached
         return torch.nn.functional.pad(0.5 * (a.mul_(ctx.force)).sum((-1, -2)), (2, 0))
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
-        force = above[0][:, 2:, None, None] * ctx.force
-        gradient = force.new_zeros(force.shape[0], force.shape[1] + 2, *force.shape[2:])
+        force = ctx.force * above[0][:, 2:, None, None]
+        windows, frames, vertices, _ = force.shape
+        gradient = force.new_zeros(vertices, 3, frames + 2, windows).permute(3, 2, 0, 1)
         gradient[:, 2:] = force
         if not ctx.detached:
             gradient[:, 1:-1].sub_(force, alpha=2)
@@ -183,7 +187,7 @@ class PhysicsLoss:
         x: (N, T, V, 3) [m], each frame relative to its own pelvis p. ahead: (N, T, 3) [m],
         2 p_{t-1} - p_{t-2} - p_t: where the pelvis would be if it kept its velocity, seen from where it is.
         planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors; or a
-        kernel that knows its planes: x (N T, V, 3) -> values (N T,) [J], gradients (N T, V, 3) [N].
+        kernel that knows its planes: x as snug.lanes lays it -> values [J] and gradients [N] laid likewise.
         """
         terms = {
             name: summed(energy, x, kernels=self.kernels and has_kernel(energy))
