@@ -17,6 +17,7 @@ import numpy as np
 from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
 from reference_sim.kernel_cache import njit
 from snug.lanes import LANES
+from snug.vector_rows import add_lanes, copy_lanes
 
 # No assumption on NaN or infinity: the guard of training must see them.
 FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -37,7 +38,7 @@ Kernel = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @lru_cache(maxsize=16)
 def batched_kernel(energy: Energy) -> Kernel | None:
-    """x (V, 3, C, LANES) float32 -> values (C, LANES) [J], gradients like x [N]; None if it has no kernel."""
+    """x (C, V, 3, LANES) float32 -> values (C, LANES) [J], gradients like x [N]; None if it has no kernel."""
     make = KERNELS.get(type(energy))
     return make(energy) if make else None
 
@@ -60,9 +61,8 @@ def _weight(energy: Any) -> Kernel:
 
     def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         gradients = np.zeros_like(x)
-        gradients[:, 1] = weights[:, None, None]
-        heights = x[:, 1].reshape(len(x), -1)
-        return (weights @ heights - zero).reshape(x.shape[2:]), gradients
+        gradients[:, :, 1] = weights[:, None]
+        return weights @ x[:, :, 1] - zero, gradients
 
     return run
 
@@ -71,8 +71,8 @@ def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Ke
     stencils = stencils.astype(np.uint32)  # for a signed index is first asked whether it counts from the end
 
     def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        values, gradients = np.empty(x.shape[2:], np.float32), np.zeros_like(x)
-        kernel(x, stencils, *constants, values, gradients)
+        values, gradients = np.empty((len(x), LANES), np.float32), np.zeros_like(x)
+        kernel(x.ravel(), stencils, *constants, values, gradients.ravel())
         return values, gradients
 
     return run
@@ -103,20 +103,6 @@ def _arctan2(y: np.float32, x: np.float32) -> np.float32:
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _take(x: np.ndarray, i: np.uint32, block: int, u: np.ndarray, corner: int) -> None:
-    for axis in range(3):
-        for n in range(LANES):
-            u[(3 * corner + axis) * LANES + n] = x[i, axis, block, n]
-
-
-@njit(cache=True, fastmath=FAST, error_model="numpy")
-def _give(u: np.ndarray, corner: int, gradient: np.ndarray, i: np.uint32, block: int) -> None:
-    for axis in range(3):
-        for n in range(LANES):
-            gradient[i, axis, block, n] += u[(3 * corner + axis) * LANES + n]
-
-
-@njit(cache=True, fastmath=FAST, error_model="numpy")
 def _bending(
     x: np.ndarray,
     hinges: np.ndarray,
@@ -128,12 +114,14 @@ def _bending(
     """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, see bend_hinge._half."""
     L = LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
-    for block in range(x.shape[2]):
+    for block in range(len(values)):
         total[:] = 0.0
+        first = len(x) // (3 * L * len(values)) * block  # of the block's vertices
         for h in range(len(hinges)):
             k, angle = stiffness[h], rest[h]
             for corner in range(4):
-                _take(x, hinges[h, corner], block, u, corner)
+                for axis in range(3):
+                    copy_lanes(x, 3 * (first + hinges[h, corner]) + axis, u, 3 * corner + axis)
             for n in range(L):
                 ex, ey, ez = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
                 rx, ry, rz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
@@ -158,10 +146,10 @@ def _bending(
                 u[5 * L + n] = a1 * az + b1 * bz
                 u[6 * L + n], u[7 * L + n], u[8 * L + n] = a2 * ax, a2 * ay, a2 * az
                 u[9 * L + n], u[10 * L + n], u[11 * L + n] = b2 * bx, b2 * by, b2 * bz
-            for n in range(L):
-                total[n] += energy[n]
+            add_lanes(energy, 0, total, 0)
             for corner in range(4):
-                _give(u, corner, gradients, hinges[h, corner], block)
+                for axis in range(3):
+                    add_lanes(u, 3 * corner + axis, gradients, 3 * (first + hinges[h, corner]) + axis)
         values[block] = total
 
 
@@ -179,13 +167,15 @@ def _strain(
     """E = A (lambda/2 tr(G)^2 + mu tr(G^2)), dE/dx_a = A F S b_a, see stretch_stvk._gradient."""
     L = LANES
     u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)
-    for block in range(x.shape[2]):
+    for block in range(len(values)):
         total[:] = 0.0
+        first = len(x) // (3 * L * len(values)) * block  # of the block's vertices
         for f in range(len(faces)):
             d00, d01, d10, d11 = Dm_inverse[f, 0], Dm_inverse[f, 1], Dm_inverse[f, 2], Dm_inverse[f, 3]
             area = areas[f]
             for corner in range(3):
-                _take(x, faces[f, corner], block, u, corner)
+                for axis in range(3):
+                    copy_lanes(x, 3 * (first + faces[f, corner]) + axis, u, 3 * corner + axis)
             for n in range(L):
                 ax, ay, az = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
                 bx, by, bz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
@@ -207,8 +197,8 @@ def _strain(
                 u[n], u[L + n], u[2 * L + n] = -ax - bx, -ay - by, -az - bz
                 u[3 * L + n], u[4 * L + n], u[5 * L + n] = ax, ay, az
                 u[6 * L + n], u[7 * L + n], u[8 * L + n] = bx, by, bz
-            for n in range(L):
-                total[n] += energy[n]
+            add_lanes(energy, 0, total, 0)
             for corner in range(3):
-                _give(u, corner, gradients, faces[f, corner], block)
+                for axis in range(3):
+                    add_lanes(u, 3 * corner + axis, gradients, 3 * (first + faces[f, corner]) + axis)
         values[block] = total

@@ -21,6 +21,7 @@ from reference_sim.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
 from reference_sim.obstacle import DEFAULT_REGION
 from snug.contact_kernels import PARTS, byte_normals, contact_energy, interpolated_planes
+from snug.lanes import LANES
 from snug.surface_walk import SLACK, triangle_adjacency
 
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
@@ -160,14 +161,14 @@ class ContactCache:
         *,
         walk: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Contact energy of garments x (V, 3, C, LANES) float32 [m] in frames (N,), lane by lane, with the
+        """Contact energy of garments x (C, V, 3, LANES) float32 [m] in frames (N,), lane by lane, with the
         planes of `planes`.
 
         -> values (C, LANES) [J], gradients like x [N], float32; zero in lanes beyond the last frame. walk:
         anchors near the skin first walk to where their samples are, and are remembered there. A sample that
         is out of reach costs no more than the look at its anchor, and no plane is stored.
         """
-        values, gradients = np.zeros(x.shape[2:], np.float32), np.zeros_like(x)
+        values, gradients = np.zeros((len(x), LANES), np.float32), np.zeros_like(x)
         contact_energy(
             x,
             *_samples(contact),

@@ -2,45 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from reference_sim.kernel_cache import njit
 from reference_sim.obstacle import vertex_normals
 from snug.lanes import LANES
 from snug.surface_walk import walk_to_foot
+from snug.vector_rows import mixed_rows
 
 PARTS = 255.0  # of a barycentric coordinate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def rows_of_three(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
-    """u rows[i] + v rows[j] + w rows[k], three numbers; rows of three lie one after the other in a flat float32
-    array, and one number more after the last.
-
-    Each row is one load of four numbers, the compiler on its own makes three of it.
-    """
-
-    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        four, wide = ir.VectorType(ir.FloatType(), 4), ir.IntType(64)
-        start = context.make_array(signature.args[0])(context, builder, args[0]).data
-        total = None
-        for row, weight in zip(args[1:4], args[4:]):
-            place = builder.mul(builder.zext(row, wide), ir.Constant(wide, 3))
-            numbers = builder.load(builder.bitcast(builder.gep(start, [place]), four.as_pointer()), align=4)
-            spread = ir.Constant(four, ir.Undefined)
-            for n in range(4):
-                spread = builder.insert_element(spread, weight, ir.IntType(32)(n))
-            term = builder.fmul(spread, numbers, flags=("contract",))
-            total = term if total is None else builder.fadd(total, term, flags=("contract",))
-        parts = [builder.extract_element(total, ir.IntType(32)(n)) for n in range(3)]
-        return context.make_tuple(builder, signature.return_type, parts)
-
-    return types.UniTuple(types.float32, 3)(rows, i, j, k, u, v, w), built
 
 
 @njit(cache=True, error_model="numpy")
@@ -103,14 +73,14 @@ def _above(
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Height of a sample above its anchor's plane, times the length of the normal; and that normal.
 
-    skin, m: positions and normals of the body, flat as `rows_of_three` wants them.
+    skin, m: positions and normals of the body, flat as `mixed_rows` wants them.
     """
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
     whole = np.float32(1.0) / np.float32(PARTS)
     v, w = whole * np.float32(parts[0]), whole * np.float32(parts[1])
     u = np.float32(1.0) - v - w
-    c0, c1, c2 = rows_of_three(skin, i, j, k, u, v, w)
-    n0, n1, n2 = rows_of_three(m, i, j, k, u, v, w)
+    c0, c1, c2 = mixed_rows(skin, i, j, k, u, v, w)
+    n0, n1, n2 = mixed_rows(m, i, j, k, u, v, w)
     return n0 * (x0 - c0) + n1 * (x1 - c1) + n2 * (x2 - c2), n0, n1, n2
 
 
@@ -125,21 +95,21 @@ def contact_energy(
 ) -> None:  # fmt: skip
     """k max(margin - d, 0)^power of each sample, summed: values (C, LANES), and added up: gradients like x.
 
-    x (V, 3, C, LANES). stencils, faces: uint32, for a signed index is first asked whether it counts from the
+    x (C, V, 3, LANES). stencils, faces: uint32, for a signed index is first asked whether it counts from the
     end. Most samples are out of reach, and for them it is the loads that count: what they read of a frame is
     first laid together.
     """
     # Normals have 127 times unit length, within 0.9 by rounding.
     reach = np.float32(128.0) * (margin + slack if walk else margin)
     zero, corners = np.float32(0.0), np.empty((1, 3, 3), np.float32)
-    size = positions.shape[1]
-    garment = np.zeros(3 * len(x) + 1, np.float32)
+    vertices, size = x.shape[1], positions.shape[1]
+    garment = np.zeros(3 * vertices + 1, np.float32)
     skin, m = np.zeros(3 * size + 1, np.float32), np.zeros(3 * size + 1, np.float32)
     for n in range(len(frames)):
         block, lane = n // LANES, n % LANES
-        for v in range(len(x)):
+        for v in range(vertices):
             for c in range(3):
-                garment[3 * v + c] = x[v, c, block, lane]
+                garment[3 * v + c] = x[block, v, c, lane]
         skin[: 3 * size] = positions[rows[n]].ravel()
         m[: 3 * size] = normals[rows[n]].ravel()
         body = positions[rows[n]]
@@ -149,7 +119,7 @@ def contact_energy(
             face = np.uint32(anchors[s])
             a, b, c = stencils[s, 0], stencils[s, 1], stencils[s, 2]
             p, q, r = weights[s, 0], weights[s, 1], weights[s, 2]
-            x0, x1, x2 = rows_of_three(garment, a, b, c, p, q, r)
+            x0, x1, x2 = mixed_rows(garment, a, b, c, p, q, r)
             along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, face, parts[s])
             if along >= reach:
                 continue
@@ -172,7 +142,7 @@ def contact_energy(
             total += force * depth
             force *= -np.float32(power) / length
             for corner, share in ((a, p), (b, q), (c, r)):
-                gradients[corner, 0, block, lane] += share * force * n0
-                gradients[corner, 1, block, lane] += share * force * n1
-                gradients[corner, 2, block, lane] += share * force * n2
+                gradients[block, corner, 0, lane] += share * force * n0
+                gradients[block, corner, 1, lane] += share * force * n1
+                gradients[block, corner, 2, lane] += share * force * n2
         values[block, lane] = total

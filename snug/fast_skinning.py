@@ -1,8 +1,7 @@
 """`snug.skinning.skin` in closed form for many frames of one garment: what training on a CPU runs.
 
-Each vertex hangs on a few joints, and its transform is blended from those alone, for snug.lanes.LANES frames
-at a time; the derivative blends it again, which takes less time than to keep it. tests/test_skinning.py holds
-values and gradients to `skin`.
+The transforms of all vertices are one matrix product, laid out like the vertices (snug.lanes), so that the
+loops are ones of vector instructions. tests/test_skinning.py holds values and gradients to `skin`.
 """
 
 from __future__ import annotations
@@ -14,102 +13,77 @@ import torch
 from torch import Tensor
 
 from reference_sim.kernel_cache import njit
+from snug.fast_network import product
 from snug.lanes import LANES, laid, unlaid
-
-
-class JointWeights:
-    """Skinning weights (V, J) without their zeros: joints and values (K,) of vertex v from starts[v] on."""
-
-    def __init__(self, weights: Tensor) -> None:
-        vertices, joints = weights.cpu().nonzero(as_tuple=True)
-        counts = np.bincount(vertices.numpy(), minlength=len(weights))
-        self.starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.uint32)
-        self.joints = joints.numpy().astype(np.uint32)
-        self.values = weights[vertices, joints].numpy().astype(np.float32)
+from snug.vector_rows import copy_lanes
 
 
 class FastSkin(torch.autograd.Function):
-    """apply(points (N, T, V, 3) [m], weights, transforms (N, T, J, 3, 4)) -> (N, T, V, 3) [m], float32.
+    """apply(points (N, T, V, 3) [m], weights (V, J), transforms (N, T, J, 3, 4)) -> (N, T, V, 3) [m], float32.
 
-    Differentiable once, by the points alone.
+    Differentiable once, by the points alone. Points and their gradients lie as FastLinear has its results.
     """
 
     @staticmethod
-    def forward(ctx: Any, points: Tensor, weights: JointWeights, transforms: Tensor) -> Tensor:
-        ctx.weights, ctx.transforms = weights, laid(transforms.flatten(-2))
-        rest = laid(points)
-        posed = np.empty_like(rest)
-        _posed(rest, weights.starts, weights.joints, weights.values, ctx.transforms, posed)
+    def forward(ctx: Any, points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
+        entries = torch.from_numpy(laid(transforms.flatten(-2)))  # (C, J, 12, LANES)
+        entries = entries.movedim(1, -1).flatten(0, 2)
+        ctx.blended = product(weights, entries).view(len(weights), -1, 12 * LANES).numpy()
+        rows = _columns(points.detach())
+        posed = np.empty((rows.shape[2], len(rows), 3, LANES), np.float32)
+        _posed(rows.ravel(), ctx.blended, posed.ravel())
         return unlaid(posed, *points.shape[:2])
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
-        weights, forces = ctx.weights, laid(above[0])
-        back = np.empty_like(forces)
-        _turned_back(forces, weights.starts, weights.joints, weights.values, ctx.transforms, back)
-        return unlaid(back, *above[0].shape[:2]), None, None
+        forces, (windows, frames, vertices, _) = laid(above[0]), above[0].shape
+        back = np.empty((vertices, 3, len(forces), LANES), np.float32)
+        _turned_back(forces.ravel(), ctx.blended, back.ravel())
+        columns = torch.from_numpy(back).flatten(2)[..., : frames * windows]
+        return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
+
+
+def _columns(points: Tensor) -> np.ndarray:
+    """(N, T, V, 3) -> (V, 3, C, LANES): a view of what lies so."""
+    columns = points.permute(2, 3, 1, 0).flatten(2)
+    missing = -columns.shape[2] % LANES
+    return torch.nn.functional.pad(columns, (0, missing)).contiguous().unflatten(2, (-1, LANES)).numpy()
+
+
+# The point is copied into one small array of known size, for the reason given in snug.batched_kernels.
+@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
+    """Flat points (V, 3, C, LANES), blended (V, C, 12 LANES), flat out (C, V, 3, LANES)."""
+    L, (vertices, blocks, _) = LANES, blended.shape
+    u = np.empty(3 * L, np.float32)
+    for v in range(vertices):
+        for block in range(blocks):
+            b = blended[v, block]
+            for axis in range(3):
+                copy_lanes(points, (3 * v + axis) * blocks + block, u, axis)
+            for n in range(L):
+                x, y, z = u[n], u[L + n], u[2 * L + n]
+                u[n] = b[n] * x + b[L + n] * y + b[2 * L + n] * z + b[3 * L + n]
+                u[L + n] = b[4 * L + n] * x + b[5 * L + n] * y + b[6 * L + n] * z + b[7 * L + n]
+                u[2 * L + n] = b[8 * L + n] * x + b[9 * L + n] * y + b[10 * L + n] * z + b[11 * L + n]
+            for axis in range(3):
+                copy_lanes(u, axis, out, 3 * (vertices * block + v) + axis)
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _blended(
-    starts: np.ndarray,
-    joints: np.ndarray,
-    values: np.ndarray,
-    transforms: np.ndarray,
-    v: int,
-    block: int,
-    b: np.ndarray,
-) -> None:
-    """The transforms (12, LANES) of vertex v, from those of all joints (J, 12, C, LANES)."""
-    b[:] = 0.0
-    for k in range(starts[v], starts[v + 1]):
-        joint, weight = joints[k], values[k]
-        for entry in range(12):
-            for n in range(LANES):
-                b[entry, n] += weight * transforms[joint, entry, block, n]
-
-
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _posed(
-    points: np.ndarray,
-    starts: np.ndarray,
-    joints: np.ndarray,
-    values: np.ndarray,
-    transforms: np.ndarray,
-    out: np.ndarray,
-) -> None:
-    b = np.empty((12, LANES), np.float32)
-    for block in range(points.shape[2]):
-        for v in range(len(points)):
-            _blended(starts, joints, values, transforms, v, block, b)
-            for c in range(3):
-                for n in range(LANES):
-                    out[v, c, block, n] = (
-                        b[4 * c, n] * points[v, 0, block, n]
-                        + b[4 * c + 1, n] * points[v, 1, block, n]
-                        + b[4 * c + 2, n] * points[v, 2, block, n]
-                        + b[4 * c + 3, n]
-                    )
-
-
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _turned_back(
-    above: np.ndarray,
-    starts: np.ndarray,
-    joints: np.ndarray,
-    values: np.ndarray,
-    transforms: np.ndarray,
-    out: np.ndarray,
-) -> None:
-    """Gradients by the points: the transpose of each rotation part."""
-    b = np.empty((12, LANES), np.float32)
-    for block in range(above.shape[2]):
-        for v in range(len(above)):
-            _blended(starts, joints, values, transforms, v, block, b)
-            for c in range(3):
-                for n in range(LANES):
-                    out[v, c, block, n] = (
-                        b[c, n] * above[v, 0, block, n]
-                        + b[4 + c, n] * above[v, 1, block, n]
-                        + b[8 + c, n] * above[v, 2, block, n]
-                    )
+def _turned_back(above: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
+    """Gradients by the points, laid out like these: the transpose of each rotation part."""
+    L, (vertices, blocks, _) = LANES, blended.shape
+    u = np.empty(3 * L, np.float32)
+    for v in range(vertices):
+        for block in range(blocks):
+            b = blended[v, block]
+            for axis in range(3):
+                copy_lanes(above, 3 * (vertices * block + v) + axis, u, axis)
+            for n in range(L):
+                x, y, z = u[n], u[L + n], u[2 * L + n]
+                u[n] = b[n] * x + b[4 * L + n] * y + b[8 * L + n] * z
+                u[L + n] = b[L + n] * x + b[5 * L + n] * y + b[9 * L + n] * z
+                u[2 * L + n] = b[2 * L + n] * x + b[6 * L + n] * y + b[10 * L + n] * z
+            for axis in range(3):
+                copy_lanes(u, axis, out, (3 * v + axis) * blocks + block)

@@ -1,9 +1,10 @@
-"""How training on a CPU lays out vertices: configurations of one mesh side by side, in vector registers.
+"""How training on a CPU lays out vertices: LANES configurations of one mesh side by side, in vector registers.
 
-Vertices (N, T, V, 3) of N windows of T frames lie in memory as (V, 3, T, N). That is the layout in which a
-matrix product gives the network's offsets, and every kernel (skinning, energies, contact) takes it as it is:
-the innermost loop runs over LANES configurations. The tensors' shape stays (N, T, V, 3), so whatever has no
-kernel works on them too.
+Vertices (N, T, V, 3) of N windows of T frames lie in memory as (C, V, 3, LANES): C blocks of LANES frames, the
+first frames of all windows before the second ones. Skinning writes this layout and the kernels of the
+energies and of contact take it as it is. Their innermost loop runs over the lanes. Of LANES windows, as
+training has, the tensor is a view of it; of any other number it is a copy. Its shape is (N, T, V, 3) in any
+case, so that whatever has no kernel works on it too.
 """
 
 from __future__ import annotations
@@ -16,18 +17,19 @@ LANES = 16
 
 
 def laid(x: Tensor) -> np.ndarray:
-    """(N, T, ...) -> (..., C, LANES) with C = ceil(T N / LANES), time first: a view of x where it lies so.
-
-    Lanes beyond the last configuration repeat it.
-    """
-    rows = x.detach().permute(*range(2, x.dim()), 1, 0).flatten(-2)
-    missing = -rows.shape[-1] % LANES
-    if missing:
-        rows = torch.cat([rows, rows[..., -1:].expand(*rows.shape[:-1], missing)], -1)
-    return rows.contiguous().unflatten(-1, (-1, LANES)).numpy()
+    """(N, T, ...) -> (C, ..., LANES), C = ceil(T N / LANES); lanes beyond the last repeat it."""
+    x = x.detach()
+    if len(x) == LANES:
+        return x.movedim(0, -1).contiguous().numpy()
+    rows = x.transpose(0, 1).flatten(0, 1)
+    missing = -len(rows) % LANES
+    rows = torch.cat([rows, rows[-1:].expand(missing, *rows.shape[1:])])
+    return rows.unflatten(0, (-1, LANES)).movedim(1, -1).contiguous().numpy()
 
 
 def unlaid(lanes: np.ndarray, windows: int, frames: int) -> Tensor:
-    """The inverse of `laid`: (..., C, LANES) -> (N, T, ...), a view."""
-    rows = torch.from_numpy(lanes).flatten(-2)[..., : windows * frames].unflatten(-1, (frames, windows))
-    return rows.permute(-1, -2, *range(rows.dim() - 2))
+    """The inverse of `laid`: (C, ..., LANES) -> (N, T, ...)."""
+    x = torch.from_numpy(lanes)
+    if windows == LANES:
+        return x.movedim(-1, 0)
+    return x.movedim(-1, 1).flatten(0, 1)[: windows * frames].unflatten(0, (frames, windows)).transpose(0, 1)

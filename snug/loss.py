@@ -127,7 +127,7 @@ class ClosedInertia(torch.autograd.Function):
     def backward(ctx: Any, *above: Tensor) -> Any:
         force = ctx.force * above[0][:, 2:, None, None]
         windows, frames, vertices, _ = force.shape
-        gradient = force.new_zeros(vertices, 3, frames + 2, windows).permute(3, 2, 0, 1)
+        gradient = force.new_zeros(frames + 2, vertices, 3, windows).movedim(-1, 0)
         gradient[:, 2:] = force
         if not ctx.detached:
             gradient[:, 1:-1].sub_(force, alpha=2)

@@ -18,7 +18,7 @@ from snug.baselines.supervised import VertexTargets
 from snug.device import CPU
 from snug.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.dressed_body import DressedBody
-from snug.fast_skinning import FastSkin, JointWeights
+from snug.fast_skinning import FastSkin
 from snug.hidden_state_cache import HiddenStateCache
 from snug.loss import PhysicsLoss
 from snug.motion_augmentation import mixed_for
@@ -70,7 +70,6 @@ class Trainer:
             dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
         )
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
-        self.joint_weights = JointWeights(self.weights) if self.kernels else None
         pins = dressed.garment.pins
         network = make_network(
             kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins
@@ -250,11 +249,8 @@ class Trainer:
             offsets, after = self._callable(batch.features, state)
         with self.clock.part("skinning"):
             # Offsets first: the sum then lies in memory as they do.
-            if self.joint_weights:
-                x = FastSkin.apply(offsets + batch.rest, self.joint_weights, batch.transforms)
-            else:
-                x = skin(offsets + batch.rest, self.weights, batch.transforms)
-            return x, offsets, after
+            posed_by = FastSkin.apply if self.kernels else skin
+            return posed_by(offsets + batch.rest, self.weights, batch.transforms), offsets, after
 
     def _set_rate(self, number: int) -> None:
         recipe, share = self.recipe, 1.0
