@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
+from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 from reference_sim.kernel_cache import njit
 from snug.lanes import LANES
-from snug.vector_rows import add_lanes, copy_lanes
+from snug.vector_rows import add_lanes, add_product_of_lanes, copy_lanes
 
 # No assumption on NaN or infinity: the guard of training must see them.
 FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -33,12 +33,14 @@ _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
 )  # fmt: skip
 
 
-Kernel = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+# x (T W, V, 3, LANES) float32 [m], see snug.lanes -> values (T W, LANES) [J]; adds gradients like x [N] to its
+# second argument.
+Kernel = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @lru_cache(maxsize=16)
 def batched_kernel(energy: Energy) -> Kernel | None:
-    """x (C, V, 3, LANES) float32 -> values (C, LANES) [J], gradients like x [N]; None if it has no kernel."""
+    """The kernel of this energy; None if it has none."""
     make = KERNELS.get(type(energy))
     return make(energy) if make else None
 
@@ -59,10 +61,36 @@ def _weight(energy: Any) -> Kernel:
     weights = energy.weights.astype(np.float32)
     zero = np.float32(energy.weights.sum() * energy.origin_height)
 
-    def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        gradients = np.zeros_like(x)
-        gradients[:, :, 1] = weights[:, None]
-        return weights @ x[:, :, 1] - zero, gradients
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        gradients[:, :, 1] += weights[:, None]
+        return weights @ x[:, :, 1] - zero
+
+    return run
+
+
+def inertia_kernel(energy: Inertia, ahead: np.ndarray, windows: int, *, detached: bool) -> Kernel:
+    """With a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t: E = m / (2 dt^2) |a|^2, zero for the first two frames.
+
+    ahead (T W, 3, LANES) [m]; detached: no gradient by earlier frames.
+    """
+    stiffness = (energy.masses / energy.dt**2).astype(np.float32)[:, None, None]
+    one = -(-windows // LANES)  # blocks a frame
+
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        a = x[2 * one :] - x[one:-one]
+        a -= x[one:-one]
+        a += x[: -2 * one]
+        a -= ahead[2 * one :, None]
+        force = stiffness * a
+        gradients[2 * one :] += force
+        a *= force
+        values = np.zeros((len(x), LANES), np.float32)
+        values[2 * one :] = 0.5 * a.sum((1, 2), dtype=np.float64)
+        if not detached:
+            gradients[: -2 * one] += force
+            force += force
+            gradients[one:-one] -= force
+        return values
 
     return run
 
@@ -70,10 +98,10 @@ def _weight(energy: Any) -> Kernel:
 def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Kernel:
     stencils = stencils.astype(np.uint32)  # for a signed index is first asked whether it counts from the end
 
-    def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        values, gradients = np.empty((len(x), LANES), np.float32), np.zeros_like(x)
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        values = np.empty((len(x), LANES), np.float32)
         kernel(x.ravel(), stencils, *constants, values, gradients.ravel())
-        return values, gradients
+        return values
 
     return run
 
@@ -96,6 +124,20 @@ def _arctan2(y: np.float32, x: np.float32) -> np.float32:
     a = _HALF * _PI - a if across > along else a
     a = _PI - a if x < np.float32(0.0) else a
     return -a if y < np.float32(0.0) else a
+
+
+@njit(cache=True, error_model="numpy")
+def weighted_sum(gradients: np.ndarray, factors: np.ndarray, out: np.ndarray) -> None:
+    """Gradients (K, T W, V, 3, LANES) times factors (K, T W, LANES), summed over K: added to out."""
+    count, blocks = factors.shape[:2]
+    size = out.size // (blocks * LANES)
+    flat, flat_factors, total = gradients.ravel(), factors.ravel(), out.ravel()
+    for block in range(blocks):
+        for row in range(size * block, size * (block + 1)):
+            for k in range(count):
+                add_product_of_lanes(
+                    flat, size * blocks * k + row, flat_factors, blocks * k + block, total, row
+                )
 
 
 # The corners of an element are copied into one small array of known size and the result copied back: within

@@ -154,21 +154,22 @@ class ContactCache:
         self,
         contact: ContactPenalty,
         x: np.ndarray,
+        gradients: np.ndarray,
         frames: np.ndarray,
         rows: np.ndarray,
         positions: np.ndarray,
         normals: np.ndarray,
         *,
         walk: bool = False,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Contact energy of garments x (C, V, 3, LANES) float32 [m] in frames (N,), lane by lane, with the
-        planes of `planes`.
+    ) -> np.ndarray:
+        """Contact energy of garments x (T W, V, 3, LANES) float32 [m], see snug.lanes, in frames (N, T), with
+        the planes of `planes`; rows (N, T).
 
-        -> values (C, LANES) [J], gradients like x [N], float32; zero in lanes beyond the last frame. walk:
+        -> values (T W, LANES) [J], zero in lanes beyond the last window; adds to gradients like x [N]. walk:
         anchors near the skin first walk to where their samples are, and are remembered there. A sample that
         is out of reach costs no more than the look at its anchor, and no plane is stored.
         """
-        values, gradients = np.zeros((len(x), LANES), np.float32), np.zeros_like(x)
+        values = np.zeros((len(x), LANES), np.float32)
         contact_energy(
             x,
             *_samples(contact),
@@ -189,7 +190,7 @@ class ContactCache:
             values,
             gradients,
         )
-        return values, gradients
+        return values
 
     def requery(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame.

@@ -93,9 +93,9 @@ def contact_energy(
     slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:  # fmt: skip
-    """k max(margin - d, 0)^power of each sample, summed: values (C, LANES), and added up: gradients like x.
+    """k max(margin - d, 0)^power of each sample, summed: values (T W, LANES), and added up: gradients like x.
 
-    x (C, V, 3, LANES). stencils, faces: uint32, for a signed index is first asked whether it counts from the
+    x (T W, V, 3, LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first asked whether it counts from the
     end. Most samples are out of reach, and for them it is the loads that count: what they read of a frame is
     first laid together.
     """
@@ -105,15 +105,16 @@ def contact_energy(
     vertices, size = x.shape[1], positions.shape[1]
     garment = np.zeros(3 * vertices + 1, np.float32)
     skin, m = np.zeros(3 * size + 1, np.float32), np.zeros(3 * size + 1, np.float32)
-    for n in range(len(frames)):
-        block, lane = n // LANES, n % LANES
+    for n in range(frames.size):
+        frame, window = divmod(n, len(frames))
+        block, lane = frame * (len(x) // frames.shape[1]) + window // LANES, window % LANES
         for v in range(vertices):
             for c in range(3):
                 garment[3 * v + c] = x[block, v, c, lane]
-        skin[: 3 * size] = positions[rows[n]].ravel()
-        m[: 3 * size] = normals[rows[n]].ravel()
-        body = positions[rows[n]]
-        anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
+        skin[: 3 * size] = positions[rows[window, frame]].ravel()
+        m[: 3 * size] = normals[rows[window, frame]].ravel()
+        body = positions[rows[window, frame]]
+        anchors, parts = anchor_faces[frames[window, frame]], barycentric[frames[window, frame]]
         total = 0.0
         for s in range(len(stencils)):
             face = np.uint32(anchors[s])

@@ -139,8 +139,8 @@ class TrainingContact:
             self._before = rows, *(table[rows] for table in self._tables())
         if isinstance(self.cache, ContactCache):
             cache, (of_body, *body) = self.cache, posed
-            lanes = batch.frames.T.ravel(), of_body.reshape(batch.frames.shape).T.ravel()  # see snug.lanes
-            return lambda vertices: cache.energy(self.contact, vertices, *lanes, *body, walk=walk)
+            rows = of_body.reshape(batch.frames.shape)
+            return lambda *lanes: cache.energy(self.contact, *lanes, batch.frames, rows, *body, walk=walk)
         flat = batch.frames.ravel()
         if x is not None:
             samples = self._samples(x.detach().flatten(0, 1))

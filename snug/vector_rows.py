@@ -46,6 +46,21 @@ def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
+def add_product_of_lanes(_: Any, source: Any, i: Any, factors: Any, k: Any, target: Any, j: Any) -> Any:
+    """Row i of source times row k of factors is added to row j of target."""
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        a, b = (builder.load(_row(context, builder, signature, args, at, LANES), align=4) for at in (0, 2))
+        place = _row(context, builder, signature, args, 4, LANES)
+        term = builder.fmul(a, b, flags=("contract",))
+        total = builder.fadd(builder.load(place, align=4), term, flags=("contract",))
+        builder.store(total, place, align=4)
+        return context.get_dummy_value()
+
+    return types.void(source, i, factors, k, target, j), built
+
+
+@intrinsic  # type: ignore[untyped-decorator]
 def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
     """u rows[i] + v rows[j] + w rows[k], three numbers: rows of three in a flat float32 array, and one number
     more after the last, for a row is loaded as four.
