@@ -17,7 +17,7 @@ import numpy as np
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 from reference_sim.kernel_cache import njit
 from snug.lanes import LANES
-from snug.vector_rows import add_lanes, add_product_of_lanes, copy_lanes
+from snug.vector_rows import add_lanes, copy_lanes
 
 # No assumption on NaN or infinity: the guard of training must see them.
 FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -33,8 +33,8 @@ _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
 )  # fmt: skip
 
 
-# x (T W, V, 3, LANES) float32 [m], see snug.lanes -> values (T W, LANES) [J]; adds gradients like x [N] to its
-# second argument.
+# x (T W, V, 3, LANES) float32 [m], see snug.lanes -> values (T W, LANES) [J]; its second argument is like x, and
+# the gradients [N] are added to it.
 Kernel = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -124,20 +124,6 @@ def _arctan2(y: np.float32, x: np.float32) -> np.float32:
     a = _HALF * _PI - a if across > along else a
     a = _PI - a if x < np.float32(0.0) else a
     return -a if y < np.float32(0.0) else a
-
-
-@njit(cache=True, error_model="numpy")
-def weighted_sum(gradients: np.ndarray, factors: np.ndarray, out: np.ndarray) -> None:
-    """Gradients (K, T W, V, 3, LANES) times factors (K, T W, LANES), summed over K: added to out."""
-    count, blocks = factors.shape[:2]
-    size = out.size // (blocks * LANES)
-    flat, flat_factors, total = gradients.ravel(), factors.ravel(), out.ravel()
-    for block in range(blocks):
-        for row in range(size * block, size * (block + 1)):
-            for k in range(count):
-                add_product_of_lanes(
-                    flat, size * blocks * k + row, flat_factors, blocks * k + block, total, row
-                )
 
 
 # The corners of an element are copied into one small array of known size and the result copied back: within

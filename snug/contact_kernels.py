@@ -102,18 +102,19 @@ def contact_energy(
     # Normals have 127 times unit length, within 0.9 by rounding.
     reach = np.float32(128.0) * (margin + slack if walk else margin)
     zero, corners = np.float32(0.0), np.empty((1, 3, 3), np.float32)
-    vertices, size = x.shape[1], positions.shape[1]
+    vertices, size = x.shape[1], 3 * positions.shape[1]
     garment = np.zeros(3 * vertices + 1, np.float32)
-    skin, m = np.zeros(3 * size + 1, np.float32), np.zeros(3 * size + 1, np.float32)
+    skin, m = np.zeros(size + 1, np.float32), np.zeros(size + 1, np.float32)
     for n in range(frames.size):
         frame, window = divmod(n, len(frames))
         block, lane = frame * (len(x) // frames.shape[1]) + window // LANES, window % LANES
         for v in range(vertices):
             for c in range(3):
                 garment[3 * v + c] = x[block, v, c, lane]
-        skin[: 3 * size] = positions[rows[window, frame]].ravel()
-        m[: 3 * size] = normals[rows[window, frame]].ravel()
         body = positions[rows[window, frame]]
+        given, given_normals = body.ravel(), normals[rows[window, frame]].ravel()
+        for c in range(len(given)):
+            skin[c], m[c] = given[c], given_normals[c]
         anchors, parts = anchor_faces[frames[window, frame]], barycentric[frames[window, frame]]
         total = 0.0
         for s in range(len(stencils)):

@@ -114,8 +114,9 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
         *(ContactCache(patch, 2) for _ in range(3)),
         TensorContactCache(patch, 2, CPU),
     )
-    on = (contact, x.numpy(), frames, rows, positions.numpy(), normals)
-    assert fast.energy(*on)[0].sum() > 0 and (fast.faces == still.faces).all()
+    lanes = laid(x[:, None])
+    on = (contact, lanes, np.zeros_like(lanes), frames[:, None], rows[:, None], positions.numpy(), normals)
+    assert fast.energy(*on).sum() > 0 and (fast.faces == still.faces).all()
     fast.energy(*on, walk=True)
     slow.walk(samples, frames, rows, positions, torch.as_tensor(normals).float(), reach=contact.margin)
     for row, frame in enumerate(frames):
@@ -193,8 +194,10 @@ def test_a_set_lies_where_it_is_told_to():
 
 def lane_by_lane(kernel, x):
     """Values (N,) and gradients (N, V, 3) that a kernel of lanes gives for x (N, V, 3)."""
-    laid_out = laid(torch.as_tensor(x)[:, None])
-    return (unlaid(found, len(x), 1)[:, 0].numpy() for found in kernel(laid_out))
+    lanes = laid(torch.as_tensor(x)[:, None])
+    gradients = np.zeros_like(lanes)
+    values = kernel(lanes, gradients)
+    return (unlaid(found, len(x))[:, 0].numpy() for found in (values, gradients))
 
 
 @pytest.mark.parametrize("count", [1, 16, 21])
