@@ -33,8 +33,8 @@ _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
 )  # fmt: skip
 
 
-# x (T W, V, 3, LANES) float32 [m], see snug.lanes -> values (T W, LANES) [J]; its second argument is like x, and
-# the gradients [N] are added to it.
+# x (C, V, 3, LANES) float32 [m], see snug.lanes -> values (C, LANES) [J]; its second argument is like x,
+# and the gradients [N] are added to it.
 Kernel = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -71,10 +71,10 @@ def _weight(energy: Any) -> Kernel:
 def inertia_kernel(energy: Inertia, ahead: np.ndarray, windows: int, *, detached: bool) -> Kernel:
     """With a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t: E = m / (2 dt^2) |a|^2, zero for the first two frames.
 
-    ahead (T W, 3, LANES) [m]; detached: no gradient by earlier frames.
+    ahead (C, 3, LANES) [m], of windows that fill whole blocks; detached: no gradient by earlier frames.
     """
     stiffness = (energy.masses / energy.dt**2).astype(np.float32)[:, None, None]
-    one = -(-windows // LANES)  # blocks a frame
+    one = windows // LANES  # blocks a frame
 
     def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
         a = x[2 * one :] - x[one:-one]

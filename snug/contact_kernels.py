@@ -93,11 +93,11 @@ def contact_energy(
     slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:  # fmt: skip
-    """k max(margin - d, 0)^power of each sample, summed: values (T W, LANES), and added up: gradients like x.
+    """k max(margin - d, 0)^power of each sample, summed: values (C, LANES), and added up: gradients like x.
 
-    x (T W, V, 3, LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first asked whether it counts from the
-    end. Most samples are out of reach, and for them it is the loads that count: what they read of a frame is
-    first laid together.
+    x (C, V, 3, LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first asked
+    whether it counts from the end. Most samples are out of reach, and for them it is the loads that count:
+    what they read of a frame is first laid together.
     """
     # Normals have 127 times unit length, within 0.9 by rounding.
     reach = np.float32(128.0) * (margin + slack if walk else margin)
@@ -107,7 +107,7 @@ def contact_energy(
     skin, m = np.zeros(size + 1, np.float32), np.zeros(size + 1, np.float32)
     for n in range(frames.size):
         frame, window = divmod(n, len(frames))
-        block, lane = frame * (len(x) // frames.shape[1]) + window // LANES, window % LANES
+        block, lane = divmod(n, LANES)
         for v in range(vertices):
             for c in range(3):
                 garment[3 * v + c] = x[block, v, c, lane]
@@ -127,7 +127,7 @@ def contact_energy(
                 continue
             if walk and along < reach:  # not a sample that is no number
                 face, v, w = walk_to_foot(
-                    x0, x1, x2, face, body, faces, adjacency, centroids, homes[s], region, corners
+                    x0, x1, x2, face, body, faces, adjacency, centroids, homes, s, region, corners
                 )
                 anchors[s] = face
                 parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))

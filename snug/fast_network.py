@@ -6,8 +6,9 @@ For each layer, with gates r, z, candidate n and q = W_hn h + b_hn (torch.nn.GRU
     n = tanh(W_in x + b_in + r q)            h' = (1 - z) n + z h
 
 Three things make it faster than torch.nn.GRU under autograd: products of one sort are taken for all frames
-together, weight gradients above all; what stands between them is one kernel; and matrix products go to oneDNN where torch has it, which on a CPU with
-AVX-512 that is not Intel's is twice as fast as MKL. The weights stay those of the modules.
+together, weight gradients above all; what stands between them is one kernel; and matrix products go to oneDNN
+where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The weights stay
+those of the modules.
 tests/test_regressor.py holds values and gradients to the modules' own.
 """
 

@@ -10,43 +10,44 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from reference_sim.kernel_cache import njit
 from snug.fast_network import product
-from snug.lanes import LANES, filled, laid, unlaid
+from snug.lanes import LANES, laid, unlaid
 from snug.vector_rows import copy_lanes
 
 
 class FastSkin(torch.autograd.Function):
     """apply(points (N, T, V, 3) [m], weights (V, J), transforms (N, T, J, 3, 4)) -> (N, T, V, 3) [m].
 
-    In float32, differentiable once, by the points alone. Points and their gradients lie as FastLinear has its results.
+    In float32, differentiable once, by the points alone, which lie in memory as FastLinear lays its results.
     """
 
     @staticmethod
     def forward(ctx: Any, points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-        entries = torch.from_numpy(laid(transforms.flatten(-2)))  # (T W, J, 12, LANES)
+        entries = torch.from_numpy(laid(transforms.flatten(-2)))  # (C, J, 12, LANES)
         entries = entries.movedim(1, -1).flatten(0, 2)
         ctx.blended = product(weights, entries).view(len(weights), -1, 12 * LANES).numpy()
-        columns = filled(points.detach()).permute(2, 3, 1, 0).contiguous()  # (V, 3, T, W LANES)
+        columns = points.detach().permute(2, 3, 1, 0).flatten(2)  # (V, 3, T N)
+        columns = nn.functional.pad(columns, (0, -columns.shape[2] % LANES)).contiguous()
         posed = np.empty((ctx.blended.shape[1], len(weights), 3, LANES), np.float32)
         _posed(columns.numpy().ravel(), ctx.blended, posed.ravel())
-        return unlaid(posed, len(points))
+        return unlaid(posed, *points.shape[:2])
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
         windows, frames, vertices, _ = above[0].shape
         back = np.empty((vertices, 3, ctx.blended.shape[1], LANES), np.float32)
         _turned_back(laid(above[0]).ravel(), ctx.blended, back.ravel())
-        columns = torch.from_numpy(back).flatten(2).unflatten(2, (frames, -1))[..., :windows]
-        return columns.permute(3, 2, 0, 1), None, None
+        columns = torch.from_numpy(back).flatten(2)[..., : frames * windows]
+        return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
 
 
 # The point is copied into one small array of known size, for the reason given in snug.batched_kernels.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
-    """Flat points (V, 3, T W, LANES), blended (V, T W, 12 LANES), flat out (T W, V, 3, LANES)."""
+    """Flat points (V, 3, C, LANES), blended (V, C, 12 LANES), flat out (C, V, 3, LANES)."""
     L, (vertices, blocks, _) = LANES, blended.shape
     u = np.empty(3 * L, np.float32)
     for v in range(vertices):

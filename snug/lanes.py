@@ -1,9 +1,10 @@
-"""How training on a CPU lays out vertices: windows of a batch side by side in vector registers.
+"""How training on a CPU lays out vertices: LANES frames of a batch side by side in vector registers.
 
-Vertices (N, T, V, 3) of N windows of T frames lie in memory as (T W, V, 3, LANES), for each frame W blocks of
-LANES windows. Skinning writes this layout and the kernels of the energies and of contact take it as it is:
-their innermost loop runs over the lanes. Of LANES windows, as training has, the tensor is a view of it, of
-any other number a copy. Its shape is (N, T, V, 3) in any case, and whatever has no kernel works on it too.
+Vertices (N, T, V, 3) of N windows of T frames lie in memory as C blocks of LANES frames, (C, V, 3, LANES):
+the first frames of all windows, then the second ones, and so on. Skinning writes this layout and the kernels
+of the energies and of contact take it as it is: their innermost loop runs over the lanes. Of LANES windows,
+as training has, the tensor is a view of it, of most other numbers a copy. Its shape is (N, T, V, 3) in any
+case, and whatever has no kernel works on it too.
 """
 
 from __future__ import annotations
@@ -15,19 +16,19 @@ from torch import Tensor
 LANES = 16
 
 
-def filled(x: Tensor) -> Tensor:
-    """(N, ...) with the last row repeated until rows fill blocks of LANES."""
-    missing = -len(x) % LANES
-    return torch.cat([x, x[-1:].expand(missing, *x.shape[1:])]) if missing else x
-
-
 def laid(x: Tensor) -> np.ndarray:
-    """(N, T, ...) -> (T W, ..., LANES), W = ceil(N / LANES); lanes beyond the last window repeat it."""
-    blocks = filled(x.detach()).unflatten(0, (-1, LANES)).movedim(1, -1)  # (W, T, ..., LANES)
-    return blocks.transpose(0, 1).flatten(0, 1).contiguous().numpy()
+    """(N, T, ...) -> (C, ..., LANES), C = ceil(T N / LANES); lanes beyond the last frame repeat it."""
+    x = x.detach().transpose(0, 1)
+    if x.shape[1] % LANES:
+        rows = x.flatten(0, 1)
+        x = torch.cat([rows, rows[-1:].expand(-len(rows) % LANES, *rows.shape[1:])])[None]
+    return x.unflatten(1, (-1, LANES)).movedim(2, -1).flatten(0, 1).contiguous().numpy()
 
 
-def unlaid(lanes: np.ndarray, windows: int) -> Tensor:
-    """The inverse of `laid`: (T W, ..., LANES) -> (N, T, ...)."""
-    blocks = torch.from_numpy(lanes).unflatten(0, (-1, -(-windows // LANES)))  # (T, W, ..., LANES)
-    return blocks.movedim(-1, 2).flatten(1, 2)[:, :windows].transpose(0, 1)
+def unlaid(lanes: np.ndarray, windows: int, frames: int) -> Tensor:
+    """The inverse of `laid`: (C, ..., LANES) -> (N, T, ...)."""
+    apart = windows % LANES == 0  # then no block holds frames of two times
+    x = torch.from_numpy(lanes).unflatten(0, (frames if apart else 1, -1)).movedim(-1, 2).flatten(1, 2)
+    if not apart:
+        x = x[0, : frames * windows].unflatten(0, (frames, windows))
+    return x.transpose(0, 1)

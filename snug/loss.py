@@ -40,7 +40,7 @@ from reference_sim.energies import (
 from snug.baselines.springs import SquaredContact, spring_terms
 from snug.batched_kernels import KERNELS, Kernel, batched_kernel, inertia_kernel
 from snug.device import CPU
-from snug.lanes import laid, unlaid
+from snug.lanes import LANES, laid, unlaid
 from snug.recipe import TERMS, Recipe
 from snug.trainable_energies import find_energy
 
@@ -90,8 +90,8 @@ class ClosedForms(torch.autograd.Function):
     def forward(ctx: Any, x: Tensor, *kernels: Kernel) -> tuple[Tensor, ...]:
         lanes = laid(x)
         gradient = np.zeros_like(lanes)
-        values = tuple(unlaid(kernel(lanes, gradient), len(x)) for kernel in kernels)
-        ctx.gradient = unlaid(gradient, len(x))
+        values = tuple(unlaid(kernel(lanes, gradient), *x.shape[:2]) for kernel in kernels)
+        ctx.gradient = unlaid(gradient, *x.shape[:2])
         return values
 
     @staticmethod
@@ -181,13 +181,14 @@ class PhysicsLoss:
         closed: dict[str, Tensor] = {}
         if self.kernels and x.dtype == torch.float32:
             kernels = self._kernels(x, ahead, planes)
-            closed = dict(zip(kernels, ClosedForms.apply(x, *kernels.values()))) if kernels else {}
+            energies: Any = ClosedForms
+            closed = dict(zip(kernels, energies.apply(x, *kernels.values()) if kernels else ()))
         terms = {}
         for name, energy in self.static.items():
             kernels_too = self.kernels and has_kernel(energy)
             terms[name] = closed[name] if name in closed else summed(energy, x, kernels=kernels_too)
         if "inertia" in self.terms and x.shape[1] >= 3:
-            terms["inertia"] = closed["inertia"] if closed else self._inertia(x, ahead)
+            terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead)
         if "collision" in self.terms and planes is not None:
             if "collision" in closed:
                 terms["collision"] = closed["collision"]
@@ -197,8 +198,8 @@ class PhysicsLoss:
 
     def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Kernel]:
         """Those terms that have a kernel in lanes."""
-        found = {name: batched_kernel(energy) for name, energy in self.static.items()}
-        if "inertia" in self.terms and x.shape[1] >= 3:
+        found: dict[str, Any] = {name: batched_kernel(energy) for name, energy in self.static.items()}
+        if "inertia" in self.terms and x.shape[1] >= 3 and len(x) % LANES == 0:
             found["inertia"] = inertia_kernel(self.inertia, laid(ahead), len(x), detached=self.detached)
         if "collision" in self.terms and callable(planes):
             found["collision"] = planes

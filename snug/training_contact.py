@@ -79,14 +79,14 @@ class TrainingContact:
         self._before: tuple[Any, ...] | None = None
         self._credit = 0.0
 
-    def _skinned(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
-        """Patch positions (..., P, 3) of unposed ones, with pose correctives; or of `every` so many."""
-        rest = rest[..., ::every, :]
+    def _skinned(self, rest: Tensor, transforms: Tensor, which: Any = slice(None)) -> Tensor:
+        """Patch positions (..., P, 3) of unposed ones, with pose correctives; or of some of them."""
+        rest = rest[..., which, :]
         if self.correctives is not None:
             parents = self.data.dressed.parents
-            directions = self.correctives[::every].to(rest.device)
+            directions = self.correctives[which].to(rest.device)
             rest = corrected(rest, directions, transforms, parents)
-        return skin(rest, self.weights[::every].to(rest.device), transforms)
+        return skin(rest, self.weights[which].to(rest.device), transforms)
 
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
         """Patch positions and normals (F, P, 3) of every frame: one body shape, computed once."""
@@ -110,8 +110,9 @@ class TrainingContact:
         """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]; to propagate by."""
         # On the CPU whatever the device, so that processes that share a run propagate alike.
         rest = self.template.cpu()
+        marked = np.argsort(self.patch.body_vertices)[::MARKED]
         parts = self.data.transforms.split(TOGETHER)
-        return np.concatenate([self._skinned(rest, part.cpu(), MARKED).numpy() for part in parts])
+        return np.concatenate([self._skinned(rest, part.cpu(), marked).numpy() for part in parts])
 
     def posed(self, batch: Batch) -> Posed:
         """The body where the frames of a batch have it."""
@@ -135,12 +136,13 @@ class TrainingContact:
         """
         walk = x is not None
         if walk:
-            rows = np.unique(batch.frames)
-            self._before = rows, *(table[rows] for table in self._tables())
+            held = np.unique(batch.frames)
+            self._before = held, *(table[held] for table in self._tables())
         if isinstance(self.cache, ContactCache):
             cache, (of_body, *body) = self.cache, posed
             rows = of_body.reshape(batch.frames.shape)
-            return lambda *lanes: cache.energy(self.contact, *lanes, batch.frames, rows, *body, walk=walk)
+            where = batch.frames, rows, *body
+            return lambda lanes, into: cache.energy(self.contact, lanes, into, *where, walk=walk)
         flat = batch.frames.ravel()
         if x is not None:
             samples = self._samples(x.detach().flatten(0, 1))

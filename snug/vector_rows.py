@@ -16,9 +16,10 @@ from numba.extending import intrinsic
 from snug.lanes import LANES
 
 WIDE = ir.IntType(64)
+_intrinsic: Any = intrinsic  # to a caller it has not the arguments of the function that types it
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_intrinsic
 def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     """Row j of target becomes row i of source: rows of LANES numbers in flat float32 arrays."""
 
@@ -30,7 +31,7 @@ def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     return types.void(source, i, target, j), built
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_intrinsic
 def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     """Row i of source is added to row j of target, which may also be one of float64."""
 
@@ -45,7 +46,7 @@ def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     return types.void(source, i, target, j), built
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_intrinsic
 def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
     """u rows[i] + v rows[j] + w rows[k], three numbers: rows of three in a flat float32 array, and one number
     more after the last, for a row is loaded as four.
@@ -68,7 +69,7 @@ def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any
 
 
 def _place(context: Any, builder: Any, kinds: Any, args: Any, size: int, loaded: int) -> Any:
-    """Where a row of so many numbers begins, as a pointer to a vector; kinds, args: of array and row number."""
+    """Where a row of `size` numbers begins, as a vector. kinds, args: of array and row number."""
     array, number = kinds
     start = context.make_array(array)(context, builder, args[0]).data
     place = builder.gep(start, [builder.mul(context.cast(builder, args[1], number, types.intp), WIDE(size))])

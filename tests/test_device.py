@@ -197,7 +197,7 @@ def lane_by_lane(kernel, x):
     lanes = laid(torch.as_tensor(x)[:, None])
     gradients = np.zeros_like(lanes)
     values = kernel(lanes, gradients)
-    return (unlaid(found, len(x))[:, 0].numpy() for found in (values, gradients))
+    return (unlaid(found, len(x), 1)[:, 0].numpy() for found in (values, gradients))
 
 
 @pytest.mark.parametrize("count", [1, 16, 21])

@@ -242,7 +242,7 @@ def test_energy_at_anchors_is_that_of_their_planes(recipe):
         lanes, rows = laid(x[:, None]), np.arange(2)[:, None]
         gradients = np.zeros_like(lanes)
         values = anchors.energy(contact, lanes, gradients, frames[:, None], rows, skin_now, normals)
-        return (unlaid(taken, 2)[:, 0].numpy() for taken in (values, gradients))
+        return (unlaid(taken, 2, 1)[:, 0].numpy() for taken in (values, gradients))
 
     values, gradients = energies()
     points, directions = anchors.planes(frames, np.arange(2), skin_now, normals)
