@@ -193,6 +193,7 @@ class PhysicsLoss:
             if "collision" in closed:
                 terms["collision"] = closed["collision"]
             else:
+                assert isinstance(planes, tuple)
                 terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
         return terms
 
