@@ -24,8 +24,6 @@ from snug.contact_kernels import PARTS, byte_normals, contact_energy, interpolat
 from snug.lanes import LANES
 from snug.surface_walk import SLACK, triangle_adjacency
 
-# m: body vertices within this of the garment at rest lie together in memory, for hardly any others are read.
-TOUCHED = 0.05
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
 
@@ -65,10 +63,8 @@ class Patch:
         kept = body_faces[np.isfinite(distance)]
         if len(kept) == 0:
             raise ValueError(f"no body face lies within {region} m of the garment: they do not fit together")
-        vertices, flat = np.unique(kept, return_inverse=True)
-        away, _ = cKDTree(samples).query(body_positions[vertices])
-        order = np.argsort(away > TOUCHED, kind="stable")
-        body_vertices, faces = vertices[order], np.argsort(order)[flat].reshape(-1, 3).astype(np.int32)
+        body_vertices, flat = np.unique(kept, return_inverse=True)
+        faces = flat.reshape(-1, 3).astype(np.int32)
         rest = body_positions[body_vertices].astype(np.float32)
         centroids = rest[faces].mean(axis=1)
         return cls(

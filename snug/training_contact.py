@@ -79,14 +79,14 @@ class TrainingContact:
         self._before: tuple[Any, ...] | None = None
         self._credit = 0.0
 
-    def _skinned(self, rest: Tensor, transforms: Tensor, which: Any = slice(None)) -> Tensor:
-        """Patch positions (..., P, 3) of unposed ones, with pose correctives; or of some of them."""
-        rest = rest[..., which, :]
+    def _skinned(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
+        """Patch positions (..., P, 3) of unposed ones, with pose correctives; or of `every` so many."""
+        rest = rest[..., ::every, :]
         if self.correctives is not None:
             parents = self.data.dressed.parents
-            directions = self.correctives[which].to(rest.device)
+            directions = self.correctives[::every].to(rest.device)
             rest = corrected(rest, directions, transforms, parents)
-        return skin(rest, self.weights[which].to(rest.device), transforms)
+        return skin(rest, self.weights[::every].to(rest.device), transforms)
 
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
         """Patch positions and normals (F, P, 3) of every frame: one body shape, computed once."""
@@ -110,9 +110,8 @@ class TrainingContact:
         """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]; to propagate by."""
         # On the CPU whatever the device, so that processes that share a run propagate alike.
         rest = self.template.cpu()
-        marked = np.argsort(self.patch.body_vertices)[::MARKED]
         parts = self.data.transforms.split(TOGETHER)
-        return np.concatenate([self._skinned(rest, part.cpu(), marked).numpy() for part in parts])
+        return np.concatenate([self._skinned(rest, part.cpu(), MARKED).numpy() for part in parts])
 
     def posed(self, batch: Batch) -> Posed:
         """The body where the frames of a batch have it."""
