@@ -194,6 +194,16 @@ def test_closed_forms_train_as_the_modules_do(frames, state):
         assert (a_gradients[name] - gradient).norm() < 1e-5 * gradient.norm(), name
 
 
+def test_closed_forms_hide_no_window_that_is_no_number():
+    torch.manual_seed(0)
+    network = Regressor(12, 40, hidden=32, layers=3)
+    network.closed_form = True
+    features = 50.0 * torch.randn(4, 3, 12)  # far beyond where a gate is open or closed
+    features[2, 1, 5] = torch.nan
+    offsets, _ = network(features)
+    assert offsets[2, 1:].isnan().all() and offsets[[0, 1, 3]].isfinite().all()
+
+
 def test_without_gradients_a_network_gives_what_it_trains_with():
     torch.manual_seed(0)
     network = Regressor(12, 40, hidden=32, layers=3)
