@@ -209,7 +209,11 @@ class FastLinear(torch.autograd.Function):
 
 
 def run_gru(gru: nn.GRU, x: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor]:
-    """What gru(x, state) gives, for a gru of batches first, in one direction and without dropout."""
+    """What gru(x, state) gives, for a gru of batches first, in one direction and without dropout. Raises
+    ValueError for a number of units that does not fill lanes.
+    """
+    if gru.hidden_size % LANES:
+        raise ValueError(f"{gru.hidden_size} recurrent units: closed forms want a multiple of {LANES}")
     if state is None:
         state = x.new_zeros(gru.num_layers, len(x), gru.hidden_size)
     weights = [weight for layer in gru.all_weights for weight in layer]

@@ -204,6 +204,13 @@ def test_closed_forms_hide_no_window_that_is_no_number():
     assert offsets[2, 1:].isnan().all() and offsets[[0, 1, 3]].isfinite().all()
 
 
+def test_closed_forms_refuse_units_that_fill_no_lanes():
+    network = Regressor(12, 40, hidden=24, layers=1)
+    network.closed_form = True
+    with pytest.raises(ValueError, match="24 recurrent units.*multiple of 16"):
+        network(torch.randn(1, 3, 12))
+
+
 def test_without_gradients_a_network_gives_what_it_trains_with():
     torch.manual_seed(0)
     network = Regressor(12, 40, hidden=32, layers=3)
