@@ -29,7 +29,7 @@ def triangle_adjacency(faces: np.ndarray) -> np.ndarray:
     return adjacency.reshape(-1, 3)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, inline="always", error_model="numpy")  # a call costs as much as a walk
 def walk_to_foot(
     x0: np.float32,
     x1: np.float32,
@@ -39,14 +39,15 @@ def walk_to_foot(
     faces: np.ndarray,
     adjacency: np.ndarray,
     centroids: np.ndarray,
-    home: np.ndarray,
+    homes: np.ndarray,
+    sample: int,
     reach: np.float32,
     corners: np.ndarray,
 ) -> tuple[np.uint32, np.float32, np.float32]:
     """Face, and weights of its second and third corner, where an anchor comes to rest for a sample at x.
 
-    centroids (Q, 3) and home (3,) [m] at rest, reach [m^2]: the rule of regions, squared. corners (1, 3, 3):
-    room to work in.
+    centroids (Q, 3) and homes (S, 3) [m] at rest, reach [m^2]: the rule of regions, squared.
+    corners (1, 3, 3): room to work in.
     """
     last, zero, one = face, np.float32(0.0), np.float32(1.0)
     for _ in range(CROSSINGS):
@@ -71,9 +72,9 @@ def walk_to_foot(
         if other < 0 or np.uint32(other) == last:
             break
         d0, d1, d2 = (
-            centroids[other, 0] - home[0],
-            centroids[other, 1] - home[1],
-            centroids[other, 2] - home[2],
+            centroids[other, 0] - homes[sample, 0],
+            centroids[other, 1] - homes[sample, 1],
+            centroids[other, 2] - homes[sample, 2],
         )
         if d0 * d0 + d1 * d1 + d2 * d2 > reach:
             break

@@ -2,10 +2,8 @@
 
 The closed forms are those beside the definitions in `reference_sim.energies`; what differs is the order of
 the work. Training evaluates one mesh in some fifty configurations, so each element is worked out for LANES
-of them side by side: positions are laid out (configurations / LANES, V, 3, LANES), the innermost loop has a
-fixed length and no branch, and the compiler turns it into vector instructions. For 48 shirts of 1000
-vertices bending takes 1.7 instead of 6.4 ms and strain 0.8 instead of 1.6 on one core with AVX-512.
-tests/test_loss.py holds both to the definitions.
+of them side by side (snug.lanes): the innermost loop has a fixed length and no branch, and the compiler turns
+it into vector instructions. tests/test_loss.py holds them to the definitions.
 """
 
 from __future__ import annotations
@@ -16,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
+from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 from reference_sim.kernel_cache import njit
+from snug.lanes import LANES
+from snug.vector_rows import add_lanes, copy_lanes
 
-LANES = 16
 # No assumption on NaN or infinity: the guard of training must see them.
 FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -34,12 +33,14 @@ _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7 = (
 )  # fmt: skip
 
 
-Kernel = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+# x (C, V, 3, LANES) float32 [m], see snug.lanes -> values (C, LANES) [J]; its second argument is like x,
+# and the gradients [N] are added to it.
+Kernel = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @lru_cache(maxsize=16)
 def batched_kernel(energy: Energy) -> Kernel | None:
-    """x (N, V, 3) float32 -> values (N,) [J], gradients (N, V, 3) [N] of this energy; None if it has none."""
+    """The kernel of this energy; None if it has none."""
     make = KERNELS.get(type(energy))
     return make(energy) if make else None
 
@@ -60,28 +61,47 @@ def _weight(energy: Any) -> Kernel:
     weights = energy.weights.astype(np.float32)
     zero = np.float32(energy.weights.sum() * energy.origin_height)
 
-    def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        gradients = np.zeros_like(x)
-        gradients[..., 1] = weights
-        return x[..., 1] @ weights - zero, gradients
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        gradients[:, :, 1] += weights[:, None]
+        return weights @ x[:, :, 1] - zero
+
+    return run
+
+
+def inertia_kernel(energy: Inertia, ahead: np.ndarray, windows: int, *, detached: bool) -> Kernel:
+    """With a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t: E = m / (2 dt^2) |a|^2, zero for the first two frames.
+
+    ahead (C, 3, LANES) [m], of windows that fill whole blocks; detached: no gradient by earlier frames.
+    """
+    stiffness = (energy.masses / energy.dt**2).astype(np.float32)[:, None, None]
+    one = windows // LANES  # blocks a frame
+
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        a = x[2 * one :] - x[one:-one]
+        a -= x[one:-one]
+        a += x[: -2 * one]
+        a -= ahead[2 * one :, None]
+        force = stiffness * a
+        gradients[2 * one :] += force
+        a *= force
+        values = np.zeros((len(x), LANES), np.float32)
+        values[2 * one :] = 0.5 * a.sum((1, 2), dtype=np.float64)
+        if not detached:
+            gradients[: -2 * one] += force
+            force += force
+            gradients[one:-one] -= force
+        return values
 
     return run
 
 
 def _runner(kernel: Any, stencils: np.ndarray, constants: tuple[Any, ...]) -> Kernel:
-    stencils = stencils.astype(np.int32)
+    stencils = stencils.astype(np.uint32)  # for a signed index is first asked whether it counts from the end
 
-    def run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        count, vertices = len(x), x.shape[1]
-        blocks = -(-count // LANES)
-        if blocks * LANES > count:  # the last configuration fills the last block
-            x = np.concatenate([x, np.repeat(x[-1:], blocks * LANES - count, axis=0)])
-        laid = x.reshape(blocks, LANES, vertices, 3).transpose(0, 2, 3, 1).reshape(blocks, vertices, -1)
-        laid, values = np.ascontiguousarray(laid), np.empty((blocks, LANES), np.float32)
-        gradients = np.zeros_like(laid)
-        kernel(laid, stencils, *constants, values, gradients)
-        gradients = gradients.reshape(blocks, vertices, 3, LANES).transpose(0, 3, 1, 2)
-        return values.ravel()[:count], gradients.reshape(-1, vertices, 3)[:count]
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        values = np.empty((len(x), LANES), np.float32)
+        kernel(x.ravel(), stencils, *constants, values, gradients.ravel())
+        return values
 
     return run
 
@@ -111,18 +131,6 @@ def _arctan2(y: np.float32, x: np.float32) -> np.float32:
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _take(x: np.ndarray, i: int, u: np.ndarray, corner: int) -> None:
-    for j in range(3 * LANES):
-        u[3 * LANES * corner + j] = x[i, j]
-
-
-@njit(cache=True, fastmath=FAST, error_model="numpy")
-def _give(u: np.ndarray, corner: int, gradient: np.ndarray, i: int) -> None:
-    for j in range(3 * LANES):
-        gradient[i, j] += u[3 * LANES * corner + j]
-
-
-@njit(cache=True, fastmath=FAST, error_model="numpy")
 def _bending(
     x: np.ndarray,
     hinges: np.ndarray,
@@ -134,12 +142,14 @@ def _bending(
     """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, w as in bend_hinge._hessian."""
     L = LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
-    for block in range(len(x)):
+    for block in range(len(values)):
         total[:] = 0.0
+        first = len(x) // (3 * L * len(values)) * block  # of the block's vertices
         for h in range(len(hinges)):
             k, angle = stiffness[h], rest[h]
             for corner in range(4):
-                _take(x[block], hinges[h, corner], u, corner)
+                for axis in range(3):
+                    copy_lanes(x, 3 * (first + hinges[h, corner]) + axis, u, 3 * corner + axis)
             for n in range(L):
                 ex, ey, ez = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
                 rx, ry, rz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
@@ -164,10 +174,10 @@ def _bending(
                 u[5 * L + n] = a1 * az + b1 * bz
                 u[6 * L + n], u[7 * L + n], u[8 * L + n] = a2 * ax, a2 * ay, a2 * az
                 u[9 * L + n], u[10 * L + n], u[11 * L + n] = b2 * bx, b2 * by, b2 * bz
-            for n in range(L):
-                total[n] += energy[n]
+            add_lanes(energy, 0, total, 0)
             for corner in range(4):
-                _give(u, corner, gradients[block], hinges[h, corner])
+                for axis in range(3):
+                    add_lanes(u, 3 * corner + axis, gradients, 3 * (first + hinges[h, corner]) + axis)
         values[block] = total
 
 
@@ -185,13 +195,15 @@ def _strain(
     """E = A (lambda/2 tr(G)^2 + mu tr(G^2)), dE/dx_a = A F S b_a, see stretch_stvk._gradient."""
     L = LANES
     u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)
-    for block in range(len(x)):
+    for block in range(len(values)):
         total[:] = 0.0
+        first = len(x) // (3 * L * len(values)) * block  # of the block's vertices
         for f in range(len(faces)):
             d00, d01, d10, d11 = Dm_inverse[f, 0], Dm_inverse[f, 1], Dm_inverse[f, 2], Dm_inverse[f, 3]
             area = areas[f]
             for corner in range(3):
-                _take(x[block], faces[f, corner], u, corner)
+                for axis in range(3):
+                    copy_lanes(x, 3 * (first + faces[f, corner]) + axis, u, 3 * corner + axis)
             for n in range(L):
                 ax, ay, az = u[3 * L + n] - u[n], u[4 * L + n] - u[L + n], u[5 * L + n] - u[2 * L + n]
                 bx, by, bz = u[6 * L + n] - u[n], u[7 * L + n] - u[L + n], u[8 * L + n] - u[2 * L + n]
@@ -213,8 +225,8 @@ def _strain(
                 u[n], u[L + n], u[2 * L + n] = -ax - bx, -ay - by, -az - bz
                 u[3 * L + n], u[4 * L + n], u[5 * L + n] = ax, ay, az
                 u[6 * L + n], u[7 * L + n], u[8 * L + n] = bx, by, bz
-            for n in range(L):
-                total[n] += energy[n]
+            add_lanes(energy, 0, total, 0)
             for corner in range(3):
-                _give(u, corner, gradients[block], faces[f, corner])
+                for axis in range(3):
+                    add_lanes(u, 3 * corner + axis, gradients, 3 * (first + faces[f, corner]) + axis)
         values[block] = total

@@ -22,6 +22,7 @@ from reference_sim.energies import ContactPenalty
 from reference_sim.obstacle import DEFAULT_REGION
 from reference_sim.surface_walk import SLACK, triangle_adjacency
 from snug.contact_kernels import PARTS, byte_normals, contact_energy, interpolated_planes
+from snug.lanes import LANES
 
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
@@ -153,20 +154,22 @@ class ContactCache:
         self,
         contact: ContactPenalty,
         x: np.ndarray,
+        gradients: np.ndarray,
         frames: np.ndarray,
         rows: np.ndarray,
         positions: np.ndarray,
         normals: np.ndarray,
         *,
         walk: bool = False,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Contact energy of garments x (N, V, 3) float32 [m] in frames (N,), with the planes of `planes`.
+    ) -> np.ndarray:
+        """Contact energy of garments x (C, V, 3, LANES) float32 [m], see snug.lanes, in frames (N, T), with
+        the planes of `planes`; rows (N, T).
 
-        -> values (N,) [J], gradients (N, V, 3) [N], float32. walk: anchors near the skin first walk to
-        where their samples are, and are remembered there. A sample that is out of reach costs no more than
-        the look at its anchor, and no plane is stored.
+        -> values (C, LANES) [J], zero in lanes beyond the last frame; adds to gradients like x [N]. walk:
+        anchors near the skin first walk to where their samples are, and are remembered there. A sample that
+        is out of reach costs no more than the look at its anchor, and no plane is stored.
         """
-        values, gradients = np.empty(len(x), np.float32), np.zeros_like(x)
+        values = np.zeros((len(x), LANES), np.float32)
         contact_energy(
             x,
             *_samples(contact),
@@ -187,7 +190,7 @@ class ContactCache:
             values,
             gradients,
         )
-        return values, gradients
+        return values
 
     def requery(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame.

@@ -7,6 +7,8 @@ import numpy as np
 from reference_sim.kernel_cache import njit
 from reference_sim.surface import vertex_normals
 from reference_sim.surface_walk import walk_to_foot
+from snug.lanes import LANES
+from snug.vector_rows import mixed_rows
 
 PARTS = 255.0  # of a barycentric coordinate
 
@@ -69,18 +71,17 @@ def _above(
     face: np.uint32,
     parts: np.ndarray,
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-    """Height of a sample above its anchor's plane, times the length of the normal; and that normal."""
+    """Height of a sample above its anchor's plane, times the length of the normal; and that normal.
+
+    skin, m: positions and normals of the body, flat as `mixed_rows` wants them.
+    """
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
     whole = np.float32(1.0) / np.float32(PARTS)
     v, w = whole * np.float32(parts[0]), whole * np.float32(parts[1])
     u = np.float32(1.0) - v - w
-    x0 -= u * skin[i, 0] + v * skin[j, 0] + w * skin[k, 0]
-    x1 -= u * skin[i, 1] + v * skin[j, 1] + w * skin[k, 1]
-    x2 -= u * skin[i, 2] + v * skin[j, 2] + w * skin[k, 2]
-    n0 = u * m[i, 0] + v * m[j, 0] + w * m[k, 0]
-    n1 = u * m[i, 1] + v * m[j, 1] + w * m[k, 1]
-    n2 = u * m[i, 2] + v * m[j, 2] + w * m[k, 2]
-    return n0 * x0 + n1 * x1 + n2 * x2, n0, n1, n2
+    c0, c1, c2 = mixed_rows(skin, i, j, k, u, v, w)
+    n0, n1, n2 = mixed_rows(m, i, j, k, u, v, w)
+    return n0 * (x0 - c0) + n1 * (x1 - c1) + n2 * (x2 - c2), n0, n1, n2
 
 
 # No assumption on NaN or infinity: the guard of training must see them.
@@ -92,30 +93,41 @@ def contact_energy(
     slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:  # fmt: skip
-    """k max(margin - d, 0)^power of each sample, summed: values (N,), and added up: gradients (N, V, 3).
+    """k max(margin - d, 0)^power of each sample, summed: values (C, LANES), and added up: gradients like x.
 
-    stencils, faces: uint32, for a signed index is first asked whether it counts from the end.
+    x (C, V, 3, LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first asked
+    whether it counts from the end. Most samples are out of reach, and for them it is the loads that count:
+    what they read of a frame is first laid together.
     """
     # Normals have 127 times unit length, within 0.9 by rounding.
     reach = np.float32(128.0) * (margin + slack if walk else margin)
     zero, corners = np.float32(0.0), np.empty((1, 3, 3), np.float32)
-    for n in range(len(x)):
-        garment, gradient, skin, m = x[n], gradients[n], positions[rows[n]], normals[rows[n]]
-        anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
+    vertices, size = x.shape[1], 3 * positions.shape[1]
+    garment = np.zeros(3 * vertices + 1, np.float32)
+    skin, m = np.zeros(size + 1, np.float32), np.zeros(size + 1, np.float32)
+    for n in range(frames.size):
+        frame, window = divmod(n, len(frames))
+        block, lane = divmod(n, LANES)
+        for v in range(vertices):
+            for c in range(3):
+                garment[3 * v + c] = x[block, v, c, lane]
+        body = positions[rows[window, frame]]
+        given, given_normals = body.ravel(), normals[rows[window, frame]].ravel()
+        for c in range(len(given)):
+            skin[c], m[c] = given[c], given_normals[c]
+        anchors, parts = anchor_faces[frames[window, frame]], barycentric[frames[window, frame]]
         total = 0.0
         for s in range(len(stencils)):
             face = np.uint32(anchors[s])
             a, b, c = stencils[s, 0], stencils[s, 1], stencils[s, 2]
             p, q, r = weights[s, 0], weights[s, 1], weights[s, 2]
-            x0 = p * garment[a, 0] + q * garment[b, 0] + r * garment[c, 0]
-            x1 = p * garment[a, 1] + q * garment[b, 1] + r * garment[c, 1]
-            x2 = p * garment[a, 2] + q * garment[b, 2] + r * garment[c, 2]
+            x0, x1, x2 = mixed_rows(garment, a, b, c, p, q, r)
             along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, face, parts[s])
             if along >= reach:
                 continue
             if walk and along < reach:  # not a sample that is no number
                 face, v, w = walk_to_foot(
-                    x0, x1, x2, face, skin, faces, adjacency, centroids, homes[s], region, corners
+                    x0, x1, x2, face, body, faces, adjacency, centroids, homes, s, region, corners
                 )
                 anchors[s] = face
                 parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))
@@ -132,7 +144,7 @@ def contact_energy(
             total += force * depth
             force *= -np.float32(power) / length
             for corner, share in ((a, p), (b, q), (c, r)):
-                gradient[corner, 0] += share * force * n0
-                gradient[corner, 1] += share * force * n1
-                gradient[corner, 2] += share * force * n2
-        values[n] = total
+                gradients[block, corner, 0, lane] += share * force * n0
+                gradients[block, corner, 1, lane] += share * force * n1
+                gradients[block, corner, 2, lane] += share * force * n2
+        values[block, lane] = total

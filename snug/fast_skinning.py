@@ -1,7 +1,7 @@
 """`snug.skinning.skin` in closed form for many frames of one garment: what training on a CPU runs.
 
-The transforms of all vertices are one matrix product, laid out (12, V) a frame, so that the loop over
-vertices is one of vector instructions. tests/test_skinning.py holds values and gradients to `skin`.
+The transforms of all vertices are one matrix product, laid out like the vertices (snug.lanes), so that the
+loops are ones of vector instructions. tests/test_skinning.py holds values and gradients to `skin`.
 """
 
 from __future__ import annotations
@@ -10,54 +10,74 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from reference_sim.kernel_cache import njit
 from snug.fast_network import product
+from snug.lanes import LANES, laid, unlaid
+from snug.vector_rows import copy_lanes
 
 
 class FastSkin(torch.autograd.Function):
-    """apply(points (..., V, 3) [m], weights (V, J), transforms (..., J, 3, 4)) -> (..., V, 3) [m], float32.
+    """apply(points (N, T, V, 3) [m], weights (V, J), transforms (N, T, J, 3, 4)) -> (N, T, V, 3) [m].
 
-    Differentiable once, by the points alone.
+    In float32, differentiable once, by the points alone, which lie in memory as FastLinear lays its results.
     """
 
     @staticmethod
     def forward(ctx: Any, points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-        entries = transforms.flatten(-2).transpose(-1, -2).reshape(-1, weights.shape[1])
-        blended = product(entries, weights).view(-1, 12, len(weights)).numpy()
-        posed = torch.empty_like(points, memory_format=torch.contiguous_format)
-        _posed(points.detach().reshape(-1, *points.shape[-2:]).numpy(), blended, _frames(posed))
-        ctx.blended = blended
-        return posed
+        entries = torch.from_numpy(laid(transforms.flatten(-2)))  # (C, J, 12, LANES)
+        entries = entries.movedim(1, -1).flatten(0, 2)
+        ctx.blended = product(weights, entries).view(len(weights), -1, 12 * LANES).numpy()
+        columns = points.detach().permute(2, 3, 1, 0).flatten(2)  # (V, 3, T N)
+        columns = nn.functional.pad(columns, (0, -columns.shape[2] % LANES)).contiguous()
+        posed = np.empty((ctx.blended.shape[1], len(weights), 3, LANES), np.float32)
+        _posed(columns.numpy().ravel(), ctx.blended, posed.ravel())
+        return unlaid(posed, *points.shape[:2])
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
-        back = torch.empty_like(above[0], memory_format=torch.contiguous_format)
-        _turned_back(_frames(above[0].contiguous()), ctx.blended, _frames(back))
-        return back, None, None
+        windows, frames, vertices, _ = above[0].shape
+        back = np.empty((vertices, 3, ctx.blended.shape[1], LANES), np.float32)
+        _turned_back(laid(above[0]).ravel(), ctx.blended, back.ravel())
+        columns = torch.from_numpy(back).flatten(2)[..., : frames * windows]
+        return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
 
 
-def _frames(x: Tensor) -> np.ndarray:
-    return x.view(-1, *x.shape[-2:]).numpy()
-
-
+# The point is copied into one small array of known size, for the reason given in snug.batched_kernels.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
-    for n in range(len(points)):
-        p, b, q = points[n], blended[n], out[n]
-        for v in range(len(p)):
-            x, y, z = p[v, 0], p[v, 1], p[v, 2]
-            for c in range(3):
-                q[v, c] = b[4 * c, v] * x + b[4 * c + 1, v] * y + b[4 * c + 2, v] * z + b[4 * c + 3, v]
+    """Flat points (V, 3, C, LANES), blended (V, C, 12 LANES), flat out (C, V, 3, LANES)."""
+    L, (vertices, blocks, _) = LANES, blended.shape
+    u = np.empty(3 * L, np.float32)
+    for v in range(vertices):
+        for block in range(blocks):
+            b = blended[v, block]
+            for axis in range(3):
+                copy_lanes(points, (3 * v + axis) * blocks + block, u, axis)
+            for n in range(L):
+                x, y, z = u[n], u[L + n], u[2 * L + n]
+                u[n] = b[n] * x + b[L + n] * y + b[2 * L + n] * z + b[3 * L + n]
+                u[L + n] = b[4 * L + n] * x + b[5 * L + n] * y + b[6 * L + n] * z + b[7 * L + n]
+                u[2 * L + n] = b[8 * L + n] * x + b[9 * L + n] * y + b[10 * L + n] * z + b[11 * L + n]
+            for axis in range(3):
+                copy_lanes(u, axis, out, 3 * (vertices * block + v) + axis)
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _turned_back(above: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
-    """Gradients by the points: the transpose of each rotation part."""
-    for n in range(len(above)):
-        g, b, q = above[n], blended[n], out[n]
-        for v in range(len(g)):
-            x, y, z = g[v, 0], g[v, 1], g[v, 2]
-            for c in range(3):
-                q[v, c] = b[c, v] * x + b[4 + c, v] * y + b[8 + c, v] * z
+    """Gradients by the points, laid out like these: the transpose of each rotation part."""
+    L, (vertices, blocks, _) = LANES, blended.shape
+    u = np.empty(3 * L, np.float32)
+    for v in range(vertices):
+        for block in range(blocks):
+            b = blended[v, block]
+            for axis in range(3):
+                copy_lanes(above, 3 * (vertices * block + v) + axis, u, axis)
+            for n in range(L):
+                x, y, z = u[n], u[L + n], u[2 * L + n]
+                u[n] = b[n] * x + b[4 * L + n] * y + b[8 * L + n] * z
+                u[L + n] = b[L + n] * x + b[5 * L + n] * y + b[9 * L + n] * z
+                u[2 * L + n] = b[2 * L + n] * x + b[6 * L + n] * y + b[10 * L + n] * z
+            for axis in range(3):
+                copy_lanes(u, axis, out, (3 * v + axis) * blocks + block)

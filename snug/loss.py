@@ -20,7 +20,7 @@ closest point.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -38,13 +38,14 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from snug.baselines.springs import SquaredContact, spring_terms
-from snug.batched_kernels import KERNELS, batched_kernel
+from snug.batched_kernels import KERNELS, Kernel, batched_kernel, inertia_kernel
 from snug.device import CPU
+from snug.lanes import LANES, laid, unlaid
 from snug.recipe import TERMS, Recipe
 from snug.trainable_energies import find_energy
 
 STATIC = ("strain", "bending", "gravity")
-Planes = tuple[Any, Any] | Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+Planes = tuple[Any, Any] | Kernel
 
 MEMBRANES = {"stvk": StretchStVK, "springs": StretchSpring}
 
@@ -78,26 +79,42 @@ def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
     return ContactPenalty(cloth, **options)
 
 
+class ClosedForms(torch.autograd.Function):
+    """Energies of each configuration of a batch by kernels in lanes, which all add to one gradient.
+
+    apply(x (N, T, V, 3) float32, *kernels) -> as many (N, T) [J]. Differentiable once, by x alone, and only
+    in their plain sum times a number: raises ValueError for energies that are weighed against each other.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, *kernels: Kernel) -> tuple[Tensor, ...]:
+        lanes = laid(x)
+        gradient = np.zeros_like(lanes)
+        values = tuple(unlaid(kernel(lanes, gradient), *x.shape[:2]) for kernel in kernels)
+        ctx.gradient = unlaid(gradient, *x.shape[:2])
+        return values
+
+    @staticmethod
+    def backward(ctx: Any, *above: Tensor) -> Any:
+        factors = torch.stack(above)
+        if (factors != factors.flatten()[0]).any():
+            raise ValueError("kernels give the gradient of the sum of all energies of a batch: weigh none")
+        return ctx.gradient * factors.flatten()[0], *([None] * len(above))
+
+
 class ClosedForm(torch.autograd.Function):
-    """energy summed over its elements, for each configuration of a batch, by its numba kernel.
+    """An energy of each configuration of a batch by its own closed form, one configuration after the other.
 
     apply(x (..., V, 3), energy, *frame data (..., S, 3) numpy) -> (...) [J]. Differentiable once, by x alone.
-    energy may also be a function of numpy x (N, V, 3) that gives values (N,) and gradients (N, V, 3) itself.
     """
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, energy: Any, *frame_data: np.ndarray) -> Tensor:
         flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
-        together = energy if callable(energy) else None
-        if together is None and flat.dtype == np.float32 and not frame_data:
-            together = batched_kernel(energy)
-        if together is not None:
-            values, gradients = together(flat)
-        else:
-            rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
-            values, gradients = np.empty(len(flat), flat.dtype), np.empty_like(flat)
-            for n in range(len(flat)):
-                values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
+        rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
+        values, gradients = np.empty(len(flat), flat.dtype), np.empty_like(flat)
+        for n in range(len(flat)):
+            values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
         ctx.gradients = torch.from_numpy(gradients).reshape(x.shape)
         ctx.extra = len(frame_data)
         return torch.from_numpy(values).reshape(x.shape[:-2])
@@ -105,30 +122,6 @@ class ClosedForm(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
         return above[0][..., None, None] * ctx.gradients, None, *([None] * ctx.extra)
-
-
-class ClosedInertia(torch.autograd.Function):
-    """apply(x (N, T, V, 3) [m], ahead (N, T, 3) [m], masses / dt^2 (V, 1) [N/m], detached) -> (N, T) [J].
-
-    With a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t: E = m / (2 dt^2) |a|^2, zero for t < 3. Differentiable once,
-    by x alone.
-    """
-
-    @staticmethod
-    def forward(ctx: Any, x: Tensor, ahead: Tensor, stiffness: Tensor, detached: bool) -> Tensor:
-        a = torch.sub(x[:, 2:], x[:, 1:-1], alpha=2).add_(x[:, :-2]).sub_(ahead[:, 2:, None])
-        ctx.force, ctx.detached = stiffness * a, detached
-        return torch.nn.functional.pad(0.5 * (a.mul_(ctx.force)).sum((-1, -2)), (2, 0))
-
-    @staticmethod
-    def backward(ctx: Any, *above: Tensor) -> Any:
-        force = above[0][:, 2:, None, None] * ctx.force
-        gradient = force.new_zeros(force.shape[0], force.shape[1] + 2, *force.shape[2:])
-        gradient[:, 2:] = force
-        if not ctx.detached:
-            gradient[:, 1:-1].sub_(force, alpha=2)
-            gradient[:, :-2] += force
-        return gradient, None, None, None
 
 
 def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Tensor:
@@ -183,25 +176,37 @@ class PhysicsLoss:
         x: (N, T, V, 3) [m], each frame relative to its own pelvis p. ahead: (N, T, 3) [m],
         2 p_{t-1} - p_{t-2} - p_t: where the pelvis would be if it kept its velocity, seen from where it is.
         planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors; or a
-        kernel that knows its planes: x (N T, V, 3) -> values (N T,) [J], gradients (N T, V, 3) [N].
+        kernel in lanes that knows its planes.
         """
-        terms = {
-            name: summed(energy, x, kernels=self.kernels and has_kernel(energy))
-            for name, energy in self.static.items()
-        }
+        closed: dict[str, Tensor] = {}
+        if self.kernels and x.dtype == torch.float32:
+            kernels = self._kernels(x, ahead, planes)
+            energies: Any = ClosedForms
+            closed = dict(zip(kernels, energies.apply(x, *kernels.values()) if kernels else ()))
+        terms = {}
+        for name, energy in self.static.items():
+            kernels_too = self.kernels and has_kernel(energy)
+            terms[name] = closed[name] if name in closed else summed(energy, x, kernels=kernels_too)
         if "inertia" in self.terms and x.shape[1] >= 3:
-            terms["inertia"] = self._inertia(x, ahead)
+            terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead)
         if "collision" in self.terms and planes is not None:
-            if callable(planes):
-                terms["collision"] = ClosedForm.apply(x, planes)
+            if "collision" in closed:
+                terms["collision"] = closed["collision"]
             else:
+                assert isinstance(planes, tuple)
                 terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
         return terms
 
+    def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Kernel]:
+        """Those terms that have a kernel in lanes."""
+        found: dict[str, Any] = {name: batched_kernel(energy) for name, energy in self.static.items()}
+        if "inertia" in self.terms and x.shape[1] >= 3 and len(x) % LANES == 0:
+            found["inertia"] = inertia_kernel(self.inertia, laid(ahead), len(x), detached=self.detached)
+        if "collision" in self.terms and callable(planes):
+            found["collision"] = planes
+        return {name: kernel for name, kernel in found.items() if kernel}
+
     def _inertia(self, x: Tensor, ahead: Tensor) -> Tensor:
-        if self.kernels:
-            stiffness = torch.as_tensor(self.inertia.masses / self.inertia.dt**2).to(x)[:, None]
-            return ClosedInertia.apply(x, ahead, stiffness, self.detached)
         past = x.detach() if self.detached else x
         x_hat = 2 * past[:, 1:-1] - past[:, :-2] + ahead[:, 2:, None]
         inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)

@@ -248,8 +248,9 @@ class Trainer:
         with self.clock.part("forward"):
             offsets, after = self._callable(batch.features, state)
         with self.clock.part("skinning"):
+            # Offsets first: the sum then lies in memory as they do.
             posed_by = FastSkin.apply if self.kernels else skin
-            return posed_by(batch.rest + offsets, self.weights, batch.transforms), offsets, after
+            return posed_by(offsets + batch.rest, self.weights, batch.transforms), offsets, after
 
     def _set_rate(self, number: int) -> None:
         recipe, share = self.recipe, 1.0

@@ -133,13 +133,16 @@ class TrainingContact:
         x (N, T, V, 3): vertices that the anchors first walk to, until `settle` says whether for good; None
         where they have just been searched.
         """
-        flat, walk = batch.frames.ravel(), x is not None
+        walk = x is not None
         if walk:
-            rows = np.unique(flat)
-            self._before = rows, *(table[rows] for table in self._tables())
+            held = np.unique(batch.frames)
+            self._before = held, *(table[held] for table in self._tables())
         if isinstance(self.cache, ContactCache):
-            cache = self.cache
-            return lambda vertices: cache.energy(self.contact, vertices, flat, *posed, walk=walk)
+            cache, (of_body, *body) = self.cache, posed
+            rows = of_body.reshape(batch.frames.shape)
+            where = batch.frames, rows, *body
+            return lambda lanes, into: cache.energy(self.contact, lanes, into, *where, walk=walk)
+        flat = batch.frames.ravel()
         if x is not None:
             samples = self._samples(x.detach().flatten(0, 1))
             self.cache.walk(samples, flat, *posed, reach=self.contact.margin)
@@ -232,12 +235,12 @@ class TrainingContact:
         exact: see ContactCache.requery.
         """
         flat, (rows, positions, _) = frames.ravel(), posed
-        vertices = x.detach().flatten(0, 1)
-        share = len(vertices)
+        vertices, window = x.detach(), frames.shape[1]
+        share = vertices.shape[0] * window
         for place in places:
             owner, mine = divmod(int(place), share)
             if owner == self.group.rank:
-                samples = self._samples(vertices[mine])
+                samples = self._samples(vertices[divmod(mine, window)])
                 self.cache.requery(int(flat[place]), samples, positions[rows[mine]], exact=exact)
             self.cache.age[flat[place]] = 0
             self._send(int(flat[place]), owner)

@@ -12,6 +12,7 @@ from dressing import swaying, tube_dress
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
 from reference_sim.energies.bend_hinge import dihedral_angles
 from snug.contact import EXACT, PARTS, ContactCache, Patch, quantised
+from snug.lanes import laid, unlaid
 from snug.loss import PhysicsLoss, make_contact, static_terms, summed
 from snug.recipe import DEFAULT, Recipe
 from snug.recipes import PAPER, PBNS_SPRINGS, RECIPES
@@ -82,20 +83,34 @@ def test_inertia_reaches_all_three_frames():
 
 
 @pytest.mark.parametrize("detached", [False, True])
-def test_closed_inertia_is_the_definition_and_its_derivative(detached):
+@pytest.mark.parametrize("windows", [1, 16, 17])
+def test_energies_in_lanes_are_the_definitions_and_their_derivatives(windows, detached):
+    """All terms of a recipe together, whose gradients the kernels add up."""
     dressed, x, *_ = posed_batch()
-    x = torch.cat([x, x.flip(1)], 1) + 0.01 * torch.arange(6.0)[:, None, None] ** 2
-    recipe = Recipe(terms=("inertia",), detached=detached)
-    ahead, weight = 0.01 * torch.arange(18.0).reshape(1, 6, 3), torch.arange(1.0, 7.0)
+    frames = torch.cat([x, x.flip(1)], 1) + 0.01 * torch.arange(6.0)[:, None, None] ** 2
+    random = np.random.default_rng(windows)
+    x = (frames + torch.as_tensor(random.normal(0, 0.003, (windows, *frames.shape[1:])))).float()
+    recipe = replace(DEFAULT, terms=("strain", "bending", "gravity", "inertia"), detached=detached)
+    ahead = 0.01 * torch.as_tensor(random.normal(size=(windows, 6, 3))).float()
     found = []
     for kernels in (True, False):
-        loss, at = PhysicsLoss(dressed.cloth, recipe, dt=DT, kernels=kernels), x.clone().requires_grad_()
-        value = loss(at, ahead, None)["inertia"]
-        (value * weight).sum().backward()
-        found.append((value.detach(), at.grad))
-    assert found[1][1].norm() > 1e-3 and found[0][0][0, 2] > 0 and not found[0][0][0, :2].any()
-    for fast, slow in zip(*found):
-        assert torch.allclose(fast, slow, rtol=1e-5, atol=1e-7 * float(slow.abs().max()))
+        loss = PhysicsLoss(dressed.cloth, recipe, dt=DT, kernels=kernels)
+        at = (x if kernels else x.double()).clone().requires_grad_()
+        terms = loss(at, ahead, None)
+        (0.1 * torch.stack(list(terms.values()))).sum().backward()
+        found.append(([value.detach().double() for value in terms.values()], at.grad.double()))
+    (fast, gradient), (slow, exact) = found
+    assert not fast[3][:, :2].any() and (fast[3][:, 2:] > 0).all()
+    for one, other in zip(fast, slow):
+        assert one.shape == (windows, 6) and torch.allclose(one, other, rtol=1e-4)
+    assert exact.norm() > 1e-3 and (gradient - exact).norm() < 2e-4 * exact.norm()
+
+
+def test_energies_in_lanes_are_not_weighed():
+    dressed, x, *_ = posed_batch(torch.float32)
+    terms = PhysicsLoss(dressed.cloth, DEFAULT, dt=DT)(x.requires_grad_(), torch.zeros(1, 3, 3), None)
+    with pytest.raises(ValueError, match="weigh none"):
+        (terms["strain"] + 2 * terms["bending"]).sum().backward()
 
 
 def test_leaving_out_a_term_leaves_it_out():
@@ -222,7 +237,14 @@ def test_energy_at_anchors_is_that_of_their_planes(recipe):
     for row, frame in enumerate(frames):
         samples = (contact.sample_matrix @ x[row].numpy()).astype(np.float32)
         anchors.requery(int(frame), samples, skin_now[row])
-    values, gradients = anchors.energy(contact, x.numpy(), frames, np.arange(2), skin_now, normals)
+
+    def energies():
+        lanes, rows = laid(x[:, None]), np.arange(2)[:, None]
+        gradients = np.zeros_like(lanes)
+        values = anchors.energy(contact, lanes, gradients, frames[:, None], rows, skin_now, normals)
+        return (unlaid(taken, 2, 1)[:, 0].numpy() for taken in (values, gradients))
+
+    values, gradients = energies()
     points, directions = anchors.planes(frames, np.arange(2), skin_now, normals)
     for row in range(2):
         planes = points[row].astype(float), directions[row].astype(float)
@@ -230,7 +252,7 @@ def test_energy_at_anchors_is_that_of_their_planes(recipe):
         assert value > 1e-3 and values[row] == pytest.approx(value, rel=1e-4)
         assert np.linalg.norm(gradients[row] - gradient) < 1e-4 * np.linalg.norm(gradient)
     x[1, 3] = np.nan
-    values, _ = anchors.energy(contact, x.numpy(), frames, np.arange(2), skin_now, normals)
+    values, _ = energies()
     assert np.isfinite(values[0]) and np.isnan(values[1])
 
 

@@ -205,6 +205,23 @@ def test_closed_forms_train_as_the_modules_do(frames, state):
         assert (a_gradients[name] - gradient).norm() < 1e-5 * gradient.norm(), name
 
 
+def test_closed_forms_hide_no_window_that_is_no_number():
+    torch.manual_seed(0)
+    network = Regressor(12, 40, hidden=32, layers=3)
+    network.closed_form = True
+    features = 50.0 * torch.randn(4, 3, 12)  # far beyond where a gate is open or closed
+    features[2, 1, 5] = torch.nan
+    offsets, _ = network(features)
+    assert offsets[2, 1:].isnan().all() and offsets[[0, 1, 3]].isfinite().all()
+
+
+def test_closed_forms_refuse_units_that_fill_no_lanes():
+    network = Regressor(12, 40, hidden=24, layers=1)
+    network.closed_form = True
+    with pytest.raises(ValueError, match="24 recurrent units.*multiple of 16"):
+        network(torch.randn(1, 3, 12))
+
+
 def test_without_gradients_a_network_gives_what_it_trains_with():
     torch.manual_seed(0)
     network = Regressor(12, 40, hidden=32, layers=3)

@@ -69,10 +69,9 @@ def test_batches_broadcast_and_gradients_flow():
     assert torch.isfinite(gradient).all() and gradient.norm() > 1.0
 
 
-def test_closed_form_is_skinning_and_its_derivative():
-    points, transforms, above = (
-        random_tensor(*s).float() for s in ((2, 3, 50, 3), (2, 3, 4, 3, 4), (2, 3, 50, 3))
-    )
+@pytest.mark.parametrize("windows", [2, 16])
+def test_closed_form_is_skinning_and_its_derivative(windows):
+    points, transforms, above = (random_tensor(windows, 3, *s).float() for s in ((50, 3), (4, 3, 4), (50, 3)))
     weights = torch.softmax(random_tensor(50, 4), -1).float()
     fast, slow = points.clone().requires_grad_(), points.double().requires_grad_()
     posed = FastSkin.apply(fast, weights, transforms)

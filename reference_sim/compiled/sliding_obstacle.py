@@ -286,7 +286,7 @@ def _slide(
                 continue
         face, v, w = walk_to_foot(
             points[s, 0], points[s, 1], points[s, 2], np.uint32(anchors[s]), vertices, faces, adjacency,
-            centroids, home[s], reach, corners,
+            centroids, home, s, reach, corners,
         )  # fmt: skip
         anchors[s] = face
         distance[s] = _set(s, points, face, v, w, vertices, faces, barycentric, closest)
@@ -317,7 +317,7 @@ def _ask_neighbours(
                     continue
                 face, v, w = walk_to_foot(
                     points[s, 0], points[s, 1], points[s, 2], np.uint32(anchors[n]), vertices, faces,
-                    adjacency, centroids, home[s], reach, corners,
+                    adjacency, centroids, home, s, reach, corners,
                 )  # fmt: skip
                 before = barycentric[s, 1], barycentric[s, 2]
                 tried = _set(s, points, face, v, w, vertices, faces, barycentric, closest)
