@@ -218,7 +218,7 @@ def test_closed_forms_hide_no_window_that_is_no_number():
 def test_closed_forms_refuse_units_that_fill_no_lanes():
     network = Regressor(12, 40, hidden=24, layers=1)
     network.closed_form = True
-    with pytest.raises(ValueError, match="24 recurrent units.*multiple of 16"):
+    with pytest.raises(ValueError, match=r"24 recurrent units.*multiple of 16"):
         network(torch.randn(1, 3, 12))
 
 
