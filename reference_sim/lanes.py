@@ -14,7 +14,7 @@ from .kernel_cache import njit
 LANES = 8
 
 _STEEP = np.tan(np.pi / 8)
-# arctan(t) = t + t z p(z), z = t^2 up to tan(pi/8)^2: a polynomial through 13 Chebyshev points, at most 5e-17 off.
+# arctan(t) = t + t z p(z) for z = t^2 up to tan(pi/8)^2: through 13 Chebyshev points, at most 5e-17 off.
 _P0, _P1, _P2, _P3, _P4, _P5 = (
     -0.33333333333333324206, 0.19999999999997013892, -0.14285714285329708164,
     0.11111111085322108759, -0.09090908059031191027, 0.07692281099937743250,

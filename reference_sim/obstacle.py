@@ -17,7 +17,7 @@ from .closed_mesh import check_closed
 from .closest_point import Closest, FaceTree
 from .cloth import MeshError
 from .resume import fingerprint
-from .surface import carry, not_outside, plane_normals, vertex_normals
+from .surface import carry, not_outside, plane_normals, vertex_normals, widened
 
 DEFAULT_REGION = 0.20  # [m]
 
@@ -152,9 +152,11 @@ class Obstacle:
             return found
         samples = self._at_rest(rest_points)
         rest, home = samples.rest, samples.home
+        if reach is not None:
+            reach = widened(reach, points, home, samples.met, self.at(frame), self.faces)
         found = tree.nearest(
             points, hints=samples.last, rest_points=rest, region=region, sequence=samples.sequence,
-            reach=None if reach is None else np.where(samples.met, reach, np.inf),
+            reach=reach,
         )  # fmt: skip
         deep = not_outside(found.faces, points, home, self.at(frame), self.faces)
         if len(deep):

@@ -1,4 +1,4 @@
-"""Normals of a triangle mesh, the contact planes that follow from closest points, and what its faces carry."""
+"""Normals of a triangle mesh, the contact planes of closest points, and what its faces carry."""
 
 from __future__ import annotations
 
@@ -122,3 +122,20 @@ def not_outside(found, points, home, vertices, faces):
                 deep[count] = s
                 count += 1
     return deep[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def widened(reach, points, home, met, vertices, faces):
+    """reach (S,), but at least half the distance to the home face, and infinite where that is not met.
+
+    What lies deep although outside by the plane of its home is then found, unless that is nearly as near.
+    """
+    wide = np.empty(len(points))
+    for s in range(len(points)):
+        i, j, k = faces[home[s], 0], faces[home[s], 1], faces[home[s], 2]
+        squared = 0.0
+        for c in range(3):
+            centre = (vertices[i, c] + vertices[j, c] + vertices[k, c]) / 3.0
+            squared += (points[s, c] - centre) ** 2
+        wide[s] = max(reach[s], 0.5 * np.sqrt(squared)) if met[s] else np.inf
+    return wide

@@ -139,7 +139,7 @@ def _bending(
     values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:
-    """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, w as in bend_hinge._hessian."""
+    """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, see bend_hinge."""
     L = LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
     for block in range(len(values)):

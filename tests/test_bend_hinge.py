@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from meshes import patch
+from numba import vectorize
 
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Energy
 from reference_sim.energies.bend_hinge import dihedral_angles
+from reference_sim.lanes import arctan2
 
 
 def curved_cloth() -> Cloth:
@@ -95,3 +97,16 @@ def test_the_default_is_scaled_by_the_rest_shape_of_the_hinge_and_the_printed_fo
 def test_unknown_bending_options_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         BendHinge(curved_cloth(), **options)
+
+
+def test_the_arctangent_of_the_kernels_is_that_of_numpy():
+    """All around the circle, near its axes and diagonals, at any size."""
+    generator = np.random.default_rng(4)
+    angles = np.concatenate([generator.uniform(-np.pi, np.pi, 20_000), np.pi / 8 * np.arange(-7, 8)])
+    angles = np.concatenate([angles, angles[-15:] + 1e-9, angles[-15:] - 1e-9, 10.0 ** np.arange(-300, 0, 7)])
+    size = 10 ** generator.uniform(-100, 100, len(angles))
+    y, x = size * np.sin(angles), size * np.cos(angles)
+    y[-5:], x[-5:] = [0.0, -0.0, 0.0, 1.0, -1.0], [1.0, 1.0, -1.0, 0.0, 0.0]
+    found = vectorize(lambda y, x: arctan2(y, x))(y, x)
+    expected = np.arctan2(y, x)
+    assert (np.abs(found - expected) <= 2 * np.spacing(np.abs(expected))).all()

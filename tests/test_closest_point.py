@@ -155,6 +155,20 @@ def test_within_reach_answers_are_exact_and_beyond_there_are_none(name):
             assert (found.barycentric[near] == exact.barycentric[near]).all()
 
 
+@pytest.mark.parametrize("name", ["soup 400", "sphere", "sheet"])
+def test_a_rough_answer_is_at_most_twice_as_far_and_exact_where_it_has_to_be(name):
+    positions, faces = mesh(name)
+    tree, points = tree_of(positions, faces), samples(positions, faces)
+    best = tree.nearest(points)
+    distance = np.linalg.norm(points - best.points, axis=1)
+    hints, limit = np.random.default_rng(9).integers(-1, len(faces), len(points)), 0.3
+    found = tree.nearest(points, hints=hints, exact=limit)
+    near = distance < limit
+    assert (found.faces[near] == best.faces[near]).all()
+    rough = np.linalg.norm(points - found.points, axis=1)[~near] / distance[~near]
+    assert rough.max() <= 2 + 1e-12 and (rough > 1.01).mean() > 0.1
+
+
 @pytest.mark.parametrize("region", [0.2, 0.7, 2.0])
 @pytest.mark.parametrize("name", ["soup 7", "soup 400", "sphere", "sheet"])
 def test_only_faces_near_the_place_at_rest_are_met(name, region):

@@ -173,6 +173,17 @@ def test_active_blocks_are_the_non_zero_ones(case):
 
 
 @every_case
+def test_what_is_declared_constant_is_the_same_everywhere(case):
+    energy, x = case()
+    other = 1.1 * x + 0.01
+    if 3 in energy.constant:
+        assert np.array_equal(energy.hessian_blocks(x), energy.hessian_blocks(other))
+    if 1 in energy.constant:
+        for one, two in zip(energy.scalar_stiffness(x), energy.scalar_stiffness(other), strict=True):
+            assert np.array_equal(one, two)
+
+
+@every_case
 def test_convexity_takes_negative_curvature_out_in_proportion(case):
     energy, x = case()
     elements, true = energy.active_hessian_blocks(x)

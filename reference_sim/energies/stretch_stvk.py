@@ -77,8 +77,8 @@ class StretchStVK(Energy):
         if convexity > 0:
             stress = _less_compressed(stress, 1 - convexity)
         _hessian(
-            x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, stress, places.slots, places.base,
-            places.stride, data,
+            x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, stress, places.slots,
+            places.base, places.stride, data,
         )  # fmt: skip
 
     def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
@@ -207,8 +207,9 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
 
 @njit(cache=True, error_model="numpy")
 def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, data):
-    """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)], LANES faces
-    side by side; stress (F, 3) holds S00, S11, S01.
+    """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)].
+
+    LANES faces side by side; stress (F, 3) holds S00, S11, S01.
     """
     L, count = LANES, len(faces)
     u = np.empty((BLOCKS + 54) * L)
@@ -261,15 +262,15 @@ def _block(u, n, place, a, c, lam, mu):
     )  # fmt: skip
     s00, s11, s01, area = u[13 * L + n], u[14 * L + n], u[15 * L + n], u[16 * L + n]
     s = a0 * (s00 * c0 + s01 * c1) + a1 * (s01 * c0 + s11 * c1)
-    l, m = lam * area, mu * area
+    k, m = lam * area, mu * area
     b = m * (a0 * c0 + a1 * c1)
     at = (BLOCKS + 9 * place) * L + n
-    u[at] = (l + m) * (ax * cx) + b * u[23 * L + n] + s
-    u[at + L] = l * (ax * cy) + m * (cx * ay) + b * u[24 * L + n]
-    u[at + 2 * L] = l * (ax * cz) + m * (cx * az) + b * u[26 * L + n]
-    u[at + 3 * L] = l * (ay * cx) + m * (cy * ax) + b * u[24 * L + n]
-    u[at + 4 * L] = (l + m) * (ay * cy) + b * u[25 * L + n] + s
-    u[at + 5 * L] = l * (ay * cz) + m * (cy * az) + b * u[27 * L + n]
-    u[at + 6 * L] = l * (az * cx) + m * (cz * ax) + b * u[26 * L + n]
-    u[at + 7 * L] = l * (az * cy) + m * (cz * ay) + b * u[27 * L + n]
-    u[at + 8 * L] = (l + m) * (az * cz) + b * u[28 * L + n] + s
+    u[at] = (k + m) * (ax * cx) + b * u[23 * L + n] + s
+    u[at + L] = k * (ax * cy) + m * (cx * ay) + b * u[24 * L + n]
+    u[at + 2 * L] = k * (ax * cz) + m * (cx * az) + b * u[26 * L + n]
+    u[at + 3 * L] = k * (ay * cx) + m * (cy * ax) + b * u[24 * L + n]
+    u[at + 4 * L] = (k + m) * (ay * cy) + b * u[25 * L + n] + s
+    u[at + 5 * L] = k * (ay * cz) + m * (cy * az) + b * u[27 * L + n]
+    u[at + 6 * L] = k * (az * cx) + m * (cz * ax) + b * u[26 * L + n]
+    u[at + 7 * L] = k * (az * cy) + m * (cz * ay) + b * u[27 * L + n]
+    u[at + 8 * L] = (k + m) * (az * cz) + b * u[28 * L + n] + s
