@@ -11,13 +11,12 @@ from functools import cached_property
 
 import igl
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .closed_mesh import check_closed
 from .closest_point import Closest, FaceTree
 from .cloth import MeshError
 from .resume import fingerprint
-from .surface import carry, not_outside, plane_normals, vertex_normals, widened
+from .surface import carry, plane_normals, vertex_normals
 
 DEFAULT_REGION = 0.20  # [m]
 
@@ -26,9 +25,8 @@ DEFAULT_REGION = 0.20  # [m]
 class Planes:
     """One contact plane per sample: points (S, 3) [m], unit outward normals (S, 3), and where it was found.
 
-    faces: (S,) face of the obstacle; barycentric: (S, 3) place on it. Of a sample out of reach: the middle of
-    its home face, the one whose rest centroid is nearest to its rest position, and a plane FAR below it.
-    far: (S,) whether a sample is out of reach; None where none is.
+    faces: (S,) face of the obstacle; barycentric: (S, 3) place on it. far: (S,) samples known to touch
+    nothing in this step, from an obstacle that is `bounded`; else None.
     """
 
     points: np.ndarray
@@ -36,22 +34,6 @@ class Planes:
     faces: np.ndarray
     barycentric: np.ndarray
     far: np.ndarray | None = None
-
-
-@dataclass
-class Samples:
-    """What the rest positions (S, 3) [m] of samples decide, once for all frames.
-
-    home: (S,) the face whose rest centroid is nearest; met: (S,) whether it lies within the region;
-    sequence: (S,) order to search in; last: (S,) faces found last, -1 for none, where the next search begins:
-    this changes its cost and no answer.
-    """
-
-    rest: np.ndarray
-    home: np.ndarray
-    met: np.ndarray
-    sequence: np.ndarray
-    last: np.ndarray
 
 
 class Obstacle:
@@ -97,8 +79,10 @@ class Obstacle:
     def _forget(self) -> None:
         self._tree: FaceTree | None = None
         self._fitted = -1  # the frame that the tree is fitted to
-        self._samples: dict[int, Samples] = {}  # by their number
-        self._last: dict[int, np.ndarray] = {}  # faces found last for so many points without regions
+        # Of so many points, in regions or not: the faces found last, and an order to search in.
+        self._last: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray | None]] = {}
+
+    bounded = False  # whether planes are exact only within a reach that they are to be told
 
     @property
     def frames(self) -> int:
@@ -124,8 +108,12 @@ class Obstacle:
         """Hash of everything that decides how it touches."""
         return fingerprint(self.positions, self.faces, self.rest_centroids, np.array(self.region))
 
-    def _fit(self, frame: int) -> FaceTree:
-        """The search tree at `frame`."""
+    def _nearest(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Closest:
+        """Closest points under the rule of regions.
+
+        Each search begins with the faces that the last one found for as many points, in the order of those
+        that the first one found: the simulator asks for the same samples in every frame.
+        """
         frame = min(frame, self.frames - 1)
         if self._tree is None:
             centroids = self.rest_centroids
@@ -135,48 +123,17 @@ class Obstacle:
         if self._fitted != frame:
             self._tree.refit(self.at(frame))
             self._fitted = frame
-        return self._tree
-
-    def _nearest(
-        self, points: np.ndarray, frame: int, rest_points: np.ndarray | None, reach: np.ndarray | None = None
-    ) -> Closest:
-        """Closest points under the rule of regions; face -1 for samples out of reach, see `planes`.
-
-        Each search begins with the faces that the last one found for as many points: the simulator asks for
-        the same samples in every frame.
-        """
-        tree, region = self._fit(frame), self.region
-        if rest_points is None or self.rest_centroids is None:
-            found = tree.nearest(points, hints=self._last.get(len(points)))
-            self._last[len(points)] = found.faces
-            return found
-        samples = self._at_rest(rest_points)
-        rest, home = samples.rest, samples.home
-        if reach is not None:
-            reach = widened(reach, points, home, samples.met, self.at(frame), self.faces)
-        found = tree.nearest(
-            points, hints=samples.last, rest_points=rest, region=region, sequence=samples.sequence,
-            reach=reach,
-        )  # fmt: skip
-        deep = not_outside(found.faces, points, home, self.at(frame), self.faces)
-        if len(deep):
-            again = tree.nearest(points[deep], hints=home[deep], rest_points=rest[deep], region=region)
-            found.faces[deep], found.barycentric[deep] = again.faces, again.barycentric
-            found.points[deep] = again.points
-        samples.last = found.faces
+        if self.rest_centroids is None:
+            rest_points = None
+        kind = len(points), rest_points is not None
+        hints, sequence = self._last.get(kind, (None, None))
+        found = self._tree.nearest(
+            points, hints=hints, rest_points=rest_points, region=self.region, sequence=sequence
+        )
+        if sequence is None and rest_points is not None:
+            sequence = self._tree.in_sequence(found.faces)
+        self._last[kind] = found.faces, sequence
         return found
-
-    def _at_rest(self, rest_points: np.ndarray) -> Samples:
-        """The set of samples at rest there (S, 3) [m]."""
-        samples = self._samples.get(len(rest_points))
-        if samples is None or not np.array_equal(samples.rest, rest_points):
-            assert self._tree is not None and self.rest_centroids is not None
-            distance, home = cKDTree(self.rest_centroids).query(rest_points)
-            samples = Samples(
-                np.array(rest_points), home, distance <= self.region, self._tree.in_sequence(home), home
-            )
-            self._samples[len(rest_points)] = samples
-        return samples
 
     def planes(
         self,
@@ -191,21 +148,17 @@ class Obstacle:
         sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
         sample's own position.
 
-        reach: (S,) [m] a sample with no allowed face so near that lies outside by the plane of its home face
-            is out of reach, and its plane touches nothing. No effect without rest positions, or on a sample
-            for which the rule of regions allows the whole mesh.
+        reach: (S,) [m] that a sample may come near in this step. It is asked of obstacles that are `bounded`;
+            here every plane is exact.
         """
-        found, vertices = self._nearest(points, frame, rest_points, reach), self.at(frame)
-        faces, barycentric, far = found.faces, found.barycentric, found.faces < 0
-        if far.any():
-            assert rest_points is not None
-            faces, barycentric[far] = np.where(far, self._at_rest(rest_points).home, faces), 1 / 3
+        found = self._nearest(points, frame, rest_points)
+        vertices = self.at(frame)
         normals = np.empty_like(found.points)
         plane_normals(
-            points, found.points, faces, barycentric, far, vertices, self.faces,
+            points, found.points, found.faces, found.barycentric, vertices, self.faces,
             vertex_normals(vertices, self.faces), normals,
         )  # fmt: skip
-        return Planes(found.points, normals, faces, barycentric, far)
+        return Planes(found.points, normals, found.faces, found.barycentric)
 
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
@@ -225,7 +178,7 @@ class Obstacle:
 
     def signed_distance(self, points: np.ndarray, frame: int) -> np.ndarray:
         """True distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
-        distance = np.linalg.norm(points - self._nearest(points, frame, None).points, axis=1)
+        distance = np.linalg.norm(points - self._nearest(points, frame).points, axis=1)
         vertices = np.asfortranarray(self.at(frame))
         # Only what lies in the bounding box can be inside.
         low, high = vertices.min(axis=0), vertices.max(axis=0)

@@ -6,11 +6,9 @@ import numpy as np
 
 from .kernel_cache import njit
 
-FAR = 1e30  # [m] below a sample lies a plane that cannot touch it; finite also as float32
-
 
 @njit(cache=True, error_model="numpy")
-def _cross_of_face(x, i, j, k):
+def cross_of_face(x, i, j, k):
     """Twice the area of a triangle times its normal."""
     a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
     b0, b1, b2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
@@ -22,7 +20,7 @@ def vertex_normals(positions, faces):
     """Unit normals (B, 3) of the vertices of a mesh (B, 3) [m], (F, 3): of its faces, weighted by area."""
     normals = np.zeros_like(positions)
     for f in range(len(faces)):
-        n = _cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
+        n = cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
         for a in range(3):
             for c in range(3):
                 normals[faces[f, a], c] += n[c]
@@ -39,21 +37,11 @@ def _normalise(v):
 
 
 @njit(cache=True, error_model="numpy")
-def plane_normals(points, closest, found, barycentric, far, vertices, faces, of_vertices, normals):
-    """normals (S, 3): from the closest point to the sample, turned outwards.
-
-    Of a sample that is far (S,) from its face: the normal of the face, and `closest` is moved FAR below the
-    sample.
-    """
+def plane_normals(points, closest, found, barycentric, vertices, faces, of_vertices, normals):
+    """normals (S, 3): from the closest point to the sample, turned outwards."""
     offset, smooth = np.empty(3), np.empty(3)
     for s in range(len(points)):
         i, j, k = faces[found[s], 0], faces[found[s], 1], faces[found[s], 2]
-        if far[s]:
-            normals[s, 0], normals[s, 1], normals[s, 2] = _cross_of_face(vertices, i, j, k)
-            _normalise(normals[s])
-            for c in range(3):
-                closest[s, c] = points[s, c] - FAR * normals[s, c]
-            continue
         u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
         for c in range(3):
             smooth[c] = u * of_vertices[i, c] + v * of_vertices[j, c] + w * of_vertices[k, c]
@@ -66,7 +54,7 @@ def plane_normals(points, closest, found, barycentric, far, vertices, faces, of_
             normals[s] = smooth
             continue
         if min(u, v, w) > 0.0:  # inside the face its normal is the direction, and has no cancellation
-            n = _cross_of_face(vertices, i, j, k)
+            n = cross_of_face(vertices, i, j, k)
             side = np.sign(n[0] * offset[0] + n[1] * offset[1] + n[2] * offset[2])
             for c in range(3):
                 offset[c] = side * n[c]
@@ -80,7 +68,7 @@ def _frame_of_face(x, i, j, k, axes):
     """Orthonormal axes (3, 3) of a triangle, in rows; the last is its normal."""
     for c in range(3):
         axes[0, c] = x[j, c] - x[i, c]
-    axes[2, 0], axes[2, 1], axes[2, 2] = _cross_of_face(x, i, j, k)
+    axes[2, 0], axes[2, 1], axes[2, 2] = cross_of_face(x, i, j, k)
     _normalise(axes[0])
     _normalise(axes[2])
     for c in range(3):
@@ -105,37 +93,3 @@ def carry(points, closest, found, barycentric, before, after, faces, carried):
                 local += old[a, c] * (points[s, c] - closest[s, c])
             for c in range(3):
                 carried[s, c] += new[a, c] * local
-
-
-@njit(cache=True, error_model="numpy")
-def not_outside(found, points, home, vertices, faces):
-    """Those of the samples that found no face that do not lie outside by the plane of their home face."""
-    deep, count = np.empty(len(points), np.int64), 0
-    for s in range(len(points)):
-        if found[s] < 0:
-            i, j, k = faces[home[s], 0], faces[home[s], 1], faces[home[s], 2]
-            n = _cross_of_face(vertices, i, j, k)
-            height = 0.0
-            for c in range(3):
-                height += n[c] * (points[s, c] - vertices[i, c])
-            if not height > 0.0:
-                deep[count] = s
-                count += 1
-    return deep[:count]
-
-
-@njit(cache=True, error_model="numpy")
-def widened(reach, points, home, met, vertices, faces):
-    """reach (S,), but at least half the distance to the home face, and infinite where that is not met.
-
-    What lies deep although outside by the plane of its home is then found, unless that is nearly as near.
-    """
-    wide = np.empty(len(points))
-    for s in range(len(points)):
-        i, j, k = faces[home[s], 0], faces[home[s], 1], faces[home[s], 2]
-        squared = 0.0
-        for c in range(3):
-            centre = (vertices[i, c] + vertices[j, c] + vertices[k, c]) / 3.0
-            squared += (points[s, c] - centre) ** 2
-        wide[s] = max(reach[s], 0.5 * np.sqrt(squared)) if met[s] else np.inf
-    return wide

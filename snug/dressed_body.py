@@ -131,9 +131,10 @@ class DressedBody:
 
 
 def _pose_numbers(poses: np.ndarray, rotations: np.ndarray, pose_input: str) -> np.ndarray:
-    """(T, 72) axis-angle numbers, or (T, 141): up direction in the root's axes and 6 numbers a joint, the first
-    two columns of its rotation (Zhou et al. 2019, "On the continuity of rotation representations in neural
-    networks").
+    """(T, 72) axis-angle numbers, or (T, 141): up direction in the root's axes and 6 numbers a joint.
+
+    Those are the first two columns of its rotation (Zhou et al. 2019, "On the continuity of rotation
+    representations in neural networks").
     """
     if pose_input == "axis_angle":
         return poses.reshape(len(poses), -1)

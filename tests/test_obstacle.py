@@ -184,62 +184,6 @@ def test_what_samples_may_meet_is_found_also_from_a_few_of_them():
     assert exact.min() < 0.05
 
 
-def wandering(seed: int) -> tuple[Obstacle, np.ndarray, np.ndarray]:
-    """A bent bar, samples at rest on it or 0.5 m beside it, and where they are: up to 8 cm off, or deep."""
-    rest, faces = bar()
-    generator = np.random.default_rng(seed)
-    rest_points = rest[faces].mean(axis=1)[generator.integers(len(faces), size=300)]
-    thickness = generator.uniform(0.1, 2.0, (300, 1))
-    points = bent(rest_points * np.hstack([thickness**0, thickness, thickness]))
-    points += generator.normal(0, 0.01, points.shape)
-    rest_points[::30, 2] += 0.5
-    return Obstacle(bent(rest), faces, rest_positions=rest, region=0.3), points, rest_points
-
-
-def test_planes_are_exact_within_reach_and_for_all_that_is_deep():
-    obstacle, points, rest_points = wandering(1)
-    exact = obstacle.planes(points, 0, rest_points)
-    height = np.einsum("si,si->s", exact.normals, points - exact.points)
-    reach = np.full(len(points), 0.02)
-    found = obstacle.planes(points, 0, rest_points, reach)
-    needed = height < reach
-    needed[::30] = True  # no face of theirs is near: they meet all
-    assert exact.far is None or not exact.far.any()
-    assert (height < -0.025).sum() > 20 and 0.3 < needed.mean() < 0.8
-    for one, other in zip(
-        (found.points, found.normals, found.faces), (exact.points, exact.normals, exact.faces)
-    ):
-        assert (one[needed] == other[needed]).all()
-    far = found.far
-    assert not far[needed].any() and far.sum() > 50
-    # What is out of reach touches nothing, also in float32, and has a place on the body that goes with it.
-    offset = points.astype(np.float32) - found.points.astype(np.float32)
-    assert (np.einsum("si,si->s", found.normals.astype(np.float32), offset)[far] > 1e20).all()
-    assert np.linalg.norm(found.normals, axis=1) == pytest.approx(1.0, rel=1e-14)
-    assert (found.faces[far] >= 0).all() and (found.barycentric[far] == 1 / 3).all()
-
-
-def test_planes_do_not_depend_on_what_was_asked_before():
-    obstacle, points, rest_points = wandering(2)
-    reach = np.random.default_rng(3).uniform(0.0, 0.05, len(points))
-    once = obstacle.planes(points, 0, rest_points, reach)
-    obstacle.planes(points[::-1] + 0.03, 0, rest_points, reach)
-    obstacle.transported(points + 0.1, 0, rest_points)
-    again = obstacle.planes(points, 0, rest_points, reach)
-    for one, other in zip(vars(once).values(), vars(again).values()):
-        assert np.array_equal(one, other)
-
-
-def test_samples_of_another_cloth_of_as_many_points_are_not_mixed_up():
-    obstacle, points, rest_points = wandering(2)
-    fresh, _, _ = wandering(2)
-    reach = np.full(len(points), 0.02)
-    obstacle.planes(points, 0, rest_points, reach)
-    mixed, alone = (o.planes(points, 0, rest_points[::-1], reach) for o in (obstacle, fresh))
-    for one, other in zip(vars(mixed).values(), vars(alone).values()):
-        assert np.array_equal(one, other)
-
-
 def test_two_kinds_of_samples_do_not_disturb_each_other():
     rest, faces = bar()
     obstacle = Obstacle(bent(rest), faces, rest_positions=rest, region=0.15)

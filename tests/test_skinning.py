@@ -1,6 +1,7 @@
 """Skinning against its invariants."""
 
 import numpy as np
+import pytest
 import torch
 from scipy.spatial.transform import Rotation
 

@@ -48,13 +48,7 @@ class TurningDrum(RoundBody):
         c, s = np.cos(frame * self.turn), np.sin(frame * self.turn)
         return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
-    def planes(
-        self,
-        points: np.ndarray,
-        frame: int,
-        rest_points: np.ndarray | None = None,
-        reach: np.ndarray | None = None,
-    ) -> Planes:
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         found = super().planes(points, frame)
         return Planes(found.points, found.normals, found.faces, found.points @ self.at(frame).T)
 

@@ -38,13 +38,9 @@ class RoundBody:
         if axis is not None:
             self.keep[axis] = 0.0
 
-    def planes(
-        self,
-        points: np.ndarray,
-        frame: int,
-        rest_points: np.ndarray | None = None,
-        reach: np.ndarray | None = None,
-    ) -> Planes:
+    bounded = False
+
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         """Tangent planes below points (S, 3); faces and places on them do not exist."""
         radial = points * self.keep
         normals = radial / np.linalg.norm(radial, axis=1, keepdims=True)

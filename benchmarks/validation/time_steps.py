@@ -58,13 +58,7 @@ class MovingBall(RoundBody):
         super().__init__(BALL)
         self.heights = heights
 
-    def planes(
-        self,
-        points: np.ndarray,
-        frame: int,
-        rest_points: np.ndarray | None = None,
-        reach: np.ndarray | None = None,
-    ) -> Planes:
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         centre = np.array([0.0, self.heights[min(frame, len(self.heights) - 1)], 0.0])
         found = super().planes(points - centre, frame)
         return Planes(found.points + centre, found.normals, found.faces, found.barycentric)

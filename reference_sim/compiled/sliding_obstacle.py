@@ -27,7 +27,7 @@ from ..closest_point import FaceTree, by_cells
 from ..group_search import GROUP
 from ..kernel_cache import njit
 from ..obstacle import Obstacle, Planes
-from ..surface import carry, not_outside, plane_normals, vertex_normals
+from ..surface import carry, cross_of_face, plane_normals, vertex_normals
 from ..surface_walk import triangle_adjacency, walk_to_foot
 
 ROTATION = 16
@@ -41,9 +41,11 @@ SWEEPS = 2  # of the trying of neighbours: what was found spreads by so many sam
 class SlidingObstacle(Obstacle):
     """The same body and the same rule of regions as `obstacle`, with remembered places in between.
 
-    Its answers depend on what it was asked before. Frames are asked for in order; after a jump, and for the
-    first time, everything is searched.
+    A bounded one: see Obstacle.planes. Its answers depend on what it was asked before. Frames are asked for in
+    order; after a jump, and for the first time, everything is searched.
     """
+
+    bounded = True
 
     def __init__(self, obstacle: Obstacle) -> None:
         self.__dict__.update(copy.copy(obstacle).__dict__)
@@ -53,7 +55,6 @@ class SlidingObstacle(Obstacle):
         super()._forget()
         self._kinds: dict[tuple[int, bool], _Anchors] = {}
         self._patch: _Patch | None = None
-        self._none_far = np.zeros(0, bool)
         self._posed: tuple[int, np.ndarray, np.ndarray] | None = None  # frame, vertices, their normals
 
     def start_again(self) -> None:
@@ -94,16 +95,14 @@ class SlidingObstacle(Obstacle):
         vertices, of_vertices = self._pose(frame)
         anchors.follow(points, frame, self._patch, vertices, self.region, reach)
         normals = np.empty_like(points)
-        if len(self._none_far) < len(points):
-            self._none_far = np.zeros(len(points), bool)
 
         patch = self._patch
 
         def set_normals(at: np.ndarray | slice) -> None:
             some = np.empty_like(normals[at])
             plane_normals(
-                points[at], anchors.closest[at], anchors.faces[at], anchors.barycentric[at],
-                self._none_far[: len(some)], vertices, patch.faces, of_vertices, some,
+                points[at], anchors.closest[at], anchors.faces[at], anchors.barycentric[at], vertices,
+                patch.faces, of_vertices, some,
             )  # fmt: skip
             normals[at] = some
 
@@ -223,9 +222,9 @@ class _Anchors:
             away = (self.distance > reach)[self._order]
             near = self._order[~away]
             self.search(self._order[away], points, patch, region, reach)
-            if self.rest_points is not None:  # by the rule of the exact one: deep is not far
+            if self.rest_points is not None:  # what is deep is not far
                 out = np.where(self.distance > reach, -1, self.faces)
-                deep = not_outside(out, points, self._home_faces(patch), vertices, patch.faces)
+                deep = _not_outside(out, points, self._home_faces(patch), vertices, patch.faces)
                 self.search(deep, points, patch, region)
         groups = np.arange(-(-len(near) // GROUP))[self.turn :: ROTATION]
         which = (GROUP * groups[:, None] + np.arange(GROUP)).ravel()
@@ -336,3 +335,20 @@ def _gaps(points, closest, normals):
             gap += normals[s, c] * (points[s, c] - closest[s, c])
         gaps[s] = gap
     return gaps
+
+
+@njit(cache=True, error_model="numpy")
+def _not_outside(found, points, home, vertices, faces):
+    """Those of the samples that found no face that do not lie outside by the plane of their home face."""
+    deep, count = np.empty(len(points), np.int64), 0
+    for s in range(len(points)):
+        if found[s] < 0:
+            i, j, k = faces[home[s], 0], faces[home[s], 1], faces[home[s], 2]
+            n = cross_of_face(vertices, i, j, k)
+            height = 0.0
+            for c in range(3):
+                height += n[c] * (points[s, c] - vertices[i, c])
+            if not height > 0.0:
+                deep[count] = s
+                count += 1
+    return deep[:count]

@@ -65,25 +65,19 @@ class ContactFriction(Energy):
         if self.contact.step is not step or step.obstacle is None or planes is None:
             raise ValueError("ContactFriction needs its own ContactPenalty before it in the terms")
         samples = self.contact.sample_matrix @ step.previous
-        moved = self._skin(step, planes, step.frame) - self._skin(step, planes, max(step.frame - 1, 0))
+        corners = step.obstacle.at(max(step.frame - 1, 0))[step.obstacle.faces[planes.faces]]
+        skin = np.einsum("sa,sai->si", planes.barycentric, corners)  # where the planes' points were
         last, self._last = self._last, (step, planes)
         if step.frame <= 1:
-            self.forces = self._coulomb(samples, planes.points - moved, planes.normals)
+            self.forces = self._coulomb(samples, skin, planes.normals)
         elif last and last[0].obstacle is step.obstacle and last[0].frame == step.frame - 1:
             self.forces = self._coulomb(samples, last[1].points, last[1].normals)
         elif last and _same_step(last[0], step):
             pass  # frozen again at another guess: the force of the step before stays
         else:  # left over from another run, or a frame that was jumped to
             self.forces = None
-        self.anchors, self.normals = samples + moved, planes.normals
+        self.anchors, self.normals = samples + planes.points - skin, planes.normals
         self.threshold = self.speed * step.dt
-
-    @staticmethod
-    def _skin(step: Step, planes: Planes, frame: int) -> np.ndarray:
-        """Where the places (S, 3) [m] on the body that the planes were found at are at `frame`."""
-        assert step.obstacle is not None
-        corners = step.obstacle.at(frame)[step.obstacle.faces[planes.faces]]
-        return np.einsum("sa,sai->si", planes.barycentric, corners)
 
     def _coulomb(self, samples: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """mu N (S,) [N] of samples (S, 3) [m] on planes."""

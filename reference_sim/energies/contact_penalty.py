@@ -6,7 +6,6 @@
 The exact distance to a moving body has jumps where a sample is pinched between two limbs, and Newton's
 method does not survive them; so each sample gets one plane per step, taken at the initial guess and frozen
 (`Obstacle.planes`), and this energy is the distance to that plane. The true signed distance is a metric.
-A sample that cannot meet the body within the step gets a plane out of its way.
 
 Samples sit on vertices, edge midpoints and face centroids, because a coarse mesh whose vertices are outside
 still cuts through a shoulder with its edges. a_s makes k a density: each of the three kinds of sample
@@ -23,7 +22,6 @@ import scipy.sparse as sp
 from ..cloth import Cloth
 from ..kernel_cache import njit
 from ..material import GRAVITY
-from ..surface import FAR
 from .energy import Energy, Step
 
 if TYPE_CHECKING:
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
 
 DEFAULT_STIFFNESS = 3.4e6  # [J/m^5]: 2500 J/m^3 on a vertex of a T-shirt with 1000 vertices
 DEFAULT_MARGIN = 4e-3  # [m]
-SLACK = 0.01  # [m] that forces may move a sample in a step, beyond its flight
+SLACK = 0.01  # [m] of a reach: neighbours pull too
 
 
 class ContactPenalty(Energy):
@@ -83,9 +81,8 @@ class ContactPenalty(Energy):
         self.planes: Planes | None = None
         self.step: Step | None = None  # that the planes belong to
         # Until a step is prepared every plane lies far below its sample: no contact. Finite also as float32.
-        self.points = np.tile([0.0, -FAR, 0.0], (len(self.stencils), 1))
+        self.points = np.tile([0.0, -1e30, 0.0], (len(self.stencils), 1))
         self.normals = np.tile([0.0, 1.0, 0.0], (len(self.stencils), 1))
-        self._all = self._near = np.arange(len(self.stencils))  # samples whose planes are not so far
 
     def parameters(self) -> dict[str, Any]:
         return {
@@ -97,10 +94,12 @@ class ContactPenalty(Energy):
     def prepare(self, step: Step) -> None:
         if step.obstacle is None:
             raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
-        samples, reach = self.sample_matrix @ step.guess, self._reach(step)
-        planes = step.obstacle.planes(samples, step.frame, self.rest_samples, reach)
+        samples = self.sample_matrix @ step.guess
+        if step.obstacle.bounded:
+            planes = step.obstacle.planes(samples, step.frame, self.rest_samples, self._reach(step))
+        else:
+            planes = step.obstacle.planes(samples, step.frame, self.rest_samples)
         self.planes, self.points, self.normals = planes, planes.points, planes.normals
-        self._near = self._all if planes.far is None else np.flatnonzero(~planes.far)
         self.step = step
 
     def _reach(self, step: Step) -> np.ndarray:
@@ -134,10 +133,10 @@ class ContactPenalty(Energy):
     def value_and_gradient(
         self, x: np.ndarray, points: np.ndarray | None = None, normals: np.ndarray | None = None
     ) -> tuple[float, np.ndarray]:
-        gradient, near = np.zeros_like(x), self._near if points is None else self._all
+        gradient = np.zeros_like(x)
         c = self.points if points is None else points
         n = self.normals if normals is None else normals
-        value = _gradient(x, near, self.stencils, self.weights, self.stiffness, self.margin, c, n, gradient)
+        value = _gradient(x, self.stencils, self.weights, self.stiffness, self.margin, c, n, gradient)
         return value, gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
@@ -162,7 +161,7 @@ class ContactPenalty(Energy):
     def _curvatures(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Samples in contact at x (n,) and their curvatures along the normal (n,) [N/m]."""
         return _curvatures(
-            x, self._near, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals
+            x, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals
         )
 
 
@@ -198,9 +197,9 @@ def _depth(x, stencil, weight, margin, c, n):
 
 
 @njit(cache=True)
-def _gradient(x, near, stencils, weights, stiffness, margin, points, normals, gradient):
+def _gradient(x, stencils, weights, stiffness, margin, points, normals, gradient):
     total = 0.0
-    for s in near:
+    for s in range(len(stencils)):
         depth = _depth(x, stencils[s], weights[s], margin, points[s], normals[s])
         if depth > 0.0:
             total += stiffness[s] * depth * depth * depth
@@ -212,10 +211,10 @@ def _gradient(x, near, stencils, weights, stiffness, margin, points, normals, gr
 
 
 @njit(cache=True)
-def _curvatures(x, near, stencils, weights, stiffness, margin, points, normals):
+def _curvatures(x, stencils, weights, stiffness, margin, points, normals):
     """6 k a_s depth of the samples in contact."""
-    elements, curvatures, count = np.empty(len(near), np.int64), np.empty(len(near)), 0
-    for s in near:
+    elements, curvatures, count = np.empty(len(stencils), np.int64), np.empty(len(stencils)), 0
+    for s in range(len(stencils)):
         depth = _depth(x, stencils[s], weights[s], margin, points[s], normals[s])
         if depth > 0.0:
             elements[count], curvatures[count] = s, 6.0 * stiffness[s] * depth
