@@ -23,6 +23,7 @@ import numba
 import numpy as np
 from numba.core.caching import InTreeCacheLocator
 from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
 from numba.misc.appdirs import AppDirs
 
 KEPT = 4  # folders of one module, so that going back to another branch compiles nothing
@@ -84,6 +85,8 @@ def _digest(function: Any) -> str:
     for name, value in function.__globals__.items():
         if isinstance(value, Dispatcher):
             digest.update(_digests.get(value.py_func.__module__, "").encode())
+        elif isinstance(value, _Intrinsic):
+            digest.update(Path(value._defn.__code__.co_filename).read_bytes())
         elif isinstance(value, ModuleType):
             digest.update(_digests.get(value.__name__, "").encode())
         elif isinstance(value, CONSTANTS) and not name.startswith("__"):

@@ -197,15 +197,15 @@ FAULTS = (
     Fault(
         "a first step without friction",
         FRICTION,
-        "self._coulomb(samples, planes.points - moved, planes.normals)",
-        "0 * self._coulomb(samples, planes.points - moved, planes.normals)",
+        "self._coulomb(samples, skin, planes.normals)",
+        "0 * self._coulomb(samples, skin, planes.normals)",
         fast=("friction_slide",),
     ),
     Fault(
         "friction against the ground, not its skin",
         FRICTION,
-        "samples + moved",
-        "samples + 0 * moved",
+        "samples + planes.points - skin",
+        "samples + planes.points - planes.points",
         fast=("friction_belt",),
     ),
     # minimisers
@@ -228,7 +228,7 @@ FAULTS = (
         "if self.gradient_norm() <= tolerance:",
         "if True:",
     ),
-    Fault("convergence ignores the step", CHECK, "if step <= step_tolerance or", "if True or"),
+    Fault("convergence ignores the step", CHECK, "small = step <= step_tolerance or", "small = True or"),
     Fault(
         "tolerance a hundred thousand times too loose",
         NEWTON,

@@ -140,7 +140,8 @@ def test_a_glitch_is_forgotten_or_not(assets, models):
     assert set(free) == set(net) <= {metric.name for metric in extrapolation.METRICS}
     assert [free[f"motion/recovery_{after}"] for after in (1, 10, 30)] == [0.0] * 3  # it has no memory
     assert net["motion/recovery_1"] > net["motion/recovery_30"] > 0.0
-    assert free["motion/offset"] == 0.0 and free["motion/strain_ratio"] == pytest.approx(1.0)
+    assert free["motion/offset"] < 1e-3  # mm: its float32
+    assert free["motion/strain_ratio"] == pytest.approx(1.0)
 
 
 def test_distance_is_that_from_skinning(assets, models):
@@ -149,7 +150,7 @@ def test_distance_is_that_from_skinning(assets, models):
     other = RollOut(free.group, find_method("simulation"), moved)
     free.group.roll_outs.append(other)
     found = extrapolation.measure(other)
-    assert found["motion/offset"] == pytest.approx(1.0) and "motion/strain_ratio" not in found
+    assert found["motion/offset"] == pytest.approx(1.0, abs=1e-3) and "motion/strain_ratio" not in found
 
 
 def test_another_material_judges_the_same_roll_out(assets, models):

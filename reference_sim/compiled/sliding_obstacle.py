@@ -41,8 +41,8 @@ SWEEPS = 2  # of the trying of neighbours: what was found spreads by so many sam
 class SlidingObstacle(Obstacle):
     """The same body and the same rule of regions as `obstacle`, with remembered places in between.
 
-    A bounded one: see Obstacle.planes. Its answers depend on what it was asked before. Frames are asked for in
-    order; after a jump, and for the first time, everything is searched.
+    A bounded one: see Obstacle.planes. Its answers depend on what it was asked before. Frames are asked for
+    in order; after a jump, and for the first time, everything is searched.
     """
 
     bounded = True

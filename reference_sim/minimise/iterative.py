@@ -18,7 +18,6 @@ from scipy.linalg import eigh_tridiagonal
 
 from ..linear_solver import analyse
 from ..potential import Potential
-from ..surface import vertex_normals
 from .descent import mean_weight
 from .factorised import FactorisedHessian
 from .lbfgs_history import dot
@@ -45,6 +44,8 @@ class IterativeHessian(FactorisedHessian):
         self._first, self._along_normals = indptr[:-1], analyse(indptr, rows, order)
 
     def assemble(self, x: np.ndarray, convexity: float) -> np.ndarray:
+        from ..surface import vertex_normals  # loads numba, which a command's --help can do without
+
         self._scalar_data = self._scalar.assemble(x)
         self._normals = vertex_normals(x, self._faces)[self._pattern.free]
         return super().assemble(x, convexity)

@@ -6,10 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..kernel_cache import njit
-
 LEAST_CURVATURE = 1e-10  # of |s| |y|: pairs of negative curvature would make the estimate indefinite
-FAST = {"reassoc", "contract", "nsz"}  # sums in vector instructions
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> float:
@@ -47,31 +44,11 @@ class LBFGSHistory:
 
         solve applies the first guess of the inverse Hessian, which the pairs correct.
         """
+        from .two_loop import first_loop, second_loop  # loads numba, which a command's --help can do without
+
         q, alphas = -g, np.empty(len(self))
         order = np.arange(self._count - len(self), self._count) % max(self._memory, 1)  # oldest first
-        _first_loop(self._pairs, self._curvatures, order, q, alphas)
+        first_loop(self._pairs, self._curvatures, order, q, alphas)
         p = solve(q)
-        _second_loop(self._pairs, self._curvatures, order, p, alphas)
+        second_loop(self._pairs, self._curvatures, order, p, alphas)
         return p
-
-
-@njit(cache=True, fastmath=FAST)
-def _first_loop(pairs, curvatures, order, q, alphas):
-    for k in range(len(order) - 1, -1, -1):
-        s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
-        for i in range(len(q)):
-            total += s[i] * q[i]
-        alphas[k] = total / curvatures[order[k]]
-        for i in range(len(q)):
-            q[i] -= alphas[k] * y[i]
-
-
-@njit(cache=True, fastmath=FAST)
-def _second_loop(pairs, curvatures, order, p, alphas):
-    for k in range(len(order)):
-        s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
-        for i in range(len(p)):
-            total += y[i] * p[i]
-        share = alphas[k] - total / curvatures[order[k]]
-        for i in range(len(p)):
-            p[i] += share * s[i]

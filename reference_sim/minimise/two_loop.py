@@ -1,0 +1,37 @@
+"""The two loops of L-BFGS, compiled; see lbfgs_history."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernel_cache import njit
+
+FAST = {"reassoc", "contract", "nsz"}  # sums in vector instructions
+
+
+@njit(cache=True, fastmath=FAST)
+def first_loop(
+    pairs: np.ndarray, curvatures: np.ndarray, order: np.ndarray, q: np.ndarray, alphas: np.ndarray
+) -> None:
+    """Newest pair first: alphas (k,) are set, q (3n,) becomes what the first guess is applied to."""
+    for k in range(len(order) - 1, -1, -1):
+        s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
+        for i in range(len(q)):
+            total += s[i] * q[i]
+        alphas[k] = total / curvatures[order[k]]
+        for i in range(len(q)):
+            q[i] -= alphas[k] * y[i]
+
+
+@njit(cache=True, fastmath=FAST)
+def second_loop(
+    pairs: np.ndarray, curvatures: np.ndarray, order: np.ndarray, p: np.ndarray, alphas: np.ndarray
+) -> None:
+    """Oldest pair first: p (3n,) becomes the direction."""
+    for k in range(len(order)):
+        s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
+        for i in range(len(p)):
+            total += y[i] * p[i]
+        share = alphas[k] - total / curvatures[order[k]]
+        for i in range(len(p)):
+            p[i] += share * s[i]
