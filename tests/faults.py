@@ -27,7 +27,7 @@ GRAVITY, INERTIA, CONTACT, FRICTION = (
 )
 NEWTON, CHECK, FACTORISED, DESCENT, HISTORY = (
     f"reference_sim/minimise/{name}.py"
-    for name in ("newton", "convergence_check", "factorised", "descent", "lbfgs_history")
+    for name in ("newton", "convergence_check", "factorised", "descent", "two_loop")
 )
 PATTERN, CURVATURE = "reference_sim/hessian_pattern.py", "benchmarks/metrics/curvature.py"
 
