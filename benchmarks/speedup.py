@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from .plan import PlanError
 from .results import ResultsError, RunFolder
 from .run_options import Parser
 from .timing import THREADS
@@ -185,11 +186,15 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
-    parser = make_parser()
-    options = parser.parse_args(arguments)
-    wanted, known = options.rows.split(","), {what.group for what in MEASUREMENTS}
-    if unknown := set(wanted) - known:
-        parser.error(f"--rows {min(unknown)}: choose from {', '.join(sorted(known))}")
+    known = {what.group for what in MEASUREMENTS}
+    try:
+        options = make_parser().parse_args(arguments)
+        wanted = options.rows.split(",")
+        if unknown := set(wanted) - known:
+            raise PlanError(f"--rows {min(unknown)}: choose from {', '.join(sorted(known))}")
+    except PlanError as error:
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        return 2
     lines: list[Line] = []
     with tempfile.TemporaryDirectory() as name:
         try:
