@@ -37,8 +37,6 @@ def make_export_parser() -> argparse.ArgumentParser:
         prog=f"python -m {PROGRAM}",
         description="Write a scene as plain files: rest mesh, weights, material, motion, posed body, start.",
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     add = parser.add_argument
     add("scene", metavar="SCENE", help="as in benchmarks.run --list")

@@ -51,7 +51,11 @@ exit status: 0 when every cell ended as ok or as an explained skip (in extremes 
 
 
 class Parser(argparse.ArgumentParser):
-    """One clear line for a wrong word, in place of the whole usage."""
+    """One clear line for a wrong word, in place of the whole usage; examples stay as they are written."""
+
+    def __init__(self, **options: Any) -> None:
+        plain = argparse.RawDescriptionHelpFormatter
+        super().__init__(formatter_class=plain, allow_abbrev=False, **options)
 
     def error(self, message: str):
         raise PlanError(f"{message}; see --help")
@@ -64,8 +68,6 @@ def make_parser() -> argparse.ArgumentParser:
         description="Dress a body, simulate the ground truth, train the networks, compare all of them "
         "and write tables, figures and a PDF.",
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     add_scene_options(parser)
     add = parser.add_argument

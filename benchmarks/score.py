@@ -51,8 +51,6 @@ def make_parser() -> argparse.ArgumentParser:
         description="Energies, gap to the minimum of each step, curvature, depth, conservation, dynamics of "
         "a roll-out of another program: rows, a report, one line.",
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     add = parser.add_argument
     add("roll_out", metavar="ROLLOUT", help="file, folder or pattern")

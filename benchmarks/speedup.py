@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .plan import PlanError
-from .results import ResultsError, RunFolder
+from .results import ResultsError, RunFolder, replacing
 from .run_options import Parser
 from .timing import THREADS
 
@@ -31,7 +31,8 @@ EXAMPLES = """examples:
   python -m benchmarks.speedup 937ace5 --rows inference,training -o speedup.csv
 
 Nothing else should be at work on the machine.
-exit status: 0 measured; 1 a run failed; 2 no such commit or row: one line says which."""
+exit status: 0 measured; 1 a run failed, the others are in the table; 2 no such commit or row: one line says
+  which."""
 
 
 @dataclass(frozen=True)
@@ -173,8 +174,6 @@ def make_parser() -> argparse.ArgumentParser:
         prog=f"python -m {PROGRAM}",
         description="Measure an earlier commit and this code in turn: times, ratios, and what they bought.",
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     groups = sorted({what.group for what in MEASUREMENTS})
     parser.add_argument("commit", help="to compare with")
@@ -196,23 +195,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
     lines: list[Line] = []
+    failed = False
     with tempfile.TemporaryDirectory() as name:
         try:
             before = check_out(options.commit, Path(name))
-            for what in MEASUREMENTS:
-                if what.group in wanted:
-                    print(f"{what.title}: measuring", file=sys.stderr, flush=True)
-                    lines += compared(what, before, Path(name), max(options.turns, 1))
-        except (SpeedupError, ResultsError) as error:
+        except SpeedupError as error:
             print(f"{PROGRAM}: {error}", file=sys.stderr)
-            return 2 if not lines and "no such commit" in str(error) else 1
+            return 2
+        for what in MEASUREMENTS:
+            if what.group not in wanted:
+                continue
+            print(f"{what.title}: measuring", file=sys.stderr, flush=True)
+            try:
+                lines += compared(what, before, Path(name), max(options.turns, 1))
+            except (SpeedupError, ResultsError) as error:  # the others are measured all the same
+                print(f"{PROGRAM}: {error}", file=sys.stderr)
+                failed = True
     _show(lines)
     if options.out:
-        with open(options.out, "w", newline="", encoding="utf-8") as stream:
+        with (
+            replacing(Path(options.out)) as temporary,
+            temporary.open("w", newline="", encoding="utf-8") as stream,
+        ):
             writer = csv.DictWriter(stream, list(Line.__dataclass_fields__), lineterminator="\n")
             writer.writeheader()
             writer.writerows(vars(line) for line in lines)
-    return 0
+    return 1 if failed else 0
 
 
 def _show(lines: Sequence[Line]) -> None:

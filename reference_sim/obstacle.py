@@ -52,6 +52,8 @@ class Obstacle:
         MeshError: wrong shapes, NaN, a mesh that is no closed surface (see `check_closed`).
     """
 
+    bounded = False  # whether planes are exact only within a reach that they are to be told
+
     def __init__(
         self,
         positions: np.ndarray,
@@ -81,8 +83,6 @@ class Obstacle:
         self._fitted = -1  # the frame that the tree is fitted to
         # Of so many points, in regions or not: the faces found last, and an order to search in.
         self._last: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray | None]] = {}
-
-    bounded = False  # whether planes are exact only within a reach that they are to be told
 
     @property
     def frames(self) -> int:

@@ -22,7 +22,8 @@ from .elements import (
 from .scalar_factor import factorise, solve
 
 HALVINGS = 12  # of a step before its direction is given up
-INERTIA, GRAVITY, STRAIN, BENDING, COLLISION = range(5)  # places of their energies
+ENERGIES = ("inertia", "gravity", "strain", "bending", "collision")  # by their places
+INERTIA, GRAVITY, STRAIN, BENDING, COLLISION = range(len(ENERGIES))
 
 # What is constant of a potential. Vertices: inertia [N/m] and weights [N] (V,); pinned: 3 times the vertex.
 Vertices = namedtuple("Vertices", "inertia weights pinned")

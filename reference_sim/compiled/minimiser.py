@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from ..energies import BendHinge, ContactPenalty, Energy, StretchStVK
 
 MEMORY = 10
-ORDER = ("inertia", "gravity", "strain", "bending", "collision")  # of the energies of an iteration
 
 
 class CompiledLBFGS:
@@ -69,7 +68,7 @@ class CompiledLBFGS:
         )
         self._work = np.empty((4, 3 * count), np.float32)
         self._scratch = np.empty(SCRATCH, np.float32)
-        self._energies, self._counts = np.zeros(5), np.zeros(3)
+        self._energies, self._counts = np.zeros(len(iteration.ENERGIES)), np.zeros(3)
         self._first_step = 1.0  # what the first direction of the last step allowed: most of the next too
 
     def minimise(self, x0: np.ndarray) -> Result:
@@ -80,6 +79,7 @@ class CompiledLBFGS:
         edges_of(x0, self._membrane.vertices, 2, self._membrane.state)
         edges_of(x0, self._hinges.vertices, 3, self._hinges.state)
         contact = self._frozen_contact(x0)
+        self._energies[:], self._counts[:] = np.nan, 0.0  # nothing of the step before is reported
         u = np.zeros(x0.size, np.float32)
         middle = time.perf_counter()
         if not iteration.precondition(contact, self._factor):
@@ -112,7 +112,7 @@ class CompiledLBFGS:
     def _result(
         self, x: np.ndarray, status: str, reason: str, seconds: dict[str, float], residual: float
     ) -> Result:
-        named = dict(zip(ORDER, self._energies.tolist()))
+        named = dict(zip(iteration.ENERGIES, self._energies.tolist()))
         gravity = self._terms.gravity
         if gravity is not None:
             named["gravity"] = gravity.value_and_gradient(x)[0]
@@ -130,14 +130,10 @@ class CompiledLBFGS:
         )
 
 
-def _indices(stencils: np.ndarray) -> np.ndarray:
-    return blocks(3 * stencils.astype(np.int32))
-
-
 def _elements(stencils: np.ndarray, constants: list[np.ndarray], states: int) -> Any:
     """Blocks of elements with constants (N,) or (N, k), and room for so many states."""
     columns = np.concatenate([c.reshape(len(c), prod(c.shape[1:])) for c in constants], axis=1)
-    vertices = _indices(stencils)
+    vertices = blocks(3 * stencils.astype(np.int32))
     state = np.zeros((len(vertices), states * LANES), np.float32)
     return iteration.Elements(vertices, blocks(columns.astype(np.float32)), state)
 

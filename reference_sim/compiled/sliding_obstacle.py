@@ -12,7 +12,7 @@ is another limb that came near. Against that, in each frame:
 
 What the rotation finds reaches its neighbours by the second rule in the same frame. A plane is therefore that
 of a place near the closest point, not always of the closest. The exact search (obstacle.Obstacle) is the
-oracle; tests/test_compiled.py states how far they differ over hard motions.
+oracle in tests/test_compiled.py.
 """
 
 from __future__ import annotations
@@ -91,9 +91,7 @@ class SlidingObstacle(Obstacle):
         assert self._patch is not None
         vertices, of_vertices = self._pose(frame)
         anchors.follow(points, frame, self._patch, vertices, self.region, reach)
-        normals = np.empty_like(points)
-
-        patch = self._patch
+        normals, patch = np.empty_like(points), self._patch
 
         def set_normals(at: np.ndarray | slice) -> None:
             some = np.empty_like(normals[at])
