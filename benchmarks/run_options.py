@@ -6,6 +6,7 @@ Light, so that --help answers at once.
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from snug.garment_file import add_garment_options
 from snug.motion_options import add_motion_options
