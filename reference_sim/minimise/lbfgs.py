@@ -67,7 +67,8 @@ class LBFGS:
         timeout: float = float("inf"),
         observe: Observer | None = None,
     ) -> None:
-        self.potential, self.memory, self.timeout = potential, memory, timeout
+        self.potential, self.memory = potential, memory
+        self.tolerance, self.timeout = tolerance, timeout
         check_tolerance(tolerance)
         self.observe = observe
         self.max_iterations = min(patience, max_iterations) if finish else max_iterations
@@ -103,7 +104,9 @@ class LBFGS:
         return self._newton.minimise(run.x, after=run)
 
     def _in_float32(self, compiled: CompiledLBFGS, x0: np.ndarray) -> Descent | None:
-        """Where the compiled part ends; None if that is not below x0 (V, 3), or x0 has no energy."""
+        """Where the compiled part ends; None if that is not below x0 (V, 3), or x0 has no energy, or nothing is
+        left to Newton: then the rounding of float32 would stay in the answer.
+        """
         run = Descent(self.potential, x0)
         if not run.finite:
             return None
@@ -114,7 +117,8 @@ class LBFGS:
         run.iterations, run.factorisations = result.iterations, result.factorisations
         for part, seconds in result.seconds.items():
             run.seconds[part] += seconds
-        return run if run.finite and run.value <= start else None
+        falls = run.finite and run.value <= start
+        return run if falls and run.gradient_norm() > self.tolerance else None
 
 
 def _compiled(potential: Potential, max_iterations: int, switch: float) -> CompiledLBFGS:
