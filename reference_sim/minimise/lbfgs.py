@@ -104,8 +104,10 @@ class LBFGS:
         return self._newton.minimise(run.x, after=run)
 
     def _in_float32(self, compiled: CompiledLBFGS, x0: np.ndarray) -> Descent | None:
-        """Where the compiled part ends; None if that is not below x0 (V, 3), or x0 has no energy, or nothing is
-        left to Newton: then the rounding of float32 would stay in the answer.
+        """Where the compiled part ends.
+
+        None if that is not below x0 (V, 3), if x0 has no energy, or if nothing is left to Newton: the rounding
+        of float32 would then stay in the answer.
         """
         run = Descent(self.potential, x0)
         if not run.finite:
