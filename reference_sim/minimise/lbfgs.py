@@ -106,8 +106,8 @@ class LBFGS:
     def _in_float32(self, compiled: CompiledLBFGS, x0: np.ndarray) -> Descent | None:
         """Where the compiled part ends.
 
-        None if that is not below x0 (V, 3), if x0 has no energy, or if nothing is left to Newton: the rounding
-        of float32 would then stay in the answer.
+        None if that is not below x0 (V, 3), if x0 has no energy, or if nothing is left to Newton, where the
+        rounding of float32 would stay in the answer.
         """
         run = Descent(self.potential, x0)
         if not run.finite:
