@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from meshes import box, patch
 from tasks_by_hand import small_scene
 
+from benchmarks.assets import open_assets
+from benchmarks.presets import find_preset
+from benchmarks.scene import BuiltScene
+from benchmarks.scenes import of_garment
+from benchmarks.scenes.long_motion import there_and_back
+from benchmarks.scenes.out_of_distribution import faster
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
@@ -24,6 +32,8 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from reference_sim.minimise import LBFGS, Newton
+from snug.motion import Motion
+from snug.motion_library import make_motion
 
 DT = 1 / 30
 
@@ -252,3 +262,41 @@ def test_whole_roll_outs_stay_beside_the_exact_ones(name):
     assert found.frames == exact.frames == 10
     span = np.abs(exact.positions - exact.positions[0]).max()
     assert np.abs(found.positions - exact.positions).max() < 0.01 * span
+
+
+def dressed_in_motion(motion: Motion) -> BuiltScene:
+    """A small T-shirt on the package's body in a motion."""
+    preset = replace(find_preset("smoke"), frames=motion.frames)
+    assets = open_assets(preset, [motion], ["tshirt"])
+    return of_garment("tshirt").scene(motion.name).at(preset).build(assets)
+
+
+def roll_out(scene: BuiltScene, obstacle: Obstacle, **options) -> np.ndarray:
+    """Positions (T, V, 3) [m] of ten iterations a step."""
+    found = simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.settle(),
+        obstacle=obstacle, max_iterations=10, **options,
+    )  # fmt: skip
+    assert found.frames == scene.frames, found.reason
+    return found.positions
+
+
+@pytest.mark.parametrize(
+    ("name", "times"),
+    [("run", 4), ("jumping_jack", 4), pytest.param("spin_jump", 1000, marks=pytest.mark.slow)],
+)
+def test_no_limb_is_lost_in_hard_and_long_motions(name, times):
+    """Four times as fast; or there and back for 1,000 frames: depths and distances beside exact planes."""
+    motion = make_motion(name)
+    motion = there_and_back(motion) if times == 1000 else faster(motion, times)
+    scene = dressed_in_motion(motion)
+    assert scene.obstacle is not None
+    exact = roll_out(scene, scene.obstacle, method="lbfgs", finish=False)
+    found = roll_out(scene, SlidingObstacle(scene.obstacle), method=CompiledLBFGS)
+    frames = range(1, scene.frames, max(scene.frames // 100, 1))
+    far = [np.array([scene.obstacle.signed_distance(x[f], f) for f in frames]) for x in (exact, found)]
+    deep = [(d < -5e-3).mean() for d in far]
+    assert deep[1] < deep[0] + 0.01, deep
+    assert far[1].min() > 2 * far[0].min() - 5e-3 and far[1].max() < far[0].max() + 0.05
+    middle = len(frames) // 2  # nothing wears out
+    assert np.abs(far[1]).mean(axis=1)[middle:].mean() < 1.2 * np.abs(far[0]).mean(axis=1)[middle:].mean()
