@@ -11,7 +11,8 @@ import pytest
 from benchmarks.methods import find_method
 from benchmarks.plan import Motions, PlanError
 from benchmarks.presets import find_preset
-from benchmarks.selection import Request, choose, choose_motions
+from benchmarks.roles import choose_motions
+from benchmarks.selection import Request, choose
 from snug.motion_library import TEST, TRAIN
 from snug.recipe import DEFAULT, Recipe
 from snug.recipe_deviations import DEVIATIONS

@@ -10,7 +10,8 @@ import pytest
 from benchmarks import selection
 from benchmarks.plan import Motions, PlanError
 from benchmarks.presets import find_preset
-from benchmarks.selection import Request, choose, choose_motions
+from benchmarks.roles import choose_motions
+from benchmarks.selection import Request, choose
 from benchmarks.validation.stress_tests import MAPS
 
 SMOKE = find_preset("smoke")

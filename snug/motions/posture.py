@@ -81,6 +81,7 @@ def root_path(
     support: np.ndarray | None = None,
     height_smoothing: float = 0.015,
     speed_smoothing: float = 0.06,
+    rises: bool = False,
 ) -> np.ndarray:
     """Root translations (T, 3) [m] of poses (T, 24, 3) at RATE whose standing foot stays where it is.
 
@@ -97,7 +98,10 @@ def root_path(
     weights /= weights.sum(axis=1, keepdims=True)
     # The weighted height is above the lowest point by about a millimetre per shared contact, and smooth.
     height = -(weights * soles[..., 1]).sum(axis=1)
-    velocity = -(weights[..., None] * np.gradient(soles, 1.0 / RATE, axis=0)).sum(axis=1)[:, ::2]
+    velocity = -(weights[..., None] * np.gradient(soles, 1.0 / RATE, axis=0)).sum(axis=1)
+    if rises:
+        height = height[0] + np.cumsum(velocity[:, 1]) / RATE
+    velocity = velocity[:, ::2]
     time = np.arange(len(poses)) / RATE
     for start, end in flights:
         inside = (time > start) & (time < end)
