@@ -90,6 +90,7 @@ def root_path(
     that carry the body do not move over the floor; in a flight the speed goes over from one to the other.
     support: (T, 2) shares in [0, 1] of the left and right foot where they are known (a swinging foot may come
     as low as the standing one); else the lowest points carry. Both smoothings: [s], of a Gaussian over time.
+    rises: the floor is steps: from the first frame on the height, too, is such that what carries stays.
     """
     soles = sole_points(poses, np.zeros((len(poses), 3)))
     weights = np.exp((soles[..., 1].min(axis=1, keepdims=True) - soles[..., 1]) / CONTACT_DEPTH)
