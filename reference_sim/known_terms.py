@@ -38,3 +38,12 @@ def terms_of(potential: Potential, solver: str) -> Terms:
     if found["inertia"] is None:
         raise ValueError(f"{solver} takes steps in time: the potential needs inertia")
     return Terms(**found)  # type: ignore[arg-type]
+
+
+def has_kernels(potential: Potential) -> bool:
+    """Whether `terms_of` knows all of them."""
+    try:
+        terms_of(potential, "")
+    except ValueError:
+        return False
+    return True

@@ -146,7 +146,7 @@ class Obstacle:
 
         The plane goes through the closest allowed point of the surface; its normal points from there to the
         sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
-        sample's own position.
+        sample's own position. Beyond the border of the allowed faces it fades: see `surface.plane_normals`.
 
         reach: (S,) [m] that a sample may come near in this step. It is asked of obstacles that are `bounded`;
             here every plane is exact.

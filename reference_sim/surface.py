@@ -6,6 +6,10 @@ import numpy as np
 
 from .kernel_cache import njit
 
+ON_SIDE = 1e-6  # weight of a corner below which a place is on a side; weights may be rounded to float32
+BALL = 0.1  # [m] diameter, of a limb: what the surface is taken for beside the faces that a sample may meet
+BEYOND = 1e-3  # cosine to a face, of an offset that leads over it: above the round-off of a foot on a side
+
 
 @njit(cache=True, error_model="numpy")
 def cross_of_face(x, i, j, k):
@@ -37,8 +41,42 @@ def _normalise(v):
 
 
 @njit(cache=True, error_model="numpy")
+def _beyond(offset, c, face, weights, vertices, faces):
+    """Whether some face at c, which is on a side or a corner of one, leads nearer along the unit offset.
+
+    Few samples ask: all faces are looked through for those that share the side or corner.
+    """
+    around, own = 0, 0.0
+    for f in range(len(faces)):
+        shared = True
+        for a in range(3):
+            v = face[a]
+            shared &= weights[a] <= ON_SIDE or v == faces[f, 0] or v == faces[f, 1] or v == faces[f, 2]
+        if not shared:
+            continue
+        around += 1
+        for a in range(3):
+            along, squared = 0.0, 0.0
+            for i in range(3):
+                way = vertices[faces[f, a], i] - c[i]
+                along += offset[i] * way
+                squared += way * way
+            if along > BEYOND * np.sqrt(squared):
+                return True
+            own = min(own, along + BEYOND * np.sqrt(squared))
+    return around == 1 and own < 0.0  # over the border of the mesh itself
+
+
+@njit(cache=True, error_model="numpy")
 def plane_normals(points, closest, found, barycentric, vertices, faces, of_vertices, normals):
-    """normals (S, 3): from the closest point to the sample, turned outwards."""
+    """normals (S, 3): from the closest point to the sample, turned outwards.
+
+    A sample that looks along the surface, or is below it and beyond the border of the faces that it may meet
+    (another face at the closest point c leads nearer), meets a ball that touches the surface in c from below:
+    the normal points to the sample from the ball's point opposite to c. By Thales' theorem n.(x - c) is
+    negative in that ball alone; where the sample is much nearer than the ball is wide, the plane is the
+    tangent.
+    """
     offset, smooth = np.empty(3), np.empty(3)
     for s in range(len(points)):
         i, j, k = faces[found[s], 0], faces[found[s], 1], faces[found[s], 2]
@@ -50,8 +88,14 @@ def plane_normals(points, closest, found, barycentric, vertices, faces, of_verti
         length = _normalise(offset)
         cosine = offset[0] * smooth[0] + offset[1] * smooth[1] + offset[2] * smooth[2]
         # Within a micrometre, or looking along the surface, the offset has no direction to trust.
-        if not (length > 1e-6 and np.abs(cosine) > 0.3):
-            normals[s] = smooth
+        beside = not (length > 1e-6 and np.abs(cosine) > 0.3)
+        if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
+            beside |= _beyond(offset, closest[s], faces[found[s]], barycentric[s], vertices, faces)
+        if beside:
+            ball = max(BALL, 1.5 * length)  # below c is in it, however deep
+            for c in range(3):
+                normals[s, c] = ball * smooth[c] + length * offset[c]
+            _normalise(normals[s])
             continue
         if min(u, v, w) > 0.0:  # inside the face its normal is the direction, and has no cancellation
             n = cross_of_face(vertices, i, j, k)

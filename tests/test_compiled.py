@@ -10,10 +10,10 @@ from tasks_by_hand import small_scene
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
-from reference_sim.compiled import CompiledLBFGS, SlidingObstacle
 from reference_sim.compiled.iteration import evaluate
+from reference_sim.compiled.minimiser import CompiledLBFGS
 from reference_sim.compiled.scalar_factor import WIDTH, ScalarPattern, factorise, solve
-from reference_sim.compiled.sliding_obstacle import ROTATION
+from reference_sim.compiled.sliding_obstacle import ROTATION, SlidingObstacle
 from reference_sim.energies import (
     AreaBarrier,
     BendHinge,
@@ -23,7 +23,7 @@ from reference_sim.energies import (
     Step,
     StretchStVK,
 )
-from reference_sim.minimise import LBFGS
+from reference_sim.minimise import LBFGS, Newton
 
 DT = 1 / 30
 
@@ -145,9 +145,30 @@ def test_iterations_are_those_of_the_exact_solver(seed, iterations):
 def test_many_iterations_end_at_the_minimum():
     potential, guess = pressed(5)
     found = CompiledLBFGS(potential, max_iterations=400).minimise(guess)
-    least = LBFGS(potential).minimise(guess)
+    least = Newton(potential).minimise(guess)
     assert least.status == "converged"
     assert potential.value(found.positions) - least.energy < 1e-6 * (potential.value(guess) - least.energy)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_begins_in_float32_ends_in_a_minimum_of_float64(seed):
+    potential, guess = pressed(seed)
+    found = LBFGS(potential).minimise(guess)
+    in_float64 = LBFGS(potential, observe=lambda x: None).minimise(guess)
+    assert found.status == in_float64.status == "converged"
+    assert found.iterations > in_float64.iterations  # more of them, and cheap ones
+    gradient = potential.value_and_gradient(found.positions)[1][potential.cloth.free]
+    assert np.abs(gradient).max() < 1e-6 * 9.81 * potential.cloth.masses.mean()
+    there = Newton(potential).minimise(found.positions)
+    assert there.status == "converged" and np.array_equal(there.positions, found.positions)
+
+
+def test_a_minimiser_that_served_gives_the_bits_of_a_new_one():
+    potential, guess = pressed(1)
+    solver = LBFGS(potential)
+    torn = np.random.default_rng(0).normal(0, 0.1, guess.shape) * potential.cloth.free[:, None]
+    solver.minimise(guess + torn)  # which allows its first direction a hundredth only
+    assert np.array_equal(solver.minimise(guess).positions, LBFGS(potential).minimise(guess).positions)
 
 
 def test_what_it_has_no_kernel_for_is_refused_by_name():

@@ -9,6 +9,7 @@ import pytest
 from meshes import box, random_rotation, sphere
 
 from reference_sim import MeshError, Obstacle
+from reference_sim.compiled.sliding_obstacle import SlidingObstacle
 
 RADIUS = 0.3
 SPHERE, FACES = sphere(4, RADIUS)
@@ -168,6 +169,82 @@ def test_a_sample_meets_only_faces_near_its_own_place_at_rest(region):
     # Without rest points, and on a body without a rest pose, the rule is off.
     for free in (obstacle.planes(points, 0), Obstacle(bent(rest), faces).planes(points, 0, rest_points)):
         assert np.linalg.norm(points - free.points, axis=1) == pytest.approx(anywhere, abs=1e-14)
+
+
+def column(height: float = 1.0, radius: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    """An upright cylinder with flat ends, of rings 1 cm apart."""
+    rings, around = np.linspace(-height, height, 201), 2 * np.pi * np.arange(48) / 48
+    circle = radius * np.column_stack([np.cos(around), np.zeros(48), np.sin(around)])
+    vertices = [circle + np.array([0, y, 0]) for y in rings] + [np.array([[0, -height, 0], [0, height, 0]])]
+    k = np.arange(48)
+    after, low = (k + 1) % 48, len(rings) * 48
+    faces = [np.column_stack([np.full(48, low), k, after])]
+    for ring in range(len(rings) - 1):
+        a, b, c, d = ring * 48 + k, ring * 48 + after, (ring + 1) * 48 + k, (ring + 1) * 48 + after
+        faces += [np.column_stack([a, c, b]), np.column_stack([b, c, d])]
+    top = (len(rings) - 1) * 48
+    faces.append(np.column_stack([np.full(48, low + 1), top + after, top + k]))
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def heights(obstacle: Obstacle, points: np.ndarray, home: tuple[float, float, float]) -> np.ndarray:
+    """n.(x - c) of samples that were all at `home` at rest."""
+    planes = obstacle.planes(points, 0, np.tile(home, (len(points), 1)))
+    assert np.linalg.norm(planes.normals, axis=1) == pytest.approx(1.0, rel=1e-12)
+    return np.einsum("si,si->s", planes.normals, points - planes.points)
+
+
+@pytest.mark.parametrize("kind", [lambda obstacle: obstacle, SlidingObstacle])
+def test_beside_the_border_of_its_faces_a_sample_meets_a_ball(kind):
+    """Samples at the side of a column at rest may meet 20 cm of it up and down, and have moved along it."""
+    rest, faces = column()
+    obstacle = kind(Obstacle(rest, faces, rest_positions=rest, region=0.2))
+    home = 0.1, 0.003, 0.0  # its uppermost face ends at 0.2 m
+
+    def at(along: float, depth: float) -> float:
+        return heights(obstacle, np.array([[0.1 - depth, 0.2 + along, 0.0]]), home)[0]
+
+    for depth in (0.03, 0.01, 0.002, -0.002, -0.03):  # on its faces: the distance to the skin, signed
+        assert at(-0.05, depth) == pytest.approx(-depth, abs=3e-4)
+    for depth in (0.03, 0.01, 0.002, -0.002, -0.03):  # far beyond them: no contact
+        assert at(0.1, depth) > 0.03
+    # Just beyond them the skin goes on as the tangent, and bends away as a ball of 10 cm.
+    assert at(0.003, 0.01) == pytest.approx(-0.01, abs=3e-4)
+    for along, depth in ((0.01, 0.01), (0.02, 0.02), (0.03, 0.01), (0.04, 0.04)):
+        way = np.array([0.1 - depth, along])  # to the sample from the ball's far end, 10 cm below the border
+        expected = np.array([-depth, along]) @ way / np.linalg.norm(way)
+        assert at(along, depth) == pytest.approx(expected, abs=3e-4)
+        assert (expected < 0) == (along**2 + (depth - 0.05) ** 2 < 0.05**2)
+
+
+def test_contact_fades_where_a_sample_slides_off_the_border_of_its_faces():
+    rest, faces = column()
+    obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.2)
+    along = np.arange(0.1, 0.4, 1e-4)
+    for depth in (0.002, 0.005, 0.01, 0.02):
+        points = np.column_stack([np.full_like(along, 0.1 - depth), along, np.zeros_like(along)])
+        height = np.minimum(heights(obstacle, points, (0.1, 0.003, 0.0)), 0.004)
+        assert np.abs(np.diff(height)).max() < 3e-4
+        assert height[0] == pytest.approx(-depth, abs=1e-4) and height[-1] == 0.004
+
+
+def test_no_sample_outside_a_dressed_body_is_in_contact():
+    """Samples of a cuff on a bent bar, displaced at random by some centimetres along it and off it."""
+    rest, faces = bar()
+    obstacle = Obstacle(bent(rest), faces, rest_positions=rest, region=0.1)
+    generator = np.random.default_rng(11)
+    cuff = rest[np.abs(rest[:, 0]) < 0.15]
+    homes = cuff[generator.integers(len(cuff), size=4000)]
+    points = bent(homes + generator.normal(0, [0.12, 0.02, 0.02], homes.shape))
+    planes = obstacle.planes(points, 0, homes)
+    height = np.einsum("si,si->s", planes.normals, points - planes.points)
+    distance = obstacle.signed_distance(points, 0)
+    assert (height < 0.004).sum() > 500
+    assert (height[distance > 0.015] > 0.004).all()
+    # And whoever is inside, nearest to a face that it may meet, is in contact by the exact depth.
+    own = (distance < 0) & (np.linalg.norm(points - planes.points, axis=1) < np.abs(distance) + 1e-9)
+    assert own.sum() > 300
+    assert height[own] == pytest.approx(distance[own], abs=1e-9)
 
 
 def test_what_samples_may_meet_is_found_also_from_a_few_of_them():

@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from reference_sim import Trajectory
-from reference_sim.compiled import CompiledLBFGS, SlidingObstacle
+from reference_sim.compiled.minimiser import CompiledLBFGS
+from reference_sim.compiled.sliding_obstacle import SlidingObstacle
 
 from ..scene import BuiltScene
 from .simulation import Simulation

@@ -140,7 +140,7 @@ def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -
     options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
     path, fast = model_path(models, guess, seed), solver == "fast-lbfgs"
     if fast:
-        from reference_sim.compiled import CompiledLBFGS
+        from reference_sim.compiled.minimiser import CompiledLBFGS
 
         from .fast_lbfgs import FastSimulation
 

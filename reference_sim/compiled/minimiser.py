@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..closest_point import by_cells
 from ..cloth import Cloth
 from ..kernel_cache import njit
 from ..known_terms import Terms, terms_of
@@ -69,6 +68,10 @@ class CompiledLBFGS:
         self._work = np.empty((4, 3 * count), np.float32)
         self._scratch = np.empty(SCRATCH, np.float32)
         self._energies, self._counts = np.zeros(len(iteration.ENERGIES)), np.zeros(3)
+        self.start_again()
+
+    def start_again(self) -> None:
+        """Forget what the last step taught, as before a first one."""
         self._first_step = 1.0  # what the first direction of the last step allowed: most of the next too
 
     def minimise(self, x0: np.ndarray) -> Result:
@@ -155,6 +158,8 @@ def _contact(term: ContactPenalty | None) -> tuple[np.ndarray, Any]:
     """Samples in an order (S,) in which those of a block lie near each other, and their blocks."""
     if term is None:
         return np.zeros(0, int), _elements(np.zeros((0, 3), int), [np.zeros((0, 4))], 4)
+    from ..closest_point import by_cells  # not of a cloth that meets nothing
+
     order = by_cells(term.rest_samples)
     return order, _elements(term.stencils[order], [term.weights[order], term.stiffness[order]], 4)
 

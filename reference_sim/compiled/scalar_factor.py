@@ -62,7 +62,7 @@ class ScalarPattern:
         """(E, k, k) where the entries of an element's matrix are added; -1 for those above the diagonal, of
         pinned vertices, and of an element that has a vertex twice.
         """
-        i = np.where(stencils >= 0, self._place[stencils], -1)
+        i = np.append(self._place, -1)[stencils]
         row, column = np.broadcast_arrays(i[:, :, None], i[:, None, :])
         key = row * self.count + column
         place = np.searchsorted(self._keys, np.where(row > column, key, 0))

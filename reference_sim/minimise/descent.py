@@ -46,7 +46,12 @@ class Descent:
         parts = dict.fromkeys(("assemble", "factorise", "solve", "evaluate"), 0.0)
         self.seconds: dict[str, float] = dict(after.seconds) if after else parts
         self.started: float = after.started if after else time.perf_counter()
-        self.value, self.g = self.evaluate(self.x)
+        self.value: float
+        self.g: np.ndarray
+        if after is not None and after.x is x:
+            self.value, self.g = after.value, after.g
+        else:
+            self.value, self.g = self.evaluate(self.x)
 
     @property
     def finite(self) -> bool:

@@ -6,14 +6,21 @@ Kavan 2017). It is factorised once per minimisation and costs three triangular s
 first hundredth of the gap comes several times sooner than with Newton; the last digits do not. So Newton
 takes over where the relative residual is SWITCH, and its factorisations serve several steps each. The first
 has all negative curvature taken out, which saves 13 to 20 % of the factorisations of a T-shirt's step.
+
+What comes before Newton needs no more than float32. So it is compiled.CompiledLBFGS, where that has kernels
+for all terms: an iteration is then so cheap that it goes on to COMPILED_SWITCH. Newton ends in float64 either
+way, at the same tolerance.
 """
 
 from __future__ import annotations
 
 import time
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..known_terms import has_kernels
 from ..potential import Potential
 from .descent import Descent, Observer
 from .lbfgs_history import LBFGSHistory
@@ -21,7 +28,11 @@ from .newton import Newton
 from .result import Result, check_tolerance
 from .scalar_preconditioner import ScalarPreconditioner
 
-SWITCH = 1.0  # relative residual
+if TYPE_CHECKING:
+    from ..compiled.minimiser import CompiledLBFGS
+
+SWITCH, COMPILED_SWITCH = 1.0, 0.1  # relative residuals
+LARGEST_COMPILED = 10_000  # vertices: from about here on a package's factorisation is faster
 
 
 class LBFGS:
@@ -31,12 +42,13 @@ class LBFGS:
         tolerance: as in Newton.
         max_iterations: iterations, of Newton's too, before giving up with status max_iterations.
         memory: number of remembered steps; 0 is preconditioned gradient descent.
-        switch: relative residual at which Newton takes over.
+        switch: relative residual at which Newton takes over; None is SWITCH, or COMPILED_SWITCH.
         patience: iterations after which it takes over in any case.
         finish: whether Newton takes over at all. Without it the result can only be "max_iterations",
             "stalled" or "timeout": nothing but a look at the curvature can say "converged".
         timeout: seconds, for both together.
-        observe: called with every point (V, 3) [m] that either of them kept, the start included.
+        observe: called with every point (V, 3) [m] that either of them kept, the start included. Nothing is
+            compiled then.
 
     Raises:
         ValueError: no term of the potential has a scalar stiffness.
@@ -49,20 +61,25 @@ class LBFGS:
         tolerance: float = 1e-6,
         max_iterations: int = 500,
         memory: int = 10,
-        switch: float = SWITCH,
+        switch: float | None = None,
         patience: int = 100,
         finish: bool = True,
         timeout: float = float("inf"),
         observe: Observer | None = None,
     ) -> None:
-        self.potential, self.memory, self.timeout = potential, memory, timeout
+        self.potential, self.memory = potential, memory
+        self.tolerance, self.timeout = tolerance, timeout
         check_tolerance(tolerance)
         self.observe = observe
         self.max_iterations = min(patience, max_iterations) if finish else max_iterations
+        small = potential.cloth.vertex_count <= LARGEST_COMPILED
+        fast = finish and memory > 0 and observe is None and small and has_kernels(potential)
+        if switch is None:
+            switch = COMPILED_SWITCH if fast else SWITCH
         self.switch = max(switch, tolerance) if finish else tolerance
         if not any(energy.has_scalar_stiffness for energy in potential.energies):
             raise ValueError("LBFGS: no term of this potential has a scalar stiffness to precondition with")
-        self.preconditioner = ScalarPreconditioner(potential)
+        self._compiled = _compiled(potential, self.max_iterations, self.switch) if fast else None
         self._newton: Newton | None = None
         if finish:
             self._newton = Newton(
@@ -70,13 +87,46 @@ class LBFGS:
                 start_projected=True, observe=observe,
             )  # fmt: skip
 
+    @cached_property
+    def preconditioner(self) -> ScalarPreconditioner:
+        return ScalarPreconditioner(self.potential)
+
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]."""
+        if self._newton is not None and self._compiled is not None:
+            first = self._in_float32(self._compiled, x0)
+            if first is not None:
+                return self._newton.minimise(first.x, after=first)
         run = _Run(self, x0)
         status, reason = run.to_the_end()
         if self._newton is None or status in ("diverged", "timeout"):
             return run.result(status, reason)
         return self._newton.minimise(run.x, after=run)
+
+    def _in_float32(self, compiled: CompiledLBFGS, x0: np.ndarray) -> Descent | None:
+        """Where the compiled part ends.
+
+        None if that is not below x0 (V, 3), if x0 has no energy, or if nothing is left to Newton, where the
+        rounding of float32 would stay in the answer.
+        """
+        run = Descent(self.potential, x0)
+        if not run.finite:
+            return None
+        compiled.start_again()  # a resumed run has to give the same bits
+        result = compiled.minimise(x0)
+        start, run.x = run.value, result.positions
+        run.value, run.g = run.evaluate(run.x)
+        run.iterations, run.factorisations = result.iterations, result.factorisations
+        for part, seconds in result.seconds.items():
+            run.seconds[part] += seconds
+        falls = run.finite and run.value <= start
+        return run if falls and run.gradient_norm() > self.tolerance else None
+
+
+def _compiled(potential: Potential, max_iterations: int, switch: float) -> CompiledLBFGS:
+    from ..compiled.minimiser import CompiledLBFGS  # its kernels are loaded only where they serve
+
+    return CompiledLBFGS(potential, max_iterations=max_iterations, tolerance=switch)
 
 
 class _Run(Descent):
