@@ -20,12 +20,14 @@ from .roll_out_option import MODULE
 from .rows import described, rows_of
 from .runner import Runner
 from .schedule import tasks_of
+from .source import digest
 from .tasks.task import RunStopped, one_line
 
 if TYPE_CHECKING:
     from .assets import Assets
 
 OF_TRAINING = ("cost/setup", "cost/train")
+KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier run in the folder
 
 
 def execute(plan: Plan) -> int:
@@ -60,6 +62,8 @@ def execute(plan: Plan) -> int:
         print(f"{label}: {reason}", file=sys.stderr)
     for line in remarks(log.rows, len(runner.reused), runner.outdated()):
         print(line, file=sys.stderr)
+    if looks := log.config["test_looks"]:
+        print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)
     if made:
         print(log.folder.report_path.resolve(), flush=True)
     return 0 if made and not (failed or broken) else 1
@@ -109,6 +113,8 @@ class RunLog:
         self.cache = Cache(self.folder, only=plan.only, origin=self.origin)
         self.rows: list[Row] = []
         self.stages: list[dict[str, Any]] = []
+        before = self.folder.read_config() if self.folder.config_path.is_file() else {}
+        runs_before = [{name: before.get(name) for name in KEPT}] if before else []
         self.config: dict[str, Any] = {
             "command": plan.command,
             "preset": plan.preset.name,
@@ -116,8 +122,13 @@ class RunLog:
             "motions": {
                 f"{what} {garment}": list(names(garment))
                 for garment in plan.garments
-                for what, names in (("train", plan.motions.train_of), ("test", plan.motions_of))
+                for what, names in (
+                    ("train", plan.motions.train_of),
+                    ("validation", plan.motions.validation_of),
+                    ("test", plan.motions.test_of),
+                )
             },
+            "split": plan.motions.split,
             "body": [plan.body.path.name, plan.body.digest] if plan.body else "of the package",
             "garment": [plan.garment.file.path.name, plan.garment.inputs] if plan.garment else "tailored",
             "seeds": list(plan.seeds),
@@ -130,21 +141,15 @@ class RunLog:
             "versions": provenance.versions(),
             "preset_values": dataclasses.asdict(plan.preset),
             "stages": self.stages,
-            "earlier": self._earlier(),
+            # Earlier runs in this folder: their stages are the times of what this one reuses.
+            "earlier": [*before.get("earlier", []), *runs_before],
+            "test_looks": before.get("test_looks", []),
         }
         plan.folder.mkdir(parents=True, exist_ok=True)
         self.folder.remove_parts()
         if plan.fresh:
             self.cache.forget_all()
         self.folder.write_config(self.config)
-
-    def _earlier(self) -> list[dict[str, Any]]:
-        """Earlier runs in this folder: their stages are the times of what this one reuses."""
-        if not self.folder.config_path.is_file():
-            return []
-        before = self.folder.read_config()
-        names = ("command", "commit", "started", "finished", "stages")
-        return [*before.get("earlier", []), {name: before.get(name) for name in names}]
 
     def note(self, name: str, value: Any) -> None:
         """Set an entry of run.json and write it."""
@@ -203,10 +208,21 @@ class RunLog:
             dataclasses.replace(row, hardware=everything) if row.metric in OF_TRAINING else row
             for row in with_provenance(rows, **self.origin)
         ]
+        self.count_look()
         self.folder.write_rows(self.rows)
         self.config |= described(self.plan, self.rows)
         self.config["digests"] = {self.folder.rows_path.name: digest_of_file(self.folder.rows_path)}
         self.folder.write_config(self.config)
+
+    def count_look(self) -> None:
+        """Add a look at the test motions where the rows hold numbers of them that no earlier look had."""
+        role_of = self.plan.motions.role_of
+        tests = {scene.name for scene in self.plan.scenes if role_of(scene.motion) == "test"}
+        rows = [row for row in self.rows if row.scene in tests]
+        seen = [[row.scene, row.method, row.seed, row.metric, row.value] for row in rows]
+        look = {"started": self.config["started"], "commit": self.origin["commit"], "rows": digest(seen)}
+        if seen and look["rows"] not in [earlier["rows"] for earlier in self.config["test_looks"]]:
+            self.config["test_looks"] = [*self.config["test_looks"], look]
 
     def make_report(self) -> bool:
         """tables/, figures/, report.html and report.pdf; a failure is said and leaves the results."""

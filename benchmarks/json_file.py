@@ -78,6 +78,10 @@ def _is_stages(value: Any) -> bool:
     )
 
 
+def _is_looks(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(v, dict) and _is_text(v.get("rows")) for v in value)
+
+
 _DUE: dict[str, tuple[Callable[[Any], bool], str]] = {
     "metrics": (_declares("title", "definition", "table", "unit"), "metric -> what it declares"),
     "methods": (_declares("label"), "method -> what it declares"),
@@ -86,4 +90,5 @@ _DUE: dict[str, tuple[Callable[[Any], bool], str]] = {
     "digests": (lambda v: isinstance(v, dict) and all(map(_is_text, v.values())), "file -> digest"),
     "stages": (_is_stages, "a list of names and seconds"),
     "earlier": (lambda v: isinstance(v, list), "a list of earlier runs"),
+    "test_looks": (_is_looks, "a list of looks at the test motions"),
 }

@@ -19,17 +19,28 @@ from .validation.registry import CASES
 
 def listing() -> str:
     """Suites, scenes, methods, motions and presets, one line each."""
-    from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, TEST, TRAIN
+    from snug.motion_library import (
+        DYNAMIC_TEST,
+        DYNAMIC_TRAIN,
+        DYNAMIC_VALIDATION,
+        TEST,
+        TRAIN,
+        VALIDATION,
+    )
 
+    swinging = dict.fromkeys(DYNAMIC_TEST, "test") | dict.fromkeys(DYNAMIC_VALIDATION, "validation")
+    roles = dict.fromkeys(TEST, "test") | dict.fromkeys(VALIDATION, "validation") | swinging
     dressed = [
-        (scene.name, f"{scene.description}; unseen in training")
+        (scene.name, f"{scene.description} ({role})")
         for scenes in GARMENT_SCENES
-        for scene in map(scenes.scene, DYNAMIC_TEST if scenes.dynamic else (*TEST, *DYNAMIC_TEST))
+        for motion, role in (swinging if scenes.dynamic else roles).items()
+        for scene in (scenes.scene(motion),)
     ]
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),
         (
-            f"scenes; of a dressed body also its liveliest part, as {dressed[0][0]}@clip",
+            "scenes; of a dressed body, in a test or validation motion, also its liveliest part, as "
+            f"{dressed[0][0]}@clip",
             [
                 *((s.name, s.description) for s in SCENES),
                 *dressed,

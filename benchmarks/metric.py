@@ -91,6 +91,7 @@ class RollOut(Kept):
         trajectory: as the method gave it; positions: (T,V,3) [m] of it that are finite.
         quasi_static: (T,V,3) [m] its own answer to poses held still, or None.
         counterpart: (T',V,3) [m] what the same method did in the scene's counterpart, or None.
+        training_poses: (N,24,3) [rad] that its network trained on, or None.
     """
 
     def __init__(
@@ -108,6 +109,7 @@ class RollOut(Kept):
         self.group, self.entry = group, entry
         self.status, self.suites, self.trajectory = status, suites, trajectory
         self.quasi_static, self.counterpart = quasi_static, counterpart
+        self.training_poses: np.ndarray | None = None
         self.positions = finite_frames(trajectory.positions)
 
     @property

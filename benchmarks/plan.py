@@ -85,10 +85,10 @@ class OwnGarment:
 
 @dataclass(frozen=True)
 class Motions:
-    """Names of the motions of a run, training apart from test, and those that came from files.
+    """Names of the motions of a run, by their roles, and those that came from files.
 
-    dynamic_train, dynamic_test: the same for garments whose motions stop within a frame. worn: the garments
-    that do them; the first is that of a run where none is named.
+    dynamic_*: the same for garments that swing. worn: the garments that do them; the first is that of a run
+    where none is named. split: the role whose motions stand in the suites' scenes, "test" or "validation".
     """
 
     train: tuple[str, ...] = ()
@@ -97,6 +97,28 @@ class Motions:
     dynamic_train: tuple[str, ...] = ()
     dynamic_test: tuple[str, ...] = ()
     worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
+    validation: tuple[str, ...] = ()
+    dynamic_validation: tuple[str, ...] = ()
+    split: str = "test"
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Those of the split."""
+        return self.test if self.split == "test" else self.validation
+
+    @property
+    def dynamic_measured(self) -> tuple[str, ...]:
+        """The same for garments that swing."""
+        return self.dynamic_test if self.split == "test" else self.dynamic_validation
+
+    def role_of(self, motion: str) -> str:
+        """Its role: "training", "validation", "test", or empty where it has none in this run."""
+        roles = {
+            "test": (*self.test, *self.dynamic_test),
+            "validation": (*self.validation, *self.dynamic_validation),
+            "training": (*self.train, *self.dynamic_train),
+        }
+        return next((role for role, names in roles.items() if motion in names), "")
 
     @property
     def first_garment(self) -> str:
@@ -107,9 +129,17 @@ class Motions:
         """Names of the motions that networks of a garment train on."""
         return self.dynamic_train if of_garment(garment, self.worn).dynamic else self.train
 
+    def validation_of(self, garment: str) -> tuple[str, ...]:
+        """Names of a garment's validation motions."""
+        return self.dynamic_validation if of_garment(garment, self.worn).dynamic else self.validation
+
     def test_of(self, garment: str) -> tuple[str, ...]:
         """Names of a garment's test motions."""
         return self.dynamic_test if of_garment(garment, self.worn).dynamic else self.test
+
+    def measured_of(self, garment: str) -> tuple[str, ...]:
+        """Names of a garment's motions of the split."""
+        return self.test_of(garment) if self.split == "test" else self.validation_of(garment)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,9 +184,9 @@ class Plan:
         return tuple(dict.fromkeys(cell.scene.garment for cell in self.cells if cell.scene.dressed))
 
     def motions_of(self, garment: str) -> tuple[str, ...]:
-        """Names of a garment's test motions, and of what it does besides in the plan's scenes."""
+        """Names of a garment's motions of the split, and of what it does besides in the plan's scenes."""
         done = (scene.motion for scene in self.scenes if scene.garment == garment)
-        return tuple(dict.fromkeys((*self.motions.test_of(garment), *done)))
+        return tuple(dict.fromkeys((*self.motions.measured_of(garment), *done)))
 
     @property
     def simulated(self) -> tuple[str, ...]:

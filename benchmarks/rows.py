@@ -266,7 +266,10 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
         if (metric := found[name]) is not None
     }
     without = ("name", "module", "declared_in", "files", "sizes", "options", "metrics")
-    scenes = {scene.name: _fields(scene, *without) for scene in plan.scenes}
+    scenes = {
+        scene.name: _fields(scene, *without) | {"role": plan.motions.role_of(scene.motion)}
+        for scene in plan.scenes
+    }
     words = ("label", "description", "role", "family", "level", "base", "seeded", "dtype")
     said = {name: {word: getattr(entry, word) for word in words} for name, entry in methods.items()}
     for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:

@@ -28,11 +28,12 @@ from .presets import find_preset
 from .provenance import usable_cores
 from .registry import DeclarationError
 from .results import ResultsError, RunFolder, digest_of_file
+from .roles import choose_motions
 from .roll_out_option import RollOutError
 from .roll_out_option import parse as parse_roll_out
 from .run_options import PROGRAM, make_parser
 from .scenes import GARMENT_SCENES, all_scenes
-from .selection import MEASURED, Request, choose, choose_motions, choose_suites, names_no_motion
+from .selection import MEASURED, Request, choose, choose_suites, names_no_motion
 from .tasks.task import RunStopped
 from .timing import one_thread
 
@@ -107,8 +108,11 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         outside.METHODS, split(options.methods), {entry.name for entry in METHODS}
     )
     motions, reading = Motions(), reading_of(options)
-    if options.motions or options.test_motions or not names_no_motion(scenes, own_scenes):
-        motions = choose_motions(options.motions, split(options.test_motions), preset, reading)
+    tests, validates = split(options.test_motions), split(options.validation_motions)
+    if options.motions or tests or validates or not names_no_motion(scenes, own_scenes):
+        motions = choose_motions(
+            options.motions, tests, preset, reading, validation_names=validates, split=options.split
+        )
     garment = choose_garment(options)
     if garment:
         motions = replace(motions, worn=(garment.scenes, *motions.worn[1:]))

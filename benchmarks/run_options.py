@@ -25,7 +25,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run --methods ./mine.py,snug,simulation --metrics ./my_metric.py
   python -m benchmarks.run --motions clips/ --test-motions 01_01
   python -m benchmarks.run --suite garments --methods 'simulation,skinning,snug,snug-without-*' \\
-      --test-motions brisk_walk,torso_twist,lunge               what each choice of the recipe does
+      --split validation                                        what each choice of the recipe does
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
   python -m benchmarks.run --motions mocap.bvh --motion-up z --repair
@@ -33,12 +33,13 @@ EXAMPLES = """examples:
   python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
   python -m benchmarks.run --garment shirt.obj --garment-units cm --body mine.npz --suite garments
 
-motions: without --motions the embedded library, which has its own test set. With --motions the files
-  replace the library; "library" among the paths keeps it. --test-motions names those to test on, all
-  others train, but for the library's own test motions, which never do. Without it the library's test
-  set tests; of files alone the first by name tests and the others train; a single file tests and the
-  library trains. Files are brought to 30 frames per second, placed on the floor, arms spread clear of
-  the torso, and cut to the preset's length.
+motions: without --motions the embedded library, whose motions train, validate or test (docs/protocol.md).
+  With --motions the files replace the library; "library" among the paths keeps it. --test-motions and
+  --validation-motions name those of these roles, all others train, but for the library's own validation
+  and test motions, which never do. Without them the library's roles hold; of files alone the first by
+  name tests and the others train; where no file is left to train on, the library trains. Files are
+  brought to 30 frames per second, placed on the floor, arms spread clear of the torso, and cut to the
+  preset's length.
 
 a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
   as it is, the rest is done. A run that was killed is so taken up again. --only failed does again what
@@ -83,6 +84,8 @@ def make_parser() -> argparse.ArgumentParser:
     add("--metrics", action="append", default=[], metavar="FILE,...",
         help="metrics of your own, measured besides all others: files or entry points")  # fmt: skip
     add("--rollout", action="append", default=[], metavar="NAME=FILE", help=ROLL_OUT_HELP)
+    add("--split", choices=("test", "validation"), default="test",
+        help="motions that the suites measure: test (default), or validation, to choose recipes")  # fmt: skip
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
@@ -107,6 +110,8 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
         help="motion file (.npz, .bvh, .amc with .asf), folder, or the word library; repeatable")  # fmt: skip
     add_motion_options(add)
     add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
+    add("--validation-motions", action="append", default=[], metavar="NAME,...",
+        help="motions to choose recipes by; neither these nor those to test on train")  # fmt: skip
     add(
         "--body",
         metavar="FILE",

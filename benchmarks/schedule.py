@@ -185,7 +185,8 @@ class Schedule:
                     (scene.counterpart, cell.method, cell.seed))  # fmt: skip
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, ("cell", counterpart.name))
-        modules = [f"benchmarks.metrics.{name}" for name in names_of(scene.metrics)] + list(plan.metrics)
+        names = names_of(scene.metrics)
+        modules = [f"benchmarks.metrics.{name}" for name in names] + list(plan.metrics)
         of_scene = self._of_scene(scene, f"{TASKS}.metrics", *modules)
         inputs = {
             "suites": sorted(cell.suites),
@@ -199,10 +200,14 @@ class Schedule:
             ],
             "metrics": scene.metrics,
         }
+        training = None
+        if (network := network_of(cell)) and "training_distance" in names:
+            training = self.network(network)
+            inputs |= {name: training.inputs[name] for name in ("training", "seed", "motions")}
         return MeasureCell(
             name=cell.name, label=cell.label, cell=cell, cells=cells,
             gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
-            counterpart=counterpart, outside=plan.metrics,
+            counterpart=counterpart, training=training, outside=plan.metrics,
             needs=(("cell", cell.name),), reads=reads, batch=scene.name,
             **of_scene | {"inputs": of_scene["inputs"] | inputs},
         )  # fmt: skip

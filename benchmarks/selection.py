@@ -1,8 +1,7 @@
-"""What a request asks for: scenes and methods, cases, microbenchmarks, motions to train and test on."""
+"""What a request asks for: scenes and methods, cases, microbenchmarks."""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -16,6 +15,7 @@ from .performance.registry import MICROBENCHMARKS
 from .plan import Motions, PlanError
 from .presets import PRESETS, Preset
 from .registry import DeclarationError, by_name
+from .roles import nearest
 from .scene import Scene
 from .scenes import GARMENT_SCENES, all_scenes
 from .suites import SUITE_NAMES, SUITES, Extent, Suite
@@ -24,13 +24,9 @@ from .validation.case import METHOD
 from .validation.registry import CASES
 
 if TYPE_CHECKING:
-    from snug.motion import Motion
-    from snug.motion_options import Reading
-
     from .roll_out_option import RollOutOption
     from .validation.case import Case
 
-FEWEST = 3  # frames of a motion: inertia needs two before the one that is judged
 MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
 
 
@@ -55,7 +51,10 @@ class Request:
     @cached_property
     def declared_scenes(self) -> dict[str, Scene]:
         """Name -> scene, of all that could be asked for. Raises DeclarationError where two have one name."""
-        declared = all_scenes(self.motions.test, self.motions.dynamic_test, self.motions.worn)
+        of = self.motions
+        motions = dict.fromkeys((*of.measured, *of.test, *of.validation))
+        dynamic = dict.fromkeys((*of.dynamic_measured, *of.dynamic_test, *of.dynamic_validation))
+        declared = all_scenes(motions, dynamic, of.worn)
         taken = {entry.name for entry in MEASURED}
         for scene in self.own_scenes:
             if scene.name in taken:
@@ -227,51 +226,6 @@ def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in SUITE_NAMES if "all" in chosen or name in chosen)
 
 
-def choose_motions(
-    paths: Sequence[str], test_names: Sequence[str], preset: Preset, reading: Reading | None = None
-) -> Motions:
-    """Which motions train and which test. Raises PlanError (or the reader's own error) for a bad request.
-
-    Without paths: the embedded library with its own division. With paths: the files alone, plus the library
-    where "library" is among the paths. test_names moves motions to the test set; without it the test
-    motions of the library test, and of files alone the first in order of names. A single file tests, and the
-    library trains. The test motions of the library never train, whichever motions test. reading: what the
-    files do not say.
-    """
-    from snug.motion_library import DYNAMIC_TEST, DYNAMIC_TRAIN, LIBRARY, TEST, TRAIN
-
-    files: dict[str, Motion] = {}
-    for path in paths:
-        for motion in _motions_in(path, reading) if path != "library" else ():
-            if motion.name in files or motion.name in LIBRARY:
-                raise PlanError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
-            if motion.frames < FEWEST:
-                raise PlanError(f"--motions {path}: {motion.frames} frames; at least {FEWEST} are needed")
-            files[motion.name] = motion
-    with_library = not paths or "library" in paths
-    names = [*sorted(files), *((*TRAIN, *TEST) if with_library else ())]
-    for name in test_names:
-        if name not in names:
-            raise PlanError(f"--test-motions: unknown motion '{name}'; {_nearest(name, names)}")
-    if test_names:
-        test = tuple(name for name in names if name in test_names)
-    else:
-        test = TEST if with_library else tuple(names[:1])
-    train = tuple(name for name in names if name not in (*test, *TEST))
-    if not train:
-        train = tuple(name for name in TRAIN if name not in test)
-    # Whoever names the test motions means all of them, whatever the size of the preset.
-    few, fewer = preset.train_motions, preset.test_motions
-    test = test if test_names else test[:fewer]
-    return Motions(train[:few], test, files, DYNAMIC_TRAIN[:few], DYNAMIC_TEST[:fewer])
-
-
-def _motions_in(path: str, reading: Reading | None) -> list[Motion]:
-    from snug.motion_files import load_motions  # its readers are slow to load
-
-    return load_motions(path, reading=reading)
-
-
 def names_no_motion(scenes: Sequence[str], own: Sequence[Scene] = ()) -> bool:
     """Whether a choice of scenes, some of them a user's own, names scenes without a body, cases and
     microbenchmarks alone; no motion is looked at then."""
@@ -285,10 +239,5 @@ def _check_words(what: str, patterns: Sequence[str], names: Sequence[str]) -> No
         if not any(fnmatchcase(name, pattern) for name in names):
             hint = ""
             if what == "scene" and pattern.partition("/")[0] in {g.garment for g in GARMENT_SCENES}:
-                hint = " (scenes of a dressed body are the test motions: see --test-motions)"
-            raise PlanError(f"unknown {what} '{pattern}'; {_nearest(pattern, names)}{hint}")
-
-
-def _nearest(word: str, names: Sequence[str]) -> str:
-    near = difflib.get_close_matches(word, names, n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else "see --list"
+                hint = " (scenes of a dressed body are the validation and test motions: see --test-motions)"
+            raise PlanError(f"unknown {what} '{pattern}'; {nearest(pattern, names)}{hint}")

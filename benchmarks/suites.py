@@ -46,12 +46,12 @@ class Suite:
 
 
 def _whole_motions(extent: Extent) -> list[str]:
-    """The first garment in each test motion; at preset paper also what swings; others where named."""
+    """The first garment in each motion of the split; at preset paper also what swings; others where named."""
     first, *others = extent.motions.worn
-    names = [first.scene(name).name for name in extent.motions.test]
-    names += [there_and_back(name, first.garment).name for name in extent.motions.test[:1]]
+    names = [first.scene(name).name for name in extent.motions.measured]
+    names += [there_and_back(name, first.garment).name for name in extent.motions.measured[:1]]
     if extent.further:
-        names += [o.scene(name).name for o in others if o.dynamic for name in extent.motions.dynamic_test]
+        names += [o.scene(name).name for o in others if o.dynamic for name in extent.motions.dynamic_measured]
     return names
 
 
@@ -59,10 +59,6 @@ def _whole_motions(extent: Extent) -> list[str]:
 
 SMALL = ("hanging_sheet", "sheet_on_sphere", "flag", "twisted_strip")
 EXACT = ("free_fall",)  # every method has no error there but round-off: only for whoever names it
-LIVELY = ("sudden_stop", "spin_jump")  # of the library's test motions: a run and its stop, a jump with a turn
-# Of the motions for garments with dynamics: a walk that turns, its clip before the stop. No training saw its
-# turning; its strides are those of the T-shirt's training walks, so it is the easiest scene for networks.
-TURNING = ("turning_stop",)
 
 # The reference from coarse to fine in tolerance and in time; and again, as right as it, from moved starts and
 # with its contact planes searched twice: how far those lie apart is the uncertainty of whatever is compared.
@@ -86,16 +82,15 @@ FAST = ("skinning", "snug", "supervised", "pbns")
 def _clips(extent: Extent) -> list[str]:
     """Small scenes and clips of dressed bodies; the quick subset is one of each.
 
-    Dressed bodies are clips, the liveliest part of a motion: here every solver goes through every frame.
+    Dressed bodies are clips, the liveliest part of a motion: here every solver goes through every frame. They
+    are the first two motions of the split, and the first for garments that swing, also with a skirt.
     """
-    motions = extent.motions
-    lively = [name for name in motions.test if name in LIVELY] or list(motions.test[:2])
+    motions, swinging = extent.motions, extent.motions.dynamic_measured[:1]
     first = motions.first_garment
     if not extent.full:
-        return [SMALL[0], *(f"{first}/{name}@clip" for name in lively[:1])]
-    turning = [name for name in motions.dynamic_test if name in TURNING]
-    shirts = [f"{first}/{name}@clip" for name in (*lively, *turning)]
-    skirts = [f"skirt/{name}@clip" for name in turning]
+        return [SMALL[0], *(f"{first}/{name}@clip" for name in motions.measured[:1])]
+    shirts = [f"{first}/{name}@clip" for name in dict.fromkeys((*motions.measured[:2], *swinging))]
+    skirts = [f"skirt/{name}@clip" for name in swinging]
     return [*SMALL, *(EXACT if extent.further else ()), *shirts, *skirts]
 
 

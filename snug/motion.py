@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices, sole_points
+from snug.skeleton import JOINT, JOINT_NAMES, axis_angles, joint_positions, rotation_matrices, sole_points
 
 # Upper arm to the spine's direction: on the default body this leaves about 2 cm between arm and chest.
 ARMS_CLEAR = np.deg2rad(25.0)
@@ -162,6 +162,32 @@ def joint_speeds(motion: Motion) -> np.ndarray:
     rotations = rotation_matrices(motion.poses)
     steps = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
     return np.linalg.norm(steps, axis=-1) * motion.fps
+
+
+def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """How far each pose is from the nearest of the others: poses (T, 24, 3), others (N, 24, 3) [rad] -> (T,).
+
+    The mean over the body's joints, hands aside, of the geodesic angle between their rotations [rad]. Of the
+    root it is the angle between the two upward directions: which way a body faces is no difference.
+    """
+    up, turns = _up_and_turns(poses)
+    other_up, other_turns = _up_and_turns(others)
+    nearest = np.empty(len(poses))
+    for frame in range(len(poses)):
+        total = np.arccos(np.clip(other_up @ up[frame], -1.0, 1.0))
+        cosines = np.abs(np.einsum("njq,jq->nj", other_turns, turns[frame]))
+        total += 2.0 * np.arccos(np.minimum(cosines, 1.0)).sum(axis=1)
+        nearest[frame] = total.min() / (1 + turns.shape[1])
+    return nearest
+
+
+def _up_and_turns(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Upward directions in the root's axes (T, 3), and unit quaternions (T, 21, 4) of the other joints."""
+    from scipy.spatial.transform import Rotation
+
+    turning = [JOINT[name] for name in JOINT_NAMES[1:] if not name.endswith("hand")]
+    quaternions = Rotation.from_rotvec(poses[:, turning].reshape(-1, 3)).as_quat()
+    return rotation_matrices(poses[:, 0])[:, 1], quaternions.reshape(len(poses), len(turning), 4)
 
 
 def arm_clearance(motion: Motion) -> np.ndarray:

@@ -106,22 +106,25 @@ def _outs(out: Path, templates: Sequence[Any]) -> list[Path]:
 def _motions(options: argparse.Namespace) -> tuple[list[Any], list[Any]]:
     """Motions to train on and to validate with. Raises ValueError for a name that is not there."""
     from snug.motion_files import load_motions
-    from snug.motion_library import TRAIN, make_motion
+    from snug.motion_library import TRAIN, VALIDATION, make_motion
 
     reading = reading_of(options)
     motions = [make_motion(name) for name in TRAIN]
     if options.motions:
         motions = load_motions(options.motions, reading=reading)
     names = [motion.name for motion in motions]
-    for word in ("hold_out", "validation"):
+    others = [name for name in VALIDATION if name not in names]  # of the library: they never train
+    for word, known in (("hold_out", names), ("validation", [*names, *others])):
         for name in getattr(options, word):
-            if name not in names:
+            if name not in known:
                 raise ValueError(
-                    f"--{word.replace('_', '-')} {name}: no such motion among {', '.join(names)}"
+                    f"--{word.replace('_', '-')} {name}: no such motion among {', '.join(known)}"
                 )
     left_out = {*options.hold_out, *options.validation}
     training = [motion for motion in motions if motion.name not in left_out]
-    return training, [motion for motion in motions if motion.name in options.validation]
+    validating = [motion for motion in motions if motion.name in options.validation]
+    validating += [make_motion(name) for name in others if name in options.validation]
+    return training, validating
 
 
 class _StopRequest:

@@ -16,7 +16,7 @@ EXAMPLES = """examples:
   python -m snug.train --garment shirt.obj --body mine.npz    for a garment of your own (see snug.check)
   python -m snug.train --model pbns --steps 8000         the static baseline
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
-  python -m snug.train --validation bow --patience 10    stop when a held-out motion gets no better
+  python -m snug.train --validation kick --patience 10   stop when a validation motion gets no better
   python -m snug.train --recipe paper --vertices 4400    the paper's text (but see snug.recipes on contact)
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
   torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
@@ -48,8 +48,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         help="file to write; of several garments each adds its name (default: by --model)")  # fmt: skip
     add = parser.add_argument_group("early stop").add_argument
     add("--validation", metavar="NAME", action="append", default=[],
-        help="hold a motion out of training and roll it out now and then; may be repeated. The weights that "
-        "do best are kept")  # fmt: skip
+        help="roll this motion out now and then, held out of training, or one of the library's validation "
+        "motions; may be repeated. The weights that do best are kept")  # fmt: skip
     add("--validate-every", metavar="STEPS", type=int, default=200, help="(default: %(default)s)")
     add("--patience", metavar="N", type=int, default=0,
         help="validations without a better value, after which training stops (default: never)")  # fmt: skip

@@ -316,7 +316,7 @@ def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, t
     worn = {scene.garment for scene in plan.scenes if scene.dressed}
     assert worn == {"mine"} and {network.garment for network in plan.networks} == {"mine"}
     names = {scene.name for scene in plan.scenes}
-    assert {"mine/sudden_stop", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
+    assert {"mine/push_recovery", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
     with pytest.raises(PlanError, match="unknown scene 'dependence/mesh/500'"):  # it tailors one itself
         planned("--garment", str(path), "--scenes", "dependence/mesh/500", "-o", out)
     usual = planned("--preset", "smoke", "-o", out)
@@ -362,6 +362,6 @@ def test_a_garment_of_ones_own_goes_through_a_run(tmp_path, shirt):
 
     folder = RunFolder(out)
     rows = [row for row in folder.read_rows() if row.metric == "energy/strain"]
-    assert {row.scene for row in rows} == {"mine/sudden_stop"} and all(row.status == "ok" for row in rows)
+    assert {row.scene for row in rows} == {"mine/push_recovery"} and all(row.status == "ok" for row in rows)
     assert folder.read_config()["garments"]["mine"]["material"] == asdict(Material())
     assert (folder.models_of("mine") / "snug-seed0.safetensors").is_file()

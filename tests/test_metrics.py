@@ -11,7 +11,7 @@ from tasks_by_hand import small_scene
 
 from benchmarks.methods import METHODS, find_method
 from benchmarks.metrics import body as body_metrics
-from benchmarks.metrics import declared, find_metric
+from benchmarks.metrics import declared, find_metric, training_distance
 from benchmarks.metrics.body import inside_itself
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
@@ -30,6 +30,7 @@ from benchmarks.results import Row
 from benchmarks.rows import remarked
 from benchmarks.validation.meshes import cylinder_patch, icosphere, right_grid, torus
 from reference_sim import Obstacle, simulate
+from snug.skeleton import JOINT
 
 
 def test_curvature_of_a_sphere_holds_at_its_five_valent_vertices_too():
@@ -174,6 +175,21 @@ def test_hem_drift_follows_the_hem_against_the_pelvis():
     x = np.zeros((3, 4, 3))
     x[:, 2:, 1] = np.array([0.5, 0.6, 0.8])[:, None]
     assert hem_drift(x, np.array([2, 3]), np.array([1.0, 1.1, 1.1])) == pytest.approx(0.2, abs=1e-15)
+
+
+def test_training_distance_is_of_judged_frames_to_the_nearest_training_pose():
+    poses = np.zeros((23, 24, 3))
+    poses[:, JOINT["right_knee"], 0] = np.deg2rad(22.0 * np.arange(23) / 2)  # 0, .5, 1 ... 11 degrees / joint
+    scene = SimpleNamespace(dressed=SimpleNamespace(motion=SimpleNamespace(poses=poses)))
+    known = np.zeros((2, 24, 3))
+    known[1] = poses[22]
+    roll_out = SimpleNamespace(scene=scene, judged=slice(2, None), training_poses=known)
+    found = training_distance.measure(roll_out)
+    nearest = np.minimum(np.arange(2, 23), 22 - np.arange(2, 23)) / 2
+    assert found["training_distance/median"] == pytest.approx(np.median(nearest))
+    assert found["training_distance/p95"] == pytest.approx(np.percentile(nearest, 95))
+    roll_out.training_poses = None
+    assert training_distance.measure(roll_out) == {}
 
 
 def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places():

@@ -11,13 +11,14 @@ import pytest
 from benchmarks.methods import find_method
 from benchmarks.plan import Motions, PlanError
 from benchmarks.presets import find_preset
-from benchmarks.selection import Request, choose, choose_motions
-from snug.motion_library import TEST, TRAIN
+from benchmarks.roles import choose_motions
+from benchmarks.run_options import EXAMPLES
+from benchmarks.selection import Request, choose
+from snug.motion_library import TEST, VALIDATION
 from snug.recipe import DEFAULT, Recipe
 from snug.recipe_deviations import DEVIATIONS
 from snug.recipes import PAPER, TRAININGS
 
-HELD_OUT = ("brisk_walk", "torso_twist", "lunge")  # those of the command in the help
 NAMES = {
     *(f"snug-without-{deviation.name}" for deviation in DEVIATIONS),
     *(f"snug-paper-with-{deviation.name}" for deviation in DEVIATIONS),
@@ -62,10 +63,12 @@ def test_a_deviation_is_a_method_for_whoever_names_it():
 
 
 def test_a_recipe_is_never_chosen_by_the_test_motions():
-    assert set(HELD_OUT) < set(TRAIN) and not set(HELD_OUT) & set(TEST)
-    motions = choose_motions([], HELD_OUT, find_preset("quick"))
-    assert set(motions.test) == set(HELD_OUT)
-    assert sorted([*motions.train, *HELD_OUT]) == sorted(TRAIN)
+    words = [word for line in EXAMPLES.splitlines() if "snug-without" in line for word in line.split()]
+    assert words and "--split validation" in EXAMPLES and "--test-motions" not in words
+    motions = choose_motions([], [], find_preset("quick"), split="validation")
+    assert motions.measured == VALIDATION and not set(TEST) & {*motions.measured, *motions.train}
+    with pytest.raises(PlanError, match="'dance_turn' is a test motion"):
+        choose_motions([], [], find_preset("quick"), validation_names=["dance_turn"], split="validation")
 
 
 @pytest.mark.parametrize("preset", ["smoke", "quick", "paper"])

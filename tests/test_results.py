@@ -95,6 +95,7 @@ def test_an_absent_or_broken_config_is_named(tmp_path):
         ('{"format": 3, "stages": [{"name": "a", "seconds": Infinity}]}', "'stages' should be"),
         ('{"format": 3, "digests": {"a": 1}}', "'digests' should be file -> digest"),
         ('{"format": 3, "earlier": 1}', "'earlier' should be a list"),
+        ('{"format": 3, "test_looks": [{"rows": 1}]}', "'test_looks' should be a list of looks"),
     ],
 )
 def test_a_config_of_wrong_types_is_named(tmp_path, text, word):

@@ -191,6 +191,29 @@ def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch)
     assert found == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
 
 
+def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path, capsys):
+    motions = Motions(("walk",), ("dance_turn",), validation=("kick",))
+    cells = [
+        Cell(dressed_scene(name), find_method("skinning"), 0, ("garments",))
+        for name in ("dance_turn", "kick")
+    ]
+
+    def looks(scene: str, *values: float) -> int:
+        log = RunLog(plan_of(tmp_path, motions=motions, cells=tuple(cells)))
+        log.write_rows(
+            [Row("garments", scene, "skinning", 0, "energy/total", "J", value) for value in values]
+        )
+        config = log.folder.read_config()
+        assert config["scenes"][scene]["role"] == ("test" if scene == "tshirt/dance_turn" else "validation")
+        return len(config["test_looks"])
+
+    assert looks("tshirt/kick", 1.0) == 0
+    assert looks("tshirt/dance_turn", 1.0) == 1
+    assert looks("tshirt/dance_turn", 1.0) == 1  # taken from the folder, or the report again
+    assert looks("tshirt/dance_turn", 1.5) == 2  # other code, another seed
+    assert looks("tshirt/kick", 2.0) == looks("tshirt/dance_turn") == looks("tshirt/dance_turn", 1.0) == 2
+
+
 @pytest.mark.parametrize(("method", "data"), [("snug", 0.0), ("supervised", 7.0)])
 def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_from(method, data):
     cell = Cell(dressed_scene("kick"), find_method(method), 0, ("garments",))

@@ -23,7 +23,7 @@ from benchmarks.validation.registry import KNOWN_ANSWERS
 from benchmarks.validation.stress_tests import MAPS, STEPS
 from reference_sim import Trajectory
 from reference_sim.array_file import array_names
-from snug.motion_library import DYNAMIC_TEST, TEST
+from snug.motion_library import DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, VALIDATION
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -82,9 +82,13 @@ def test_the_list_names_everything(capsys):
         assert name in words
 
 
+@pytest.mark.parametrize("split", ["test", "validation"])
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
-def test_the_list_names_every_scene_that_a_suite_has(preset, capsys):
-    motions = Motions(test=TEST, dynamic_test=DYNAMIC_TEST)
+def test_the_list_names_every_scene_that_a_suite_has(preset, split, capsys):
+    motions = Motions(
+        test=TEST, dynamic_test=DYNAMIC_TEST, validation=VALIDATION, dynamic_validation=DYNAMIC_VALIDATION,
+        split=split,
+    )  # fmt: skip
     extents = [Extent(preset, motions, full=wide, further=wide) for wide in (False, True)]
     asked = {name for suite in SUITES for extent in extents for name in suite.scenes(extent)}
     assert run.main(["--list"]) == 0

@@ -149,8 +149,18 @@ def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_ne
     assert not any(find_method(cell.method).trained for cell in skirts)
 
 
-def test_suite_speed_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
-    plan = planned("--suite", "speed")
+def test_suite_speed_has_clips_of_the_split():
+    for split, names in (
+        ("test", {"push_recovery", "dance_turn"}),
+        ("validation", {"sudden_stop", "spin_jump", "turning_stop"}),
+    ):
+        plan = planned("--suite", "speed", "--split", split)
+        assert {scene.motion for scene in plan.scenes if scene.garment == "tshirt"} == names
+        assert {plan.motions.role_of(scene.motion) for scene in plan.scenes if scene.dressed} == {split}
+
+
+def test_validation_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
+    plan = planned("--suite", "speed", "--split", "validation")
     cells = [cell for cell in plan.cells if cell.scene.name == "tshirt/turning_stop@clip"]
     assert {"simulation", "snug", "lbfgs-5"} <= {cell.method for cell in cells}
     assert "turning_stop" in plan.motions_of("tshirt") and "turning_stop" not in plan.motions.train_of(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from tasks_by_hand import dressed_scene
 from test_cell_tasks import plan_of
@@ -11,13 +13,15 @@ from test_cell_tasks import plan_of
 from benchmarks import provenance
 from benchmarks.methods import find_method
 from benchmarks.plan import Motions, Network, OwnGarment
-from benchmarks.results import digest_of_file
+from benchmarks.results import RunFolder, digest_of_file
 from benchmarks.run import choose_garment
 from benchmarks.run_options import make_parser
 from benchmarks.schedule import Schedule, tasks_of
 from benchmarks.tasks.cell import Cell
-from benchmarks.tasks.task import Task
+from benchmarks.tasks.metrics import _training_poses
+from benchmarks.tasks.task import Context, Task
 from snug.garment_file import GarmentFile
+from snug.motion_library import make_motion
 from snug.recipe import DEFAULT, TERMS
 from snug.recipes import TRAININGS, Training
 
@@ -42,6 +46,25 @@ def test_an_energy_that_a_recipe_names_is_part_of_the_training(tmp_path, monkeyp
     plan = plan_of(tmp_path, motions=MOTIONS)
     assert "reference_sim.energies.stretch_spring" in network(plan, "mine").modules
     assert not any(module.startswith("reference_sim") for module in network(plan).modules)
+
+
+def test_a_networks_cell_is_measured_beside_the_poses_that_it_trained_on_mixed_ones_too(tmp_path):
+    scene = dressed_scene("kick")
+    names = ("simulation", "untrained", "snug", "supervised")
+    cells = tuple(Cell(scene, find_method(name), 0, ("garments",)) for name in names)
+    schedule = Schedule(plan_of(tmp_path, motions=MOTIONS, cells=cells))
+    trainings = {cell.method: schedule.metrics(cell).training for cell in cells}
+    walk = make_motion("walk").cut(0, 30)
+    shirt = SimpleNamespace(rest_positions=np.zeros((300, 3)))
+    assets = SimpleNamespace(named=lambda names: [walk] * len(names), garments={"tshirt": shirt})
+    context = Context(RunFolder(tmp_path), assets)
+    assert trainings["simulation"] is None and _training_poses(trainings["untrained"], context) is None
+    given = _training_poses(trainings["supervised"], context)
+    mixed = _training_poses(trainings["snug"], context)
+    assert np.array_equal(given, walk.poses) and np.array_equal(mixed[:30], walk.poses)
+    assert len(mixed) - 30 == pytest.approx(DEFAULT.mixed * 30, abs=30)
+    narrow = dataclasses.replace(cells[2], scene=dataclasses.replace(scene, metrics=("energy",)))
+    assert schedule.metrics(narrow).training is None
 
 
 def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path):

@@ -10,7 +10,8 @@ import pytest
 from benchmarks import selection
 from benchmarks.plan import Motions, PlanError
 from benchmarks.presets import find_preset
-from benchmarks.selection import Request, choose, choose_motions
+from benchmarks.roles import choose_motions
+from benchmarks.selection import Request, choose
 from benchmarks.validation.stress_tests import MAPS
 
 SMOKE = find_preset("smoke")
@@ -103,13 +104,18 @@ def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
 
 
 def test_motions_are_divided_as_help_says(tmp_path):
-    from snug.motion_library import TEST, TRAIN
+    from snug.motion_library import TEST, TRAIN, VALIDATION
 
     quick = find_preset("quick")
     library = choose_motions([], [], quick)
-    assert (library.train, library.test, library.files) == (TRAIN, TEST, {})
-    moved = choose_motions([], ["walk"], quick)
-    assert moved.test == ("walk",) and "walk" not in moved.train and not set(TEST) & set(moved.train)
+    assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION, TEST)
+    assert library.files == {} and library.measured == TEST
+    moved = choose_motions([], ["walk", "kick"], quick)
+    assert moved.test == ("walk", "kick") and "kick" not in moved.validation
+    assert not {"walk", *VALIDATION, *TEST} & set(moved.train)
+    other = choose_motions([], [], quick, validation_names=["bow"], split="validation")
+    assert (other.validation, other.test, other.measured) == (("bow",), TEST, ("bow",))
+    assert not {"bow", *VALIDATION, *TEST} & set(other.train)
     small = choose_motions([], [], SMOKE)
     assert (len(small.train), len(small.test)) == (SMOKE.train_motions, SMOKE.test_motions)
 
@@ -124,6 +130,18 @@ def test_motions_are_divided_as_help_says(tmp_path):
     assert both.train == ("a", "b", "c", *TRAIN) and both.test == TEST
     single = choose_motions([str(Path(clips) / "a.npz")], [], quick)
     assert (single.train, single.test) == (TRAIN, ("a",))
+    roles = choose_motions([clips], ["b"], quick, validation_names=["a", "c"])  # none is left to train on
+    assert (roles.train, roles.validation, roles.test) == (TRAIN, ("a", "c"), ("b",))
+    assert [roles.role_of(name) for name in ("a", "b", "walk", "kick")] == [
+        "validation", "test", "training", "",
+    ]  # fmt: skip
+    for words, said in (
+        ({"test_names": ["a"], "validation_names": ["a"]}, "'a' is a test motion"),
+        ({"test_names": [], "validation_names": ["d"]}, "--validation-motions: unknown motion 'd'"),
+        ({"test_names": ["a"], "split": "validation"}, "name some by --validation-motions"),
+    ):
+        with pytest.raises(PlanError, match=said):
+            choose_motions([clips], preset=quick, **words)
     (tmp_path / "short").mkdir()
     with pytest.raises(PlanError, match="2 frames; at least 3 are needed"):
         choose_motions([clips_folder(tmp_path / "short", "d", frames=2) + "/d.npz"], [], quick)

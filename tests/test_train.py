@@ -13,7 +13,7 @@ from snug import trained_model
 from snug.baselines.supervised import TargetError, vertex_loss
 from snug.motion import Motion, arm_clearance
 from snug.motion_augmentation import lap_clearance, mirrored, mixed_for, mixed_motions
-from snug.motion_library import make_motion
+from snug.motion_library import TRAIN, make_motion
 from snug.recipe import DEFAULT, Recipe
 from snug.recipes import PAPER, SUPERVISED
 from snug.rollout import roll_out
@@ -300,7 +300,8 @@ def test_command_line_answers_without_torch():
 
 
 def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
-    from snug.train import main
+    from snug.train import _motions, main
+    from snug.train_options import parse
 
     out = tmp_path / "model.safetensors"
     assert main(["--motions", str(tmp_path / "nowhere"), "-o", str(out)]) == 2
@@ -309,6 +310,12 @@ def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
     assert main(["--repair", "-o", str(out)]) == 2
     assert "say of which files by --motions" in capsys.readouterr().err
     np.savez(tmp_path / "a.npz", poses=np.zeros((9, 72)), trans=np.zeros((9, 3)))
+    validating = ["--validation", "kick", "--validation", "bow"]
+    training, validation = _motions(parse(validating))
+    assert [motion.name for motion in validation] == ["bow", "kick"]
+    assert {motion.name for motion in training} == set(TRAIN) - {"bow"}
+    assert main(["--validation", "dance_turn", "-o", str(out)]) == 2  # a test motion
+    assert "--validation dance_turn: no such motion among walk" in capsys.readouterr().err
     words = ["--motions", str(tmp_path), "--motion-fps", "30", "--hold-out", "b", "-o", str(out)]
     assert main(words) == 2  # the motion itself was read
     assert "--hold-out b: no such motion among a" in capsys.readouterr().err

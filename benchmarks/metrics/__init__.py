@@ -22,6 +22,7 @@ MODULES = (
     "solver",
     "exact",
     "dynamics",
+    "training_distance",
     "conservation",
     "time_error",
     "cost",

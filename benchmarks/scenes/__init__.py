@@ -115,7 +115,7 @@ def all_scenes(
     dynamic_motions: Iterable[str],
     worn: tuple[GarmentScenes, ...] = GARMENT_SCENES,
 ) -> dict[str, Scene]:
-    """Every scene by name: those without a body, then dressed bodies in each test motion and in its clip.
+    """Every scene by name: those without a body, then dressed bodies in each motion and in its clip.
 
     motions: those of the T-shirt, which can do the others too; dynamic_motions: those of garments that swing.
     worn: the garments, the first in place of the T-shirt.
@@ -123,7 +123,7 @@ def all_scenes(
     motions, dynamic = list(motions), list(dynamic_motions)
     first = worn[0].garment
     long = [there_and_back(motion, first) for motion in motions[:1]]
-    chosen = {False: [*motions, *dynamic], True: dynamic}
+    chosen = {False: list(dict.fromkeys((*motions, *dynamic))), True: dynamic}
     dressed = [
         scenes.scene(motion, part)
         for scenes in worn

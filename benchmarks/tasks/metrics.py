@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ..results import RunFolder, replacing
 from .cell import Cell, built
 from .task import Context, Outcome, Task, TaskId, one_line
 
+if TYPE_CHECKING:
+    from .training import TrainNetwork
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasureCell(Task):
@@ -23,7 +26,8 @@ class MeasureCell(Task):
 
     cells: all of the scene, in the order of their roll-outs; those that `reads` names are compared with.
     quasi_static: the simulator's answer to poses held still; counterpart: the same method in another scene.
-    outside: modules of metrics that are not the project's, measured in every scene.
+    training: what trained its network. outside: modules of metrics that are not the project's, measured in
+    every scene.
     """
 
     kind = "metrics"
@@ -34,6 +38,7 @@ class MeasureCell(Task):
     gap_samples: int
     quasi_static: TaskId | None = None
     counterpart: Cell | None = None
+    training: TrainNetwork | None = None
     outside: tuple[str, ...] = ()
 
     def clear(self, folder: RunFolder) -> None:
@@ -46,6 +51,8 @@ class MeasureCell(Task):
         roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
         if self.counterpart is not None and ("cell", self.counterpart.name) in needed:
             roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
+        if self.training is not None:
+            roll_out.training_poses = _training_poses(self.training, context)
         metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)
         path = self.cell.curves(folder)
         write_curves(path, curves, roll_out.trajectory.frames)
@@ -125,6 +132,21 @@ def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> N
     }
     with replacing(path) as temporary:
         np.savez(temporary, **padded)
+
+
+def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | None:
+    """(N,24,3) [rad], mixed ones included; None of a network that was not trained. Kept within a batch."""
+    from snug.motion_augmentation import mixed_for
+
+    assets, how = context.assets, training.chosen
+    if how is None or assets is None:
+        return None
+    if training.id not in context.memo:
+        given = assets.named(training.motions)
+        vertices = len(assets.garments[training.garment].rest_positions)
+        mixed = mixed_for(given, how.recipe, vertices=vertices, seed=training.seed)
+        context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
+    return context.memo[training.id]
 
 
 def _positions(path: Path) -> np.ndarray:

@@ -22,6 +22,7 @@ from snug.motions.gait import RUN, WALK, Stride, gait_angles, gait_flights, gait
 from snug.motions.posture import RATE, poses_from_angles, root_path, smoothstep
 from snug.motions.strikes import KICK, PUNCH, SIDESTEP, TURN
 from snug.motions.turns import STOPS
+from snug.motions.unseen import CARTWHEEL_LEAN, CLIMB, DANCE_TURN, PUSH_RECOVERY, SIT_AND_STAND
 
 FPS = 30.0
 
@@ -41,6 +42,10 @@ ACTIONS: dict[str, tuple[str, Action]] = {
     "kick": ("kick", KICK),
     "punch": ("punch", PUNCH),
     "spin_jump": ("spin jump", SPIN_JUMP),
+    "push_recovery": ("push recovery", PUSH_RECOVERY),
+    "dance_turn": ("dance turn", DANCE_TURN),
+    "cartwheel_lean": ("cartwheel lean", CARTWHEEL_LEAN),
+    "sit_and_stand": ("sitting down and standing up", SIT_AND_STAND),
 }
 # name: (kind, stride, seconds, pace as a share of the stride's normal rate, time at which it stops or None)
 GAITS: dict[str, tuple[str, Stride, float, float, float | None]] = {
@@ -48,6 +53,7 @@ GAITS: dict[str, tuple[str, Stride, float, float, float | None]] = {
     "brisk_walk": ("walk", WALK, 3.0, 1.25, None),
     "run": ("run", RUN, 3.0, 1.0, None),
     "sudden_stop": ("sudden stop", RUN, 3.0, 0.9, 1.53),
+    "climbing_steps": ("climbing steps", CLIMB, 2.4, 1.0, None),
 }
 START_SECONDS = 0.7  # from standing to the full stride
 STOP_SECONDS = 0.35  # from the full stride to standing
@@ -85,7 +91,9 @@ def _gait(stride: Stride, seconds: float, pace: float, stop: float | None) -> tu
     poses = poses_from_angles(angles, len(time))
     # The trunk's mass evens out what the curves of the legs alone would do to the pelvis at each contact.
     flights, support = gait_flights(stride, phase, size), gait_support(phase, size)
-    return poses, root_path(poses, flights, support=support, height_smoothing=0.045, speed_smoothing=0.08)
+    return poses, root_path(
+        poses, flights, support=support, height_smoothing=0.045, speed_smoothing=0.08, rises=stride.rises
+    )
 
 
 def _brake(angles: dict[str, np.ndarray], since: np.ndarray) -> None:

@@ -14,7 +14,10 @@ Curve = tuple[tuple[float, float], ...]  # (percent of the stride from that foot
 
 @dataclass(frozen=True)
 class Stride:
-    """One stride: sagittal curves of a leg and the swing of pelvis, trunk and arms. Angles in degrees."""
+    """One stride: sagittal curves of a leg and the swing of pelvis, trunk and arms. Angles in degrees.
+
+    rises: whether each foot comes down a step higher than the other.
+    """
 
     seconds: float
     hip: Curve
@@ -29,6 +32,7 @@ class Stride:
     elbow_mean: float
     elbow_swing: float
     trunk_lean: float
+    rises: bool = False
 
 
 # Approximate values of the mean curves of D. A. Winter, The Biomechanics and Motor Control of Human Gait

@@ -81,6 +81,7 @@ def root_path(
     support: np.ndarray | None = None,
     height_smoothing: float = 0.015,
     speed_smoothing: float = 0.06,
+    rises: bool = False,
 ) -> np.ndarray:
     """Root translations (T, 3) [m] of poses (T, 24, 3) at RATE whose standing foot stays where it is.
 
@@ -89,6 +90,7 @@ def root_path(
     that carry the body do not move over the floor; in a flight the speed goes over from one to the other.
     support: (T, 2) shares in [0, 1] of the left and right foot where they are known (a swinging foot may come
     as low as the standing one); else the lowest points carry. Both smoothings: [s], of a Gaussian over time.
+    rises: the floor is steps: from the first frame on the height, too, is such that what carries stays.
     """
     soles = sole_points(poses, np.zeros((len(poses), 3)))
     weights = np.exp((soles[..., 1].min(axis=1, keepdims=True) - soles[..., 1]) / CONTACT_DEPTH)
@@ -97,7 +99,10 @@ def root_path(
     weights /= weights.sum(axis=1, keepdims=True)
     # The weighted height is above the lowest point by about a millimetre per shared contact, and smooth.
     height = -(weights * soles[..., 1]).sum(axis=1)
-    velocity = -(weights[..., None] * np.gradient(soles, 1.0 / RATE, axis=0)).sum(axis=1)[:, ::2]
+    velocity = -(weights[..., None] * np.gradient(soles, 1.0 / RATE, axis=0)).sum(axis=1)
+    if rises:
+        height = height[0] + np.cumsum(velocity[:, 1]) / RATE
+    velocity = velocity[:, ::2]
     time = np.arange(len(poses)) / RATE
     for start, end in flights:
         inside = (time > start) & (time < end)
