@@ -77,6 +77,7 @@ OTHER_SOLVERS = (
 )  # fmt: skip
 EXTERNAL = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
 FAST = ("skinning", "snug", "supervised", "pbns")
+CHEAP = ("snug+fast-lbfgs-1", "fast-lbfgs-10")  # solvers of some milliseconds, where others are not asked
 
 
 def _clips(extent: Extent) -> list[str]:
@@ -134,10 +135,11 @@ SUITES = (
         description="all methods on unseen motions: energies, curvature, cost",
         scenes=_whole_motions,
         methods=lambda extent: [
-            "simulation", *FEW_AGAIN, "skinning", "untrained", "snug", "supervised", "pbns",
+            "simulation", *FEW_AGAIN, "skinning", "untrained", "snug", "supervised", "pbns", *CHEAP,
         ],
         more_methods=(
             *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
+            "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
         named_methods=tuple(entry.name for entry in RECIPE_DEVIATIONS),
     ),
@@ -166,7 +168,7 @@ SUITES = (
         description="stiff, huge and degenerate input; methods on a walk made hard: converged, or a "
         "reported failure",
         scenes=_out_of_distribution,
-        methods=lambda extent: ["simulation", *FAST],
+        methods=lambda extent: ["simulation", *FAST, *CHEAP],
         more_methods=tuple(entry.name for entry in LEARNED if entry.batched),
     ),
     Suite(
