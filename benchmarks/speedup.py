@@ -39,8 +39,9 @@ exit status: 0 measured; 1 a run failed, the others are in the table; 2 no such 
 class Measurement:
     """One row of the table, or one for each scene.
 
-    group: what --rows names. arguments: of benchmarks.run. before, after: the methods compared. time: the
-    metric that is divided; bought: what must not grow with it.
+    group: what --rows names. arguments: of benchmarks.run; {methods} are those of either code. before, after:
+    the methods compared; others: what the code of then, and that of now, run besides. time: the metric that
+    is divided; bought: what must not grow with it.
     """
 
     group: str
@@ -50,40 +51,49 @@ class Measurement:
     after: str
     time: str
     bought: str
+    others: tuple[str, str] = ("", "")
+
+    def words(self, side: int) -> tuple[str, ...]:
+        """Arguments of the run of then (0) or now (1)."""
+        methods = ",".join(filter(None, ((self.before, self.after)[side], self.others[side])))
+        return tuple(word.format(methods=methods) for word in self.arguments)
 
 
 CLIPS = (
-    "tshirt/sudden_stop@clip", "tshirt/spin_jump@clip", "tshirt/turning_stop@clip", "skirt/turning_stop@clip",
-    "tunic/turning_stop@clip", "out_of_distribution/arms_crossed",
+    "tshirt/sudden_stop@clip", "tshirt/spin_jump@clip", "tshirt/turning_stop@clip", "tshirt/kick@clip",
+    "skirt/turning_stop@clip", "tunic/turning_stop@clip",
 )  # fmt: skip
-_ON_CLIPS = ("--scenes", ",".join(CLIPS))
 _GAP = {"time": "cost/frame", "bought": "gap/energy"}
-_SOLVERS = tuple(
-    Measurement(
-        "solver", title, ("--suite", "speed", *_ON_CLIPS, "--methods", "simulation,skinning,{method}"),
-        before, after, **_GAP,
-    )
-    for title, before, after in (
-        ("L-BFGS, 10 iterations", "lbfgs-10", "lbfgs-10"),
-        ("the same, compiled", "lbfgs-10", "fast-lbfgs-10"),
-    )
-)  # fmt: skip
-_HYBRIDS = (
-    Measurement(
-        "hybrid", "SNUG and 2 iterations", ("--suite", "speed", "--scenes", ",".join(CLIPS[:3]), "--methods",
-        "simulation,skinning,snug,{method}"), "snug+lbfgs-2", "snug+fast-lbfgs-2", **_GAP,
-    ),
-)  # fmt: skip
+
+
+def _on_clips(
+    group: str, clips: Sequence[str], before: str, afters: Sequence[str], beside: str
+) -> list[Measurement]:
+    """One run of each code serves all rows."""
+    arguments = ("--suite", "speed", "--scenes", ",".join(clips), "--methods", "{methods}")
+    return [
+        Measurement(
+            group, f"{before}, now {after}", arguments, before, after, **_GAP,
+            others=(beside, ",".join([beside, *(name for name in afters if name != after)])),
+        )
+        for after in afters
+    ]  # fmt: skip
 
 
 def _performance(group: str, case: str, method: str, time: str, bought: str) -> Measurement:
-    arguments = ("--suite", "performance", "--scenes", case, "--methods", method)
+    arguments = ("--suite", "performance", "--scenes", case, "--methods", "{methods}")
     return Measurement(group, case, arguments, method, method, f"performance/{time}", f"performance/{bought}")
 
 
 MEASUREMENTS = (
-    *_SOLVERS,
-    *_HYBRIDS,
+    *_on_clips("solver", CLIPS, "lbfgs-10", ("lbfgs-10", "fast-lbfgs-10"), "simulation,skinning"),
+    *_on_clips(
+        "hybrid",
+        CLIPS[:3],
+        "snug+lbfgs-2",
+        ("snug+fast-lbfgs-1", "snug+fast-lbfgs-2", "snug+fast-lbfgs-4"),
+        "simulation,skinning,snug",
+    ),
     *(
         _performance("inference", f"inference/{n}", "snug", "inference", "inference_p95")
         for n in (1000, 4400)
@@ -151,13 +161,18 @@ def _values(run: RunFolder, method: str, metric: str) -> dict[str, float]:
     return {row.scene: row.value for row in rows if row.value is not None}
 
 
-def compared(what: Measurement, before: Path, folder: Path, turns: int) -> list[Line]:
-    """Both codes in turn; medians over the turns. Raises SpeedupError."""
+def compared(
+    what: Measurement, before: Path, folder: Path, turns: int, runs: dict[tuple[object, ...], RunFolder]
+) -> list[Line]:
+    """Both codes in turn; medians over the turns. runs: those made so far. Raises SpeedupError."""
     found: list[list[dict[str, float]]] = [[], [], [], []]
     for turn in range(turns):
         for side, (tree, method) in enumerate(((before, what.before), (ROOT, what.after))):
-            words = [word.format(method=method) for word in what.arguments]
-            run = measured(tree, words, folder / f"{what.title} {method} {turn} {side}".replace("/", "-"))
+            words = what.words(side)
+            made = (turn, side, frozenset(",".join(words).split(",")))
+            if made not in runs:
+                runs[made] = measured(tree, words, folder / str(len(runs)))
+            run = runs[made]
             for place, metric in enumerate((what.time, what.bought)):
                 found[2 * place + side].append(_values(run, method, metric))
     scenes = [scene for scene in found[0][0] if all(scene in values for side in found for values in side)]
@@ -195,6 +210,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
     lines: list[Line] = []
+    runs: dict[tuple[object, ...], RunFolder] = {}
     failed = False
     with tempfile.TemporaryDirectory() as name:
         try:
@@ -207,7 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 continue
             print(f"{what.title}: measuring", file=sys.stderr, flush=True)
             try:
-                lines += compared(what, before, Path(name), max(options.turns, 1))
+                lines += compared(what, before, Path(name), max(options.turns, 1), runs)
             except (SpeedupError, ResultsError) as error:  # the others are measured all the same
                 print(f"{PROGRAM}: {error}", file=sys.stderr)
                 failed = True

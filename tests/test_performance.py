@@ -365,8 +365,8 @@ def test_speedup_gives_medians_of_both_codes_and_their_ratio(monkeypatch, tmp_pa
 
     monkeypatch.setattr(speedup, "measured", measured)
     monkeypatch.setattr(speedup, "_values", values)
-    what = speedup.Measurement("g", "x", ("--methods", "{method}"), "old", "new", "cost/frame", "gap/energy")
-    (line,) = speedup.compared(what, tmp_path, tmp_path, 3)  # scene b has no gap
+    what = speedup.Measurement("g", "x", ("--methods", "{methods}"), "old", "new", "cost/frame", "gap/energy")
+    (line,) = speedup.compared(what, tmp_path, tmp_path, 3, {})  # scene b has no gap
     assert (line.scene, line.before, line.after, line.ratio) == ("a", 6.0, 2.0, 1 / 3)
     assert (line.bought_before, line.bought_after, line.unit) == (60.0, 20.0, "gap/energy")
     assert asked == [(tmp_path, "old"), (speedup.ROOT, "new")] * 3
