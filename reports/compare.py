@@ -202,7 +202,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         runs = [read_run(RunFolder(path)) for path in (options.one, options.other)]
-        found = compare(*runs, options.metrics, options.methods, times=not options.without_times)
+        found = compare(runs[0], runs[1], options.metrics, options.methods, times=not options.without_times)
     except (ResultsError, OSError) as error:
         print(f"reports.compare: {error}", file=sys.stderr)
         return 2

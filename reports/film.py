@@ -7,13 +7,14 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from benchmarks.results import ResultsError, RunFolder, replacing
 
 if TYPE_CHECKING:
+    from reference_sim.trajectory import Trajectory
     from reports.kept import Kept
 
 EXAMPLES = """examples:
@@ -44,10 +45,9 @@ class Stage:
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # that there is no screen
         self.kept, self.axes = kept, camera_axes(azimuth)
         self.width, self.height = width - width % 2, round(width * TALL / 2) * 2
-        size = (self.width, self.height)
-        self.plotter = pyvista.Plotter(off_screen=True, window_size=size, lighting="none")
-        self.plotter.set_background(PAPER)
-        self.plotter.enable_anti_aliasing("msaa")
+        size = [self.width, self.height]
+        self.plotter: Any = pyvista.Plotter(off_screen=True, window_size=size, lighting="none")
+        self.plotter.background_color = pyvista.Color(PAPER)
         # Nearly along the cloth from the side: folds of millimetres throw shade.
         for place, strength in (((1.7, 0.8, 0.6), 1.0), ((-1.2, 0.6, 1.6), 0.4)):
             self.plotter.add_light(
@@ -59,7 +59,8 @@ class Stage:
         self.centres, half = camera_path(kept, self.axes)
         self.away = half / np.tan(np.radians(ANGLE / 2.0))
 
-    def _added(self, cloth, colour):
+    def _added(self, cloth: Trajectory, colour: str) -> tuple[Any, Any]:
+        """The mesh of a cloth or body and what draws it."""
         import pyvista
 
         mesh = pyvista.PolyData.from_regular_faces(cloth.positions[0], cloth.faces)
@@ -82,7 +83,7 @@ class Stage:
         camera.position = centre + self.away * self.axes[:, 2]
         self.plotter.renderer.reset_camera_clipping_range()
         self.plotter.render()
-        return self.plotter.screenshot(return_img=True)
+        return np.asarray(self.plotter.screenshot(return_img=True))
 
     def close(self) -> None:
         self.plotter.close()
