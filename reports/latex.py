@@ -64,7 +64,7 @@ def _cell(cell: Mapping[str, str]) -> str:
 
 def _math(text: str) -> str:
     """A number as "2.50×10⁻⁷" or "1,730 s" with its digits in math, its unit not."""
-    plain = _POWER.sub(lambda found: rf"\times 10^{{{found[1].translate(_PLAIN)}}}", text.strip())
+    plain = _POWER.sub(lambda found: rf"\times 10^{{{found[1]}}}", text.strip())
     found = _NUMBER.match(plain.translate(_PLAIN))
     if not found:
         return "--" if plain == "–" else plain.replace("∞", r"$\infty$")

@@ -50,6 +50,17 @@ def test_the_same_run_and_another_draw_of_the_seeds_are_no_change():
         assert found(rows_of(), rows_of(draw)) == []
 
 
+def test_of_many_means_that_scatter_none_is_a_change():
+    def many(draw: int):  # another seed moves all motions alike
+        values = np.random.default_rng(draw).normal(10.0, 3.0, (80, len(SEEDS)))
+        return [
+            row(scene, "snug", f"energy/{k}", values[k, seed], seed=seed)
+            for k in range(len(values)) for scene in SCENES[:2] for seed in SEEDS
+        ]  # fmt: skip
+
+    assert found(many(1), many(2)) == []
+
+
 @pytest.mark.parametrize(("factor", "verdict"), [(1.3, "worse"), (0.7, "better")])
 def test_a_network_that_moved_beyond_its_seeds_is_found(factor, verdict):
     assert found(rows_of(), rows_of(1, snug=factor)) == [(verdict, "tshirt", "snug", "energy/total")]
