@@ -197,12 +197,16 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
 
 
 def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
-    """Of hundredths of a second that add up to the right time, and the colours of the first frame."""
-    from PIL import Image
+    """Of hundredths of a second that add up to the right time, in shades of the colours of a film."""
+    from PIL import Image, ImageColor
 
-    images = [Image.fromarray(picture) for picture in frames]
-    palette = images[0].quantize(200)
-    drawn = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    # Of all frames at once: one picture's own palette has no place for what the others show.
+    shades = np.linspace(0.0, 1.3, 126)[:, None]
+    colours = [np.minimum(shades * ImageColor.getrgb(colour), 255.0) for colour in (CLOTH, BODY)]
+    table = np.concatenate([*colours, [ImageColor.getrgb(PAPER), INK]]).round().astype(np.uint8)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(table.tobytes())
+    drawn = [Image.fromarray(x).quantize(palette=palette, dither=Image.Dither.NONE) for x in frames]
     ends = [10 * round(100.0 * (k + 1) / rate) for k in range(len(drawn))]
     durations = [max(end - start, 20) for start, end in zip([0, *ends], ends)]
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations, loop=0)
@@ -248,7 +252,7 @@ def make_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     options = make_parser().parse_args(arguments)
-    path, methods = Path(options.out), options.methods.split(",")
+    path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
     try:
         if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
             raise ValueError("--speed is .01 to 10, --width 64 to 2000")
