@@ -35,11 +35,16 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
     header = SIGNATURE + struct.pack("<iiffi", 1, points, 0.0, 1.0, frames)
     with replacing(path) as temporary:
         temporary.write_bytes(header + trajectory.positions.astype("<f4").tobytes())
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in trajectory.positions[0]]
-    lines += [f"f {a} {b} {c}\n" for a, b, c in trajectory.faces + 1]
-    with replacing(mesh) as temporary:
-        temporary.write_text("".join(["# metres, y up\n", *lines]), encoding="utf-8")
+    write_obj(mesh, trajectory.positions[0], trajectory.faces)
     return path, mesh
+
+
+def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray) -> None:
+    """Write vertices (V,3) [m, y up] with the digits of float32 and faces (F,3), whole or not at all."""
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in positions.tolist()]
+    lines += [f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist()]
+    with replacing(path) as temporary:
+        temporary.write_text("".join(["# metres, y up\n", *lines]), encoding="utf-8")
 
 
 def read_point_cache(path: str | Path) -> np.ndarray:

@@ -38,16 +38,20 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     """
     folder = RunFolder(run_dir)
     run = read_run(folder)
+    from reports.dictionary import dictionary
     from reports.document import document
+    from reports.latex import write_latex
     from reports.page.write import write_page
     from reports.tables import make_tables
 
     tables = make_tables(run)
     # Of other suites, asked for in this folder before. What --axes drew stays.
-    for old in [*folder.tables.glob("*.csv"), *(p for kind in FIGURES for p in folder.figures.glob(kind))]:
+    made = [path for kind in ("*.csv", "*.tex") for path in folder.tables.glob(kind)]
+    for old in [*made, *(p for kind in FIGURES for p in folder.figures.glob(kind))]:
         old.unlink()
-    for table in tables.values():
+    for table in (*tables.values(), dictionary(run)):
         table.write_csv(folder.tables)
+    write_latex(run, tables, folder.tables)
     problems: list[str] = []
     pictures = draw(folder, run, problems)
     write_page(folder, run, tables, problems, lambda path: read_trajectory(folder, path, problems))

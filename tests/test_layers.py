@@ -22,6 +22,7 @@ ALLOWED = {
         "benchmarks.results",
         "reference_sim.trajectory",
         "reference_sim.array_file",
+        "reference_sim.point_cache",
         "reference_sim.whole_file",
     ),
 }

@@ -61,7 +61,7 @@ def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
             found.missing[group.scene] = found.missing.get(group.scene, 0) + len(group.paths)
             continue
         read_ones = {method: read(path) for method, path in group.paths.items()}
-        whole = {method: _finite(cloth) for method, cloth in read_ones.items() if cloth is not None}
+        whole = {method: finite_frames(cloth) for method, cloth in read_ones.items() if cloth is not None}
         cloths = {method: cloth for method, cloth in whole.items() if cloth.frames}
         if run.reference in cloths:
             references[group.scene] = cloths[run.reference]
@@ -93,16 +93,18 @@ def _kept(texts: dict[str, str], pack: Pack) -> dict[str, Any]:
     return {"text": name, "arrays": pack.entries}
 
 
-def _finite(cloth: Trajectory) -> Trajectory:
+def finite_frames(cloth: Trajectory) -> Trajectory:
     """Its frames before the first that is not finite."""
     whole = np.isfinite(cloth.positions).all(axis=(1, 2))
-    if whole.all():
-        return cloth
-    end = int(np.argmin(whole))
-    fields = {name: values[:end] for name, values in cloth.frame_fields.items()}
+    return cloth if whole.all() else first_frames(cloth, int(np.argmin(whole)))
+
+
+def first_frames(cloth: Trajectory, count: int) -> Trajectory:
+    """That many of its frames, or all that there are."""
+    fields = {name: values[:count] for name, values in cloth.frame_fields.items()}
     return replace(
-        cloth, positions=cloth.positions[:end], times=cloth.times[:end],
-        frame_seconds=cloth.frame_seconds[:end], frame_fields=fields,
+        cloth, positions=cloth.positions[:count], times=cloth.times[:count],
+        frame_seconds=cloth.frame_seconds[:count], frame_fields=fields,
     )  # fmt: skip
 
 

@@ -1,0 +1,228 @@
+"""python -m reports.compare A B: what changed from run A to run B beyond the noise of both, as a gate.
+
+Only cells that both runs have are compared: the same scene, method and seed. Suite garments is compared by
+garment, over its motions and seeds; every other scene by itself, over its seeds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import pandas as pd
+
+from benchmarks.results import ResultsError, RunFolder
+from reports.build import read_run
+from reports.data import SUITES, Metric, Run
+from reports.means import Mean, means
+from reports.numbers import number, with_spread
+from reports.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
+from reports.significance import LEVEL, Effect, effect, holm, within_uncertainty
+
+CELL = ["scene", "method", "seed", "metric"]
+GROUP = ["place", "method", "metric"]
+WORSE, BETTER, OTHER = "worse", "better", "changed"
+CLOCKED = ("s", "ms", "MB")  # units of what the machine's state moves from run to run
+EXAMPLES = """examples:
+  python -m reports.compare before after
+  python -m reports.compare before after --metrics 'energy/*,curvature/*' --methods snug
+  python -m reports.compare before after --without-times         beside other work on the machine
+
+What counts as a change:
+  a mean   p below .05, corrected by Holm for all means compared, the 95 % interval not within 5 % of
+           equality, and more than the uncertainties of both runs together (column uncertainty; of run
+           times, the range of repeats). Where nothing was repeated, 5 % decide in place of p.
+  a time   so, and all of the interval beyond 20 %, on the same hardware, and only where it was repeated;
+           memory likewise.
+  a check  one that passed fails, or the other way round; so with stress tests, whatever --metrics says.
+  a cell   one that came to its end no longer does, or the other way round; likewise.
+What is trained with one seed in common is not judged: how far another seed moves it is unknown.
+Worse is what a metric's declaration says; a metric that has no better side is at most changed.
+exit status: 0 nothing got worse; 1 something did; 2 a folder is no run, or the two share nothing."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One line of the comparison: where, of what, which way, and how far in words."""
+
+    verdict: str
+    place: str
+    method: str
+    metric: str
+    said: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The changes, worse ones first; how many means were compared; how many differ that one seed each cannot
+    judge; cells that one run lacks.
+    """
+
+    changes: tuple[Change, ...]
+    compared: int
+    one_seed: int
+    only_one: int
+    only_other: int
+
+
+def compare(
+    one: Run, other: Run, metrics: str = "*", methods: str = "*", *, times: bool = True
+) -> Comparison:
+    """All that both runs have. metrics, methods: patterns, joined by commas; times: run times and memory too.
+
+    Raises ResultsError where the presets differ or nothing is shared.
+    """
+    presets = [run.config.get("preset") for run in (one, other)]
+    if presets[0] != presets[1]:
+        raise ResultsError(f"A is of preset {presets[0]}, B of {presets[1]}: their numbers differ by design")
+    frames = [_chosen(run, methods) for run in (one, other)]
+    keys = [frame.set_index(CELL).index for frame in frames]
+    frames = [frame[key.isin(rest)] for frame, key, rest in zip(frames, keys, reversed(keys))]
+    endings = _endings(*frames)
+    same = set(one.frame["hardware"]) == set(other.frame["hardware"])
+    kept = [frame[_matching(frame["metric"], metrics)] for frame in frames]
+    kept = [frame if times and same else frame[~frame["unit"].isin(CLOCKED)] for frame in kept]
+    if kept[0].empty:
+        raise ResultsError("the two runs share no such scene, method, seed and metric: nothing to compare")
+    judged, compared, one_seed = _means(one, *kept)
+    order = (WORSE, BETTER, OTHER)
+    changes = sorted([*endings, *judged], key=lambda change: order.index(change.verdict))
+    lacking = [len(key.difference(rest)) for key, rest in zip(keys, reversed(keys))]
+    return Comparison(tuple(changes), compared, one_seed, *lacking)
+
+
+def _chosen(run: Run, methods: str) -> pd.DataFrame:
+    """Each cell once, with what its means are over, and the range of repeats as a time's uncertainty."""
+    cases = run.frame[run.frame["case"] != ""].drop_duplicates(CELL)
+    frame = pd.concat([run.cells(*SUITES), cases], ignore_index=True)
+    frame = frame[(frame["status"] != "skipped") & _matching(frame["method"], methods)]
+    worn = (frame["suite"] == "garments") & (frame["garment"] != "")
+    frame = frame.assign(place=frame["garment"].where(worn, frame["scene"]))
+    cell = ["scene", "method", "seed"]
+    repeats = frame[frame["metric"] == REPEATS].set_index(cell)["value"] / 100.0
+    timed = frame["metric"].isin((TIME, WHOLE))
+    apart = repeats.reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell])).to_numpy()
+    frame.loc[timed, "uncertainty"] = frame.loc[timed, "value"] * apart
+    return frame[frame["metric"] != REPEATS]
+
+
+def _matching(names: pd.Series, patterns: str) -> pd.Series:
+    chosen = [n for n in names.unique() if any(fnmatchcase(n, p.strip()) for p in patterns.split(","))]
+    return names.isin(chosen)
+
+
+def _endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
+    """Cells, checks and stress tests that ended well in one run alone; once for all metrics of a cell."""
+    both = one.merge(other, on=CELL, suffixes=("", "_other"))
+    good, good_other = both["status"] == "ok", both["status_other"] == "ok"
+    moved = both[good != good_other].drop_duplicates(["scene", "method", "seed", "status", "status_other"])
+    return [
+        Change(
+            WORSE if row.status == "ok" else BETTER, row.scene, row.method, row.metric,
+            f"{row.status} -> {row.status_other}, seed {row.seed}"
+            + (f": {reason}" if (reason := row.reason_other or row.reason) else ""),
+        )
+        for row in moved.itertuples()
+    ]  # fmt: skip
+
+
+def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
+    """Means beyond noise; how many were compared, one family; how many differ that have one seed."""
+    first, second = (means(frame, *GROUP) for frame in _over_the_same(*frames))
+    differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
+    found = [
+        (place, method, run.metrics[name], mean, new, effect(new, mean))
+        for (place, method, name), (mean, new) in differ.items()
+        if not mean.seeded or mean.seeds > 1
+    ]
+    p_values = [far.p_value() for *_, far in found]
+    corrected = iter(holm([p for p in p_values if p is not None]))
+    changes = []
+    for (place, method, metric, mean, new, far), alone in zip(found, p_values):
+        p = None if alone is None else next(corrected)
+        noise = within_uncertainty(mean, new) or far.equal() or (p is not None and p >= LEVEL)
+        if not noise and not (metric.unit in CLOCKED and _machine(mean, far)):
+            verdict = _side(metric, far)
+            changes.append(Change(verdict, place, method, metric.name, _said(metric, mean, new, far, p)))
+    return changes, len(first), len(differ) - len(found)
+
+
+def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
+    """The usable rows of both, without cases, of scenes that have all seeds of their group."""
+    rows = [frame[frame["usable"] & (frame["case"] == "")] for frame in (one, other)]
+    keys = [frame.set_index(CELL).index for frame in rows]
+    rows = [frame[key.isin(rest)] for frame, key, rest in zip(rows, keys, reversed(keys))]
+    whole = [
+        frame.groupby([*GROUP, "scene"])["seed"].transform("nunique")
+        == frame.groupby(GROUP)["seed"].transform("nunique")
+        for frame in rows
+    ]
+    return [frame[full] for frame, full in zip(rows, whole)]
+
+
+def _machine(mean: Mean, far: Effect) -> bool:
+    """Whether a change of time or memory may be the machine's: not repeated, or within MOST_SLACK."""
+    if far.error is None and mean.uncertainty is None:
+        return True
+    low, high = far.interval or (far.shown, far.shown)
+    return not far.ratio or (low < 1.0 + MOST_SLACK and high > 1.0 / (1.0 + MOST_SLACK))
+
+
+def _side(metric: Metric, far: Effect) -> str:
+    if metric.lower_is_better is None:
+        return OTHER
+    return WORSE if (far.value > 0.0) is metric.lower_is_better else BETTER
+
+
+def _said(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
+    """As "0.21 ± 0.01 -> 0.26 ± 0.01 J, × 1.24 (1.2 to 1.28), p .003"."""
+    unit = "" if metric.unit in ("", "1") else f" {metric.unit}"
+    before, after = (with_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
+    text = f"{before} -> {after}{unit}, {'×' if far.ratio else 'by'} {number(far.shown)}"
+    if far.interval:
+        text += f" ({' to '.join(number(end) for end in far.interval)})"
+    return text + ("" if p is None else f", p {number(p, 2)}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m reports.compare",
+        description="What changed from one run to another beyond the noise of both.",
+        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("one", metavar="A", help="folder of the earlier run")
+    parser.add_argument("other", metavar="B", help="folder of the later run")
+    for name in ("metrics", "methods"):
+        parser.add_argument(f"--{name}", metavar="NAME,...", default="*", help="only these (patterns)")
+    parser.add_argument("--without-times", action="store_true", help="neither run times nor memory")
+    options = parser.parse_args(arguments)
+    try:
+        runs = [read_run(RunFolder(path)) for path in (options.one, options.other)]
+        found = compare(runs[0], runs[1], options.metrics, options.methods, times=not options.without_times)
+    except (ResultsError, OSError) as error:
+        print(f"reports.compare: {error}", file=sys.stderr)
+        return 2
+    for change in found.changes:
+        print(f"{change.verdict:8}{change.place}  {change.method}  {change.metric}  {change.said}")
+    print("\n".join(_summary(found, runs)))
+    return 1 if any(change.verdict == WORSE for change in found.changes) else 0
+
+
+def _summary(found: Comparison, runs: Sequence[Run]) -> Iterator[str]:
+    counts = [f"{sum(c.verdict == v for c in found.changes)} {v}" for v in (WORSE, BETTER, OTHER)]
+    yield f"{found.compared} means compared: {', '.join(counts)}."
+    if found.one_seed:
+        yield f"Not judged: {found.one_seed} means differ that have one seed; run both with --seeds 0,1,2."
+    if found.only_one or found.only_other:
+        yield f"Not compared: {found.only_one} numbers of A alone, {found.only_other} of B alone."
+    machines = [", ".join(sorted(set(run.frame["hardware"]))) for run in runs]
+    if machines[0] != machines[1]:
+        yield f"No times compared: A ran on {machines[0]}, B on {machines[1]}."
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,188 @@
+"""python -m reports.export RUN: a roll-out of a run and its body, for programs that animate and render.
+
+A whole scene to be simulated elsewhere is what python -m benchmarks.export writes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.results import ResultsError, RunFolder
+
+if TYPE_CHECKING:
+    from reference_sim.trajectory import Trajectory
+
+EXAMPLES = """examples:
+  python -m reports.export reports/runs/NAME --scene tshirt/kick --method snug -o kick.usdc
+  python -m reports.export reports/runs/NAME --scene tshirt/kick --method simulation -o kick.abc
+  python -m reports.export reports/runs/NAME --scene tshirt/kick --method snug --seed 2 -o kick.pc2
+  python -m reports.export reports/runs/NAME --scene flag --method newton-4 -o flag_frames/
+  python -m benchmarks.export tshirt/kick -o kick      another command: the scene, to simulate it elsewhere
+
+  .abc    Alembic: meshes "garment" and "body"      needs pip install 'neural-garment-benchmark[alembic]'
+  .usdc   USD: meshes /roll_out/garment and /body   needs pip install 'neural-garment-benchmark[usd]'
+  .pc2    point caches NAME.pc2 and NAME_body.pc2, each with its .obj
+  DIR/    garment_0000.obj, body_0000.obj, and so on, a file for each frame
+
+Metres, y up, float32; time 0 is frame 0. Vertices and faces are those of the run in each frame and format.
+exit status: 0 written; 2 the run has no such roll-out, or the file cannot be written: one line says why."""
+ORDER = (
+    "Blender: import each .obj with Split By Object and Split By Group off, so that its vertices keep their "
+    "order, and add a Mesh Cache modifier with the .pc2 of the same name."
+)
+Meshes = dict[str, "Trajectory"]
+
+
+def write_alembic(path: Path, meshes: Meshes) -> None:
+    """One polygon mesh for each name. Faces are turned round: Alembic's wind clockwise seen from outside."""
+    import imath
+    import numpy as np
+    from alembic3d.Abc import OArchive
+    from alembic3d.AbcCoreAbstract import AcyclicFlag, TimeSampling, TimeSamplingType, TimeVector
+    from alembic3d.AbcGeom import OPolyMesh, OPolyMeshSchemaSample
+
+    archive = OArchive(str(path))
+    for name, mesh in meshes.items():
+        times = TimeVector()
+        times.extend(mesh.times.tolist())  # any: of a long roll-out not all frames are kept
+        sampling = TimeSampling(TimeSamplingType(AcyclicFlag.kAcyclic), times)
+        schema = OPolyMesh(archive.getTop(), name).getSchema()
+        schema.setTimeSampling(archive.addTimeSampling(sampling))
+        turned = np.ascontiguousarray(mesh.faces[:, ::-1], dtype=np.int32)
+        indices = imath.IntArrayFromBuffer(turned.ravel())
+        counts = imath.IntArrayFromBuffer(np.full(len(turned), 3, dtype=np.int32))
+        for points in mesh.positions.astype(np.float32):
+            schema.set(OPolyMeshSchemaSample(imath.V3fArrayFromBuffer(points), indices, counts))
+
+
+def write_usd(path: Path, meshes: Meshes) -> None:
+    """A stage of metres with y up: one mesh for each name, its points at each frame."""
+    import numpy as np
+    from pxr import Usd, UsdGeom, Vt
+
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/roll_out").GetPrim())
+    rates = [1.0 / mesh.dt for mesh in meshes.values() if mesh.frames > 1]
+    rate = round(rates[0], 6) if rates else 1.0
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetFramesPerSecond(rate)
+    stage.SetStartTimeCode(0.0)
+    stage.SetEndTimeCode(max(round(rate * float(mesh.times[-1]), 6) for mesh in meshes.values()))
+    for name, mesh in meshes.items():
+        made = UsdGeom.Mesh.Define(stage, f"/roll_out/{name}")
+        made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        made.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(mesh.faces), 3, dtype=np.int32)))
+        made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.faces.ravel().astype(np.int32)))
+        points, extent = made.CreatePointsAttr(), made.CreateExtentAttr()
+        for time, frame in zip(mesh.times * rate, mesh.positions.astype(np.float32)):
+            code = Usd.TimeCode(round(float(time), 6))
+            points.Set(Vt.Vec3fArray.FromNumpy(frame), code)
+            extent.Set(Vt.Vec3fArray.FromNumpy(np.stack([frame.min(axis=0), frame.max(axis=0)])), code)
+    stage.GetRootLayer().Save()
+
+
+# Ending -> what writes it, the package that it takes, and the extra that brings it.
+ARCHIVES: dict[str, tuple[Callable[[Path, Meshes], None], str, str]] = {
+    ".abc": (write_alembic, "alembic3d", "alembic"),
+    ".usdc": (write_usd, "pxr", "usd"),
+}
+
+
+def demand_writable(path: Path) -> None:
+    """Raises ValueError for a name or an installation that nothing can come of, before anything is read."""
+    from importlib.util import find_spec
+
+    if path.suffix in ARCHIVES:
+        _, package, extra = ARCHIVES[path.suffix]
+        if find_spec(package) is None:
+            raise ValueError(f"{path}: needs pip install 'neural-garment-benchmark[{extra}]'")
+    elif path.suffix not in (".pc2", ""):
+        raise ValueError(f"{path}: give a name that ends in .abc, .usdc or .pc2, or a folder for .obj files")
+    if path.suffix == "" and path.exists() and not (path.is_dir() and not any(path.iterdir())):
+        raise ValueError(f"{path}: is there already; name a new folder")
+    if path.suffix != "" and path.is_dir():
+        raise ValueError(f"{path}: is a folder; name a file")
+
+
+def write(path: Path, meshes: Meshes) -> None:
+    """Write the meshes, each whole or not at all. Raises OSError."""
+    from reference_sim.point_cache import write_point_cache
+    from reference_sim.whole_file import replacing
+
+    if path.suffix in ARCHIVES:
+        with replacing(path) as temporary:
+            ARCHIVES[path.suffix][0](temporary, meshes)
+    elif path.suffix == ".pc2":
+        for name, mesh in meshes.items():
+            write_point_cache(path if name == "garment" else path.with_stem(f"{path.stem}_{name}"), mesh)
+    else:
+        _write_frames(path, meshes)
+
+
+def _write_frames(folder: Path, meshes: Meshes) -> None:
+    from reference_sim.point_cache import write_obj
+
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    part.mkdir()
+    try:
+        for name, mesh in meshes.items():
+            for frame, positions in enumerate(mesh.positions):
+                write_obj(part / f"{name}_{frame:04d}.obj", positions, mesh.faces)
+        if folder.exists():
+            folder.rmdir()
+        os.replace(part, folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    parser = argparse.ArgumentParser(
+        prog="python -m reports.export",
+        description="Write a roll-out of a run, and the body, as Alembic, USD, PC2 or OBJ files.",
+        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("run_dir", metavar="RUN", help="folder of a run that has kept its trajectories")
+    parser.add_argument("--scene", required=True, help="as in results.csv, say tshirt/kick")
+    parser.add_argument("--method", required=True, help="as in results.csv, say snug")
+    parser.add_argument("--seed", type=int, help="of a trained method (default: the first)")
+    parser.add_argument(
+        "-o", "--out", required=True, metavar="FILE", help="x.abc, x.usdc, x.pc2 or a new folder"
+    )
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    options = make_parser().parse_args(arguments)
+    path = Path(options.out)
+    try:
+        demand_writable(path)
+        from reports.kept import read_kept
+        from reports.page.roll_outs import first_frames
+
+        kept = read_kept(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
+        cloth = kept.cloths[options.method]
+        meshes = {"garment": cloth} | ({"body": first_frames(kept.body, cloth.frames)} if kept.body else {})
+        write(path, meshes)
+    except (ResultsError, ValueError, OSError) as error:
+        print(f"reports.export: {error}", file=sys.stderr)
+        return 2
+    sizes = ", ".join(f"{name} of {mesh.positions.shape[1]} vertices" for name, mesh in meshes.items())
+    print(f"{path}: {cloth.frames} frames, {sizes}")
+    if path.suffix == ".pc2":
+        print(ORDER)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,78 @@
+"""The paper's tables of a run in LaTeX, the numbers as the PDF prints them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.results import replacing
+from reports import paper
+from reports.data import Run
+from reports.layout import column_texts, remarks_of
+from reports.table import Table
+
+HEAD = "% Needs \\usepackage{booktabs}. Names that are not Latin need LuaLaTeX or XeLaTeX.\n"
+MARKS = {"*": r"\ast", "†": r"\dagger", "‡": r"\ddagger", "§": r"\S"}
+_POWER = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
+_PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
+_NUMBER = re.compile(r"(-?[\d,.]+(?:\\times 10\^\{-?\d+\})?)")
+
+
+def write_latex(run: Run, tables: Mapping[str, Table], folder: Path) -> None:
+    """Write <folder>/<name>.tex of the tables that the paper has, each whole or not at all."""
+    for name in paper.PRINTED:
+        if name in tables:
+            with replacing(folder / f"{name}.tex") as temporary:
+                temporary.write_text(latex(run, tables[name]), encoding="utf-8", newline="\n")
+
+
+def latex(run: Run, table: Table) -> str:
+    """A table environment: names escaped, each number with its spread or uncertainty and its marks."""
+    columns = [
+        column_texts(run, column, [row[place] for row in table.rows], [])
+        for place, column in enumerate(table.columns)
+    ]
+    heads = [f"{c.title} [{c.unit}]" if c.unit else c.title for c in table.columns]
+    cells = {
+        head: [cell["text"] if column.text else _cell(cell) for cell in texts]
+        for head, column, texts in zip(heads, table.columns, columns)
+    }
+    words = [head for head, column in zip(heads, table.columns) if column.text]
+    styled = pd.DataFrame(cells).style.hide(axis="index")
+    styled = styled.format(escape="latex", subset=words).format_index(escape="latex", axis="columns")
+    # Of rows that stand beside the paper's in the PDF, the remark on those is not for here.
+    lines = [list(line) for line in zip(*columns)]
+    note = remarks_of(Table(table.name, table.columns, table.rows), lines)
+    kinds = "".join("l" if column.text else "r" for column in table.columns)
+    text = styled.to_latex(
+        column_format=kinds, hrules=True, position_float="centering", caption=_plain(table.caption),
+        label=f"tab:{table.name}",
+    )  # fmt: skip
+    return HEAD + text.replace(r"\end{table}", f"\\par\\footnotesize {_plain(note)}\n\\end{{table}}")
+
+
+def _cell(cell: Mapping[str, str]) -> str:
+    text = _math(cell["text"])
+    if cell["spread"]:
+        text += rf" $\pm$ {_math(cell['spread'].removeprefix('± '))}"
+    marks = "".join(MARKS.get(mark, mark) for mark in cell["mark"])
+    return f"{text.removesuffix('$')}{'' if text.endswith('$') else '$'}{{}}^{{{marks}}}$" if marks else text
+
+
+def _math(text: str) -> str:
+    """A number as "2.50×10⁻⁷" or "1,730 s" with its digits in math, its unit not."""
+    plain = _POWER.sub(lambda found: rf"\times 10^{{{found[1]}}}", text.strip())
+    found = _NUMBER.match(plain.translate(_PLAIN))
+    if not found:
+        return "--" if plain == "–" else plain.replace("∞", r"$\infty$")
+    return f"${found[1].replace(',', '{,}')}$" + plain[found.end() :].replace(" ", "~")
+
+
+def _plain(text: str) -> str:
+    """Words of the report itself, with the few of their signs that LaTeX reads otherwise."""
+    for sign, instead in (("%", r"\%"), ("±", r"$\pm$"), *((m, f"$^{{{x}}}$") for m, x in MARKS.items())):
+        text = text.replace(sign, instead)
+    return text
