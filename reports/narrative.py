@@ -1,4 +1,4 @@
-"""The summary on page one: a few sentences, computed from the numbers and printed as they come out."""
+"""What the run found: a few sentences, computed from the numbers and printed as they come out."""
 
 from __future__ import annotations
 
@@ -45,10 +45,13 @@ def summary(run: Run) -> list[tuple[str, str]]:
         ("The reference", reference(run, cells[cells["scene"].isin(compared)])),
         ("Claims of the paper", claims.counts(run)),
         ("Known answers", checks(run).strip()),
-        ("Not finished", trouble(run)),
     ]
-    # A number keeps its unit on its line.
-    return [(topic, re.sub(r"(?<=\d) (?=(J|ms|1/m|%)\b|%)", "\u00a0", said)) for topic, said in found if said]
+    return [(topic, unbroken(said)) for topic, said in found if said]
+
+
+def unbroken(text: str) -> str:
+    """A number keeps its unit on its line."""
+    return re.sub(r"(?<=\d) (?=(J|ms|mm|1/m|%)\b|%)", "\u00a0", text)
 
 
 def changed(run: Run) -> str:
@@ -95,10 +98,10 @@ def run_time(run: Run, frame: pd.DataFrame) -> str:
     return f"{text} From pose to vertices {number(whole[0].value)} and {number(whole[1].value)} ms."
 
 
-def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
+def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str], first_only: bool = False) -> str:
     """By each error, what beats the network, and the fastest truncated solver that is as accurate."""
     text = ""
-    for metric in ("gap/energy", CURVATURE):
+    for metric in ("gap/energy",) if first_only else ("gap/energy", CURVATURE):
         points = points_of(run, frame, scenes, metric)
         own = next((p for p in points if p.method == NETWORK), None)
         if own is None:
@@ -164,15 +167,6 @@ def checks(run: Run) -> str:
     return text + (
         f"{(tests == 'ok').sum()} of {len(tests)} stress tests converged{others}." if len(tests) else ""
     )
-
-
-def trouble(run: Run) -> str:
-    """How cells ended: what has any usable number has run, whatever became of its other metrics."""
-    best_first = {"stalled": 0, "ok": 1}
-    cells = run.suite("garments", "speed")
-    cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
-    words = counts(cells.drop_duplicates(["scene", "method", "seed"]).sort_index()["status"])
-    return f"Cells of garments and speed: {words}; the reasons stand near the end." if words else ""
 
 
 def counts(statuses: pd.Series) -> str:

@@ -28,7 +28,7 @@ def performance_profile(folder: Path, run: Run) -> list[Picture]:
     if not panels:
         return []
     looks = {method.family: family_style(run, method) for method in run.methods.values()}
-    figure = new_figure(PAGE_WIDTH, 2.9)
+    figure = new_figure(PAGE_WIDTH, 2.3)
     shown: set[str] = set()
     for axes, (target, times) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels.items()):
         for family, (ratios, shares) in staircases(times).items():
@@ -45,8 +45,7 @@ def performance_profile(folder: Path, run: Run) -> list[Picture]:
     legend_above(figure, [looks[family] for family in families if family in shown], lines=True)
     caption = (
         "Performance profile: the share of scenes on which a family reaches a relative energy gap within so "
-        "many times the time of the fastest. A family that never gets there has no line; a scene that it "
-        "cannot do, as a network a sheet, counts as not reached."
+        "many times the time of the fastest; a scene that it cannot do counts as not reached."
     )
     return [save(figure, folder, "performance_profile", caption=caption, kind="profile")]
 
