@@ -80,7 +80,10 @@ def document(
         "configuration": configuration(run.config, run.frame),
         "sections": [{"title": title, "blocks": found} for title, found in sections.items() if found],
         "definitions": _definitions(run, (tables[name] for name in (*PAPER, "overview") if name in tables)),
-        "elsewhere": [[f"tables/{table.name}.csv", _cut(table.caption)] for table in tables.values() if table.caption],
+        "spare": drawn("spare"),
+        "elsewhere": [
+            [f"tables/{table.name}.csv", _cut(table.caption)] for table in tables.values() if table.caption
+        ],
     }
 
 

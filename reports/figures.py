@@ -34,6 +34,7 @@ DOTTED = ("energy/total", "curvature/error", "penetration/vertices")
 SIZED, VERTICES = ("curvature/error", "curvature/mean"), "mesh/vertices"
 EVERY = 3  # of a roll-out's frames, in histograms
 RARE = 0.01  # [%] the lowest share that they show
+MOST_LINES = 24  # methods that have room below each other
 LEAST = 1e-6  # tolerances away: what is nearer is drawn here
 
 
@@ -79,10 +80,12 @@ def _log_energy_axis(axes: Axes) -> None:
 
 def dots(folder: Path, run: Run) -> list[Picture]:
     """The cells behind the means of the first garment: a dot per motion and seed, a bar at the mean."""
-    garment, rows = next(((g, run.worn[run.worn["garment"] == g]) for g in run.garments(run.worn)), ("", run.worn))
+    garment, rows = next(
+        ((g, run.worn[run.worn["garment"] == g]) for g in run.garments(run.worn)), ("", run.worn)
+    )
     rows = rows[rows["usable"]]
     shown = [name for name in DOTTED if name in set(rows["metric"])]
-    methods = leading(run, set(rows[rows["metric"].isin(shown)]["method"]))
+    methods = leading(run, set(rows[rows["metric"].isin(shown)]["method"]))[:MOST_LINES]
     if not shown or not methods or not garment:
         return []
     found = means(rows[rows["metric"].isin(shown)], "method", "metric")
@@ -96,7 +99,9 @@ def dots(folder: Path, run: Run) -> list[Picture]:
             axes.plot(values, np.full(len(values), place), look.marker, color=look.colour, alpha=0.55,
                 markersize=4, linestyle="none")  # fmt: skip
             axes.plot([mean.value] * 2, [place - 0.36, place + 0.36], color="#111111", linewidth=1.4)
-        every = np.concatenate([list(found[m, name].cells.values()) for m in methods if (m, name) in found.index])
+        every = np.concatenate(
+            [list(found[m, name].cells.values()) for m in methods if (m, name) in found.index]
+        )
         if every.min() > 0.0 and every.max() > 20.0 * every.min():
             axes.set_xlim(every.min() / 1.3, every.max() * 1.3)
             log_axis(axes, "x")
@@ -136,7 +141,7 @@ def histograms(
         log_axis(axes, "y")
         grid(axes)
     legend_above(figure, [style(run, method) for method in methods], lines=True)
-    caption = f"{scene}: of all vertices, every {EVERY}th frame."
+    caption = f"{scene}: of all vertices, in one frame of {EVERY}."
     return save(figure, folder, "histograms", caption=caption, kind="histograms")
 
 

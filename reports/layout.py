@@ -99,8 +99,8 @@ def remarks_of(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
 
 
 def _widths(columns: Sequence[Column], cells: Sequence[Sequence[dict[str, str]]]) -> list[str]:
-    """Columns of numbers share the width evenly; beside several columns of words they take what they need, and
-    the long words share the rest.
+    """Columns of numbers share the width evenly; beside several columns of words they take what they need,
+    and long words share the rest.
     """
     if all(not column.text for column in columns[1:]):
         return ["1.4fr" if len(columns) <= FEW else "2.4fr", *["1fr"] * (len(columns) - 1)]

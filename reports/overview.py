@@ -18,12 +18,12 @@ STEPS = ("gap/energy", "step/distance")
 BEST_BY = ("step/distance", "gap/energy", "curvature/error", "energy/total")
 
 
-def leads(run: Run, rows: pd.DataFrame, among: Iterable[str] = ()) -> list[str]:
+def leads(run: Run, rows: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
     """The reference, the network, the best of other networks in these rows, and the first baseline; of those
-    in `among`, where any are named.
+    in `among` alone where that is given.
     """
     usable = set(rows[rows["usable"]]["method"])
-    have = usable & set(among) if among else usable
+    have = usable if among is None else usable & set(among)
     others = [name for name in run.with_role("network") if name in have and not run.methods[name].base]
     own = NETWORK if NETWORK in others else next(iter(others), "")
     best = _best(run, rows, [name for name in others if name != own])
@@ -56,7 +56,11 @@ def overview(run: Run) -> list[Table]:
     timed = cells[cells["scene"].isin(scenes)] if scenes else worn
     plain = set(worn[worn["usable"]]["method"]) - run.standing_apart(worn)
     chosen = leads(run, worn)
-    chosen += [m for m in run.ordered(plain) if m not in chosen and run.methods[m].role in ("network", "bound", "baseline")]
+    chosen += [
+        m
+        for m in run.ordered(plain)
+        if m not in chosen and run.methods[m].role in ("network", "bound", "baseline")
+    ]
     why = rivals(run, cells, scenes) if scenes else {}
     solvers = [m for m in why if m not in chosen]
     chosen = run.ordered([*chosen[: ROWS - len(solvers)], *solvers])

@@ -1,4 +1,4 @@
-"""Sheets of pictures of garments: methods side by side, coloured by what a vertex has, and where they fail."""
+"""Sheets of pictures of garments: methods side by side, coloured by what a vertex has, and failures."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 DOTS = 200  # of a picture in an inch
 FRONT, BACK = -25.0, 155.0  # turns of the camera [degrees]
 BAR, NAME, SIDE = 0.62, 0.24, 0.2  # inches for a scale, a line of words and words at the side
-FULL = 98.0  # percentile of the values shown that has the darkest colour
+FULL = 97.0  # percentile of the values of the worst method: it has the darkest colour
 NOTHING = 1e-6  # of a scale's unit: what is less everywhere is not shown
 STEP = "step/vertices"
 INERTIA = "energy/inertia"
@@ -69,8 +69,7 @@ class Scale:
 
     @property
     def top(self) -> float:
-        every = np.concatenate([np.nan_to_num(own) for own in self.values.values()])
-        return float(np.percentile(every, FULL)) or float(every.max())
+        return max(float(np.percentile(np.nan_to_num(own), FULL)) for own in self.values.values())
 
     def colours(self, method: str) -> np.ndarray:
         """(V,3), pale to dark in grey too."""
@@ -92,7 +91,9 @@ def scales(filmed: Filmed, methods: Sequence[str], frame: int, reference: str) -
     at = {m: cloth.positions[frame] for m, cloth in cloths.items()}
     found = {}
     if filmed.has_steps(methods):
-        found["step"] = Scale("one-step error [mm]", {m: c.frame_fields[STEP][frame] for m, c in cloths.items()})
+        found["step"] = Scale(
+            "one-step error [mm]", {m: c.frame_fields[STEP][frame] for m, c in cloths.items()}
+        )
     if reference in at and len({x.shape for x in at.values()}) == 1:
         away = {m: distance(x[None], at[reference][None])[0] for m, x in at.items()}
         found["distance"] = Scale("from the simulation [mm]", away)
@@ -141,7 +142,9 @@ def sheet(
             if line == 0 and heads:
                 figure.text(middle, 1.0 - 0.02 / height, heads[place], ha="center", va="top", fontsize=8.5)
             if below:
-                figure.text(middle, (floor - 0.02) / height, below[line][place], ha="center", va="top", fontsize=8)
+                figure.text(
+                    middle, (floor - 0.02) / height, below[line][place], ha="center", va="top", fontsize=8
+                )
     if bar:
         _bar(figure, bar, (width - BAR + 0.12) / width, height)
     return figure
@@ -216,11 +219,15 @@ def side_by_side(folder: Path, run: Run, filmed: Filmed, methods: Sequence[str])
     ended = [method for method in filmed.series if method not in methods]
     if ended:
         caption += f" Not shown, for they ended before it: {', '.join(map(run.label, run.ordered(ended)))}."
-    return save(figure, folder, f"frames_{file_name(filmed.scene)}", caption=caption, kind="frames", vector=False)
+    return save(
+        figure, folder, f"frames_{file_name(filmed.scene)}", caption=caption, kind="frames", vector=False
+    )
 
 
-def strip(folder: Path, run: Run, filmed: Filmed, methods: Sequence[str], columns: int = 6) -> Picture:
-    """Frames of a motion, evenly spread, a row for each method."""
+def strip(
+    folder: Path, run: Run, filmed: Filmed, methods: Sequence[str], columns: int = 6, spare: bool = False
+) -> Picture:
+    """Frames of a motion, evenly spread, a row for each method; spare: to fill a page."""
     frames = min(filmed.series[method].frames for method in methods)
     chosen = np.unique(np.linspace(frames // 5, frames - 1, columns).astype(int))
     wide = (PAGE_WIDTH - SIDE) / columns
@@ -232,13 +239,20 @@ def strip(folder: Path, run: Run, filmed: Filmed, methods: Sequence[str], column
         beside=[wrapped(run.label(method), 14) for method in methods],
     )  # fmt: skip
     caption = f"{filmed.scene}: the same frames of each method."
-    return save(figure, folder, f"strip_{file_name(filmed.scene)}", caption=caption, kind="strip", vector=False)
+    return save(
+        figure,
+        folder,
+        f"strip_{file_name(filmed.scene)}",
+        caption=caption,
+        kind="spare" if spare else "strip",
+        vector=False,
+    )
 
 
 def maps(folder: Path, run: Run, filmed: Filmed, methods: Sequence[str]) -> list[Picture]:
     """A row of pictures for each thing that cloths can be coloured by, but that of page one."""
     frame, _ = filmed.chosen_frame(methods, run.reference)
-    pictures = []
+    pictures: list[Picture] = []
     known = scales(filmed, methods, frame, run.reference)
     for name in list(known)[:1]:
         known.pop(name)
@@ -270,7 +284,10 @@ def gallery(folder: Path, run: Run, failures: Sequence[Failure]) -> list[Picture
     wide = PAGE_WIDTH / max(len(failures), 4)
     tile = (wide, 1.1 * wide)
     images = [shots(f.filmed, [f.method], f.frame, FRONT, tile)[0] for f in failures]
-    heads = [wrapped(f"{run.label(f.method)}: {f.filmed.scene.rpartition('/')[2]}", round(14 * wide)) for f in failures]
+    heads = [
+        wrapped(f"{run.label(f.method)}: {f.filmed.scene.rpartition('/')[2]}", round(14 * wide))
+        for f in failures
+    ]
     figure = sheet([images], tile, heads, below=[[f.words for f in failures]])
     caption = "The worst of trained networks by strain over the simulation's: each at its worst frame."
     return [save(figure, folder, "failures", caption=caption, kind="failures", vector=False)]

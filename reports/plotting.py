@@ -89,7 +89,7 @@ def power_text(value: float) -> str:
 def wrapped(name: str, width: int = 44) -> str:
     """A long name on several lines, broken after a separator where there is one."""
     lines = [""]
-    for piece in re.findall(r"[^_/ :-]*[_/ :-]?", name):
+    for piece in re.findall(rf"[^_/ :-]{{1,{max(width - 1, 1)}}}[_/ :-]?|[_/ :-]", name):
         if lines[-1] and len(lines[-1]) + len(piece) > width:
             lines.append("")
         lines[-1] += piece
@@ -151,7 +151,7 @@ def _legend(figure: Figure, entries: Sequence[Style], lines: bool, **more: Any) 
             linestyle=look.line if lines or not look.marker else "none",  # type: ignore[arg-type]
             marker="" if lines else look.marker,
             markersize=9 if look.marker == "*" else 6,
-            label=wrapped(look.label),
+            label=wrapped(look.label, 30),
         )
         for look in entries
     ]

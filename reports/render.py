@@ -102,20 +102,30 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     """Triangles (F,3,2) in pixels -> for each pixel in each of them: its number, the face, weights (P,3)."""
     low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, [w, h])
     high = np.clip(np.ceil(corners.max(axis=1)).astype(int), 0, [w, h])
-    spans = high - low
-    counts = spans.prod(axis=1)
-    faces = np.repeat(np.arange(len(corners)), counts)
-    place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    x, y = low[faces, 0] + place % spans[faces, 0], low[faces, 1] + place // spans[faces, 0]
-    first, second, third = corners[faces].transpose(1, 0, 2)
-    ab, ac, ap = second - first, third - first, np.stack([x, y], axis=1) + 0.5 - first
+    first, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    area = np.where(area == 0.0, np.inf, area)  # a triangle seen from its edge covers nothing
-    v = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / area
-    u = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / area
-    weights = np.stack([1.0 - u - v, v, u], axis=1)
-    inside = (weights >= 0.0).all(axis=1) & np.isfinite(area)
-    return (y * w + x)[inside], faces[inside], weights[inside]
+    seen = np.flatnonzero((high > low).all(axis=1) & (area != 0.0))  # from its edge one covers nothing
+    low, spans, first, area = low[seen], (high - low)[seen], first[seen], area[seen, None]
+    # Weights of the second and third corner are linear in the pixel: slopes and the value at the low corner.
+    slopes = [
+        np.stack([ac[seen, 1], -ac[seen, 0]], axis=1) / area,
+        np.stack([-ab[seen, 1], ab[seen, 0]], axis=1) / area,
+    ]
+    starts = [(slope * (low + 0.5 - first)).sum(axis=1) for slope in slopes]
+    counts = spans.prod(axis=1)
+    own = np.repeat(np.arange(len(seen)), counts)
+    place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    y, x = np.divmod(place, spans[own, 0])
+    weights: list[np.ndarray] = []
+    for slope, start in zip(slopes, starts):
+        weight = start[own] + slope[own, 0] * x + slope[own, 1] * y
+        kept = weight >= 0.0
+        own, x, y = own[kept], x[kept], y[kept]
+        weights = [one[kept] for one in (*weights, weight)]
+    weights.insert(0, 1.0 - weights[0] - weights[1])
+    kept = weights[0] >= 0.0
+    own, x, y = own[kept], x[kept] + low[own[kept], 0], y[kept] + low[own[kept], 1]
+    return y * w + x, seen[own], np.stack([weight[kept] for weight in weights], axis=1)
 
 
 def _normals(seen: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -134,5 +144,5 @@ def _creased(image: np.ndarray, depth: np.ndarray) -> np.ndarray:
     level, reach = np.where(shown, depth, 0.0), image.shape[1] / 66.0
     share = np.maximum(gaussian_filter(shown.astype(float), reach), 1e-6)
     below = np.maximum(gaussian_filter(level, reach) / share - level, 0.0) / CREASE
-    dark = 1.0 - 0.4 * below * np.exp(1.0 - below)
+    dark = 1.0 - 0.3 * below * np.exp(1.0 - below)
     return np.clip(np.where(shown[..., None], image * dark[..., None], image), 0.0, 1.0)

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 Reader = Callable[[Path], "Trajectory | None"]
 BELOW = ("step/distance", "distance/rms")  # the number below a picture of page one: the first that is known
 WORST, OF_ONE = 4, 2  # failures that are shown, and how many of them by one method
-MOST = 6  # methods side by side
+MOST, FEW = 6, 3  # methods side by side, and at many frames
+SPARE = 2  # further motions that may fill the last page
 STRAIN = "energy/strain"
 
 
@@ -45,14 +46,16 @@ def draw_roll_outs(folder: RunFolder, run: Run, read: Reader) -> list[Picture]:
             found.append(pictures.lead_row(folder.figures, run, filmed, shown, said))
             found += pictures.maps(folder.figures, run, filmed, shown)
             break
-    worn = run.worn[run.worn["metric"] == "energy/total"]
+    worn, motions = run.worn[run.worn["metric"] == "energy/total"], 0
     for scene in [scene for own in run.garments(worn).values() for scene in own]:
         rows = worn[worn["scene"] == scene]
         filmed = film(folder, run, rows, leading(run, rows["method"]), read)
-        if filmed.series:
-            few = [method for method in shown if method in filmed.series]
-            found += _of_motion(folder.figures, run, filmed, few or leads(run, rows, filmed.series))
-            break
+        few = [method for method in shown if method in filmed.series] or leads(run, rows, filmed.series)
+        if filmed.series and motions == 0:
+            found += _of_motion(folder.figures, run, filmed, few)
+        elif few and motions <= SPARE:
+            found.append(pictures.strip(folder.figures, run, filmed, few[:FEW], spare=True))
+        motions += bool(filmed.series)
     return found + _failures(folder, run, read)
 
 
@@ -84,7 +87,7 @@ def _of_motion(folder: Path, run: Run, filmed: Filmed, few: list[str]) -> list[P
     """A motion at length: all methods at one frame, a few at many, and their curves."""
     last = max(cloth.frames for cloth in filmed.series.values())
     whole = [method for method in filmed.series if filmed.series[method].frames == last]
-    few = [method for method in few if method in whole][:3]
+    few = [method for method in few if method in whole][:FEW]
     found = [
         pictures.side_by_side(folder, run, filmed, run.ordered(whole)[:MOST]),
         pictures.strip(folder, run, filmed, few) if few else None,
@@ -106,7 +109,9 @@ def _failures(folder: RunFolder, run: Run, read: Reader) -> list[Picture]:
         if method in filmed.series:
             cloth = filmed.series[method]
             curve = cloth.frame_fields.get(STRAIN)
-            frame = cloth.frames - 1 if curve is None else int(np.argmax(np.nan_to_num(curve[: cloth.frames])))
+            frame = (
+                cloth.frames - 1 if curve is None else int(np.argmax(np.nan_to_num(curve[: cloth.frames])))
+            )
             words = f"{number(strain)} J of strain,\n{number(ratio)} × the simulation's"
             found.append(Failure(filmed, method, frame, words))
     return pictures.gallery(folder.figures, run, found)

@@ -27,7 +27,7 @@ class Column:
     """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
 
     text: words, set from the left; method: names of methods, printed by their labels. digits: of its numbers;
-    trim: without zeros at their end; mixed: of several units, whose decimal points need not stand in a column.
+    trim: without zeros at their end; mixed: of several units, whose points need not stand in a column.
     """
 
     name: str

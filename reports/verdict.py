@@ -58,8 +58,8 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
     own, reference = pair(timed, NETWORK, run.reference, time)
     if own is None or reference is None or not own.value:
         return ""
-    text = f"{run.label(NETWORK)} takes {number(own.value)} ms a frame, the simulation {number(reference.value)}: "
-    text += f"{number(reference.value / own.value, 2)} times as long"
+    text = f"{run.label(NETWORK)} takes {number(own.value)} ms a frame, the simulation "
+    text += f"{number(reference.value)}: {number(reference.value / own.value, 2)} times as long"
     more = fronts(run, run.cells("speed", "garments"), scenes, first_only=True) if scenes else ""
     return f"{text}; {more[:1].lower()}{more[1:]}" if more else f"{text}."
 
@@ -73,12 +73,12 @@ def _trust(run: Run, worn: pd.DataFrame, timed: pd.DataFrame) -> str:
     apart = [indistinct(run, timed, metric) for metric in (CURVATURE, DISTANCE)]
     if all(apart):
         parts.append(
-            f"right simulations lie up to {number(apart[0])} 1/m and {number(apart[1])} mm apart, and what is "
-            "nearer cannot be told"
+            f"right simulations lie up to {number(apart[0])} 1/m and {number(apart[1])} mm apart, and what "
+            "is nearer cannot be told"
         )
     counted = claims.counts(run)
     if counted:
-        parts.append(f"of the paper's claims tested here, {counted.partition(': ')[2].rstrip('.')}")
+        parts.append(f"of the paper's claims tested here: {counted.partition(': ')[2].rstrip('.')}")
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if parts else ""
 
@@ -86,8 +86,8 @@ def _trust(run: Run, worn: pd.DataFrame, timed: pd.DataFrame) -> str:
 def endings(run: Run) -> str:
     """How many cells, checks and stress tests ended how, with every kind that is not ok."""
     cells = run.frame[(run.frame["case"] == "") & (run.frame["method"] != "")]
-    order = {status: rank for rank, status in enumerate(("stalled", "ok", "skipped"))}
-    cells = cells.sort_values("status", key=lambda s: s.map(order).fillna(-1), kind="stable")
+    best_first = {"stalled": 0, "ok": 1}  # what has any usable number has run, whatever became of the others
+    cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
     ends = cells.drop_duplicates(["suite", "scene", "method", "seed"])["status"]
     checks = tables.checks(run)
     groups = {
@@ -114,13 +114,24 @@ def failures(run: Run) -> list[tuple[str, str]]:
     rows = rows.drop_duplicates(["scene", "method", "seed"])
     tested = rows["case"] != ""
     kinds: list[list[tuple[str, str]]] = [
-        [(f"{run.label(row.method)}, {row.scene}" + (f", seed {row.seed}" if row.seed else ""), f"{row.status}: {row.reason}") for row in part.itertuples()]
+        [
+            (
+                f"{run.label(row.method)}, {row.scene}" + (f", seed {row.seed}" if row.seed else ""),
+                f"{row.status}: {row.reason}",
+            )
+            for row in part.itertuples()
+        ]
         for part in (rows[~tested], rows[tested])
     ]
-    kinds.append([
-        (f"{run.label(method)}, {scene}", f"strain {number(own)} J, {number(ratio)} times the simulation's")
-        for method, scene, own, ratio in overstretched(run)[:3]
-    ])
+    kinds.append(
+        [
+            (
+                f"{run.label(method)}, {scene}",
+                f"strain {number(own)} J, {number(ratio)} times the simulation's",
+            )
+            for method, scene, own, ratio in overstretched(run)[:3]
+        ]
+    )
     found: list[tuple[str, str]] = []
     for left, kind in zip((3, 2, 1), kinds):
         found += kind[: max((MOST - len(found)) // left, 1)]

@@ -65,7 +65,7 @@ def error_against_time(folder: Path, run: Run) -> list[Picture]:
             shown[scene] = (rows, [(run.metrics[name], found) for name, found in points.items()])
     if not shown:
         return []
-    first, (rows, panels) = next(iter(shown.items()))
+    rows, panels = next(iter(shown.values()))
     pictures = [_draw_errors(folder, run, rows, panels[:1], lead=True)]
     if len(panels) > 1:
         pictures.append(_draw_errors(folder, run, rows, panels[:MOST_PANELS]))
@@ -83,8 +83,8 @@ def compared_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:
     frame = cells[~cells["method"].isin(apart)]
     ran = timed[~timed["method"].isin(apart)].groupby("scene")["method"].nunique()
     first = next(iter(run.garments(frame).values()), [])
-    scenes = dict.fromkeys(frame["scene"])
-    return frame, sorted(scenes, key=lambda scene: (scene not in first, -int(ran.get(scene, 0))))
+    scenes = [scene for scene in dict.fromkeys(frame["scene"]) if scene in ran]
+    return frame, sorted(scenes, key=lambda scene: (scene not in first, -int(ran[scene])))
 
 
 def metric_against_metric(folder: Path, run: Run, x: str, y: str, scenes: Sequence[str]) -> Picture | None:
@@ -227,13 +227,21 @@ def _draw_points(
             edge if hollow else point.error,
             xerr=[[min(point.time_spread / 2, 0.9 * point.time)], [point.time_spread / 2]],
             yerr=[[min(point.error_spread, 0.9 * abs(point.error))], [point.error_spread]],
-            color=colour, marker=look.marker, markersize=3.5 if small else 5.5, linestyle="none", elinewidth=0.8, zorder=3,
+            color=colour, marker=look.marker, markersize=3.5 if small else 5.5, linestyle="none",
+            elinewidth=0.8, zorder=3,
             markerfacecolor="white" if hollow else colour,
         )  # fmt: skip
         if run.methods[point.method].level is not None:
             families.setdefault(run.methods[point.method].family, []).append(point)
     for members in families.values():
-        _join(axes, run, sorted(members, key=lambda p: run.methods[p.method].level or 0.0), least, edge, named=not small)
+        _join(
+            axes,
+            run,
+            sorted(members, key=lambda p: run.methods[p.method].level or 0.0),
+            least,
+            edge,
+            named=not small,
+        )
     if band:
         axes.axhspan(edge / 10.0, band, color="#F0F0F0", zorder=0)
     if reference:
@@ -243,9 +251,7 @@ def _draw_points(
     return {p.method for p in points if p.error <= least}
 
 
-def _join(
-    axes: Axes, run: Run, members: Sequence[Point], least: float, edge: float, named: bool
-) -> None:
+def _join(axes: Axes, run: Run, members: Sequence[Point], least: float, edge: float, named: bool) -> None:
     """The line through a family, its first and last member marked by their numbers where they are named."""
     look = family_style(run, run.methods[members[0].method])
     heights = [point.error if point.error > least else edge for point in members]

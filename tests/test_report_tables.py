@@ -17,10 +17,12 @@ from reports import numbers
 from reports.ablations import ablation_effects, ablations
 from reports.data import run_data
 from reports.document import document
-from reports.layout import table_blocks
+from reports.layout import shortened, table_blocks
 from reports.means import Mean, mean_of, pair
-from reports.narrative import least, run_time, summary, trouble
+from reports.narrative import least, run_time, summary
+from reports.overview import ROWS, leads
 from reports.tables import make_tables, map_points, merged
+from reports.verdict import endings, failures, verdict
 
 
 def seeds_of(method, metric, values, **more):
@@ -134,11 +136,11 @@ def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
 
 
 def test_a_wide_table_goes_on_below_with_its_heads():
-    rows = [row(metric=f"energy/{k}", value=float(k)) for k in range(11)]
+    rows = [row(metric=f"energy/{k}", value=float(k)) for k in range(13)]
     run = run_of(rows)
     blocks = list(table_blocks(run, make_tables(run)["energies"]))
     heads = [[column["title"] for column in block["columns"]] for block in blocks]
-    assert [len(head) for head in heads] == [7, 6] and {head[0] for head in heads} == {"Method"}
+    assert [len(head) for head in heads] == [8, 7] and {head[0] for head in heads} == {"Method"}
     assert blocks[1]["caption"].endswith("(continued)")
 
 
@@ -281,16 +283,23 @@ def test_run_times_are_of_the_scenes_that_both_have():
     )
 
 
-def test_what_did_not_end_well_is_counted_by_cell():
+def test_page_one_counts_every_kind_of_ending():
     rows = [*all_rows(), row("tshirt/walk", "pbns", "energy/bending", status="stalled", reason="a frame")]
-    assert trouble(run_of(rows)).startswith("Cells of garments and speed: 2 failed, 1 skipped, 1 stalled;")
-    assert trouble(run_of(rows[:3])) == ""
+    rows.append(
+        row("tshirt/jump", "pbns", "energy/strain", None, status="timeout", reason="over 600 s", seed=1)
+    )
+    said = endings(run_of(rows))
+    assert (
+        "cells 2 failed, 1 timeout, 1 stalled, 1 skipped; of 3 checks 1 failed; of 2 stress tests 1 timeout"
+        in said
+    )
+    assert endings(run_of(rows[:3])) == "Of 1 cells all ended well."
     # A metric that is not finite, or off its tolerance, fails no cell that has others.
     rows[:3] = [
         *rows[:3],
         row("tshirt/walk", "pbns", "gap/energy", None, status="failed", reason="no number"),
     ]
-    assert "2 failed, 1 skipped, 1 stalled;" in trouble(run_of(rows))
+    assert "cells 2 failed, 1 timeout, 1 stalled, 1 skipped;" in endings(run_of(rows))
 
 
 @pytest.mark.parametrize(
@@ -303,43 +312,77 @@ def test_times_say_what_ran_beside(workers, said):
 
 
 def test_sections_exist_only_for_what_ran():
-    check = row("falls", "simulation", "check", 0.0, suite="validation", expected=0.0, tolerance=1.0)
-    run = run_of([check])
+    check = row("falls", "simulation", "check", 0.5, suite="validation", expected=0.0, tolerance=1.0)
+    failed = dataclasses.replace(check, scene="sag", status="failed", reason="off")
+    run = run_of([check, failed])
     made_tables = make_tables(run)
     content = document(run, made_tables, [], [])
-    assert [section["title"] for section in content["sections"]] == ["Validation: known answers"]
-    assert content["definitions"] == [] and content["lead"] is None and content["main"] == []
+    assert [section["title"] for section in content["sections"]] == ["Findings", "Validation"]
+    assert content["definitions"] == content["first"]["verdict"] == content["first"]["blocks"] == []
     assert set(made_tables) == {"validation", "metrics"}
+    (block,) = content["sections"][1]["blocks"]
+    assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
 
 
-def test_every_metric_in_a_table_is_defined_as_it_defines_itself():
+def test_every_metric_of_a_printed_table_is_defined_as_it_defines_itself():
     run = run_of(all_rows())
-    groups = document(run, make_tables(run), [], [])["definitions"]
-    assert [group["title"] for group in groups] == ["Energies", "Cost", "Curvature"]
-    assert ["Strain [J]", "definition of energy/strain"] in groups[0]["pairs"]
+    definitions = dict(document(run, make_tables(run), [], [])["definitions"])
+    assert (
+        definitions["Strain [J]"] == "definition of energy/strain" and "Curvature error [1/m]" in definitions
+    )
 
 
-def test_other_suites_stand_scene_by_scene_in_their_sections():
-    run = run_of([*all_rows(), row("tshirt/fast", suite="extremes"), row("tshirt/walk", suite="extremes")])
-    sections = {s["title"]: s["blocks"] for s in document(run, make_tables(run), [], [])["sections"]}
-    (block,) = [b for b in sections["Extremes: where it breaks"] if b["caption"].startswith("Energies")]
-    assert [group["title"] for group in block["groups"]] == [
-        "tshirt/fast"
-    ]  # the walk stands in its own suite
-
-
-def test_the_page_lists_the_stress_tests_that_did_not_converge_and_the_table_all():
+def test_the_report_lists_the_stress_tests_that_did_not_converge_and_the_table_all():
     run = run_of(all_rows())
     made = make_tables(run)
     assert [line[:3] for line in made["extremes"].rows] == [
         ("stiff", "simulation", "converged"), ("teleport", "simulation", "timeout"),
     ]  # fmt: skip
     sections = {s["title"]: s["blocks"] for s in document(run, made, [], [])["sections"]}
-    (block,) = sections["Extremes: where it breaks"]
+    (block,) = sections["Stress"]
     assert [[cell["text"] for cell in line[:3]] for line in block["groups"][0]["rows"]] == [
         ["teleport", "Simulation", "timeout"]
     ]
     assert dict(summary(run))["Known answers"].endswith("1 of 2 stress tests converged; 1 timeout.")
+
+
+def test_page_one_names_the_worst_of_each_kind():
+    stretched = [row("tshirt/kick", m, "energy/strain", v) for m, v in (("simulation", 0.1), ("snug", 0.9))]
+    found = failures(run_of([*all_rows(), *stretched]))
+    assert ("Supervised, tshirt/walk", "failed: diverged at step 7") in found
+    assert any(name == "Simulation, teleport" for name, _ in found)
+    assert ("SNUG, tshirt/kick", "strain 0.900 J, 9.00 times the simulation's") in found
+    assert failures(run_of([row(method="simulation"), row()])) == []  # as much strain is no failure
+
+
+def test_the_verdict_says_tie_only_within_the_uncertainty():
+    def near(snug: float) -> str:
+        rows = seeds_of("snug", "energy/total", (snug, snug + 0.02))
+        return dict(verdict(run_of([*rows, row(method="simulation", metric="energy/total")])))["How near"]
+
+    assert "is as low as the simulation's" in near(0.99)
+    assert "is above the simulation's, 1.00." in near(2.0) and "is below" in near(0.5)
+    assert near(2.0).startswith("On 1 unseen motions SNUG's total energy, 2.01 ± 0.014")
+
+
+def test_page_one_shows_the_network_the_best_of_others_and_a_baseline():
+    run = run_of(all_rows())
+    assert leads(run, run.worn) == ["simulation", "snug", "pbns", "skinning"]
+    better = run_of(
+        [*all_rows(), *(row(s, "supervised", "curvature/error", 0.1, unit="1/m") for s in SCENES)]
+    )
+    assert leads(better, better.worn)[2] == "supervised"
+    assert leads(run, run.worn, ["pbns", "simulation"]) == ["simulation", "pbns"]
+
+
+def test_the_table_of_page_one_stays_short():
+    many = [row(scene, f"mine-{k}", "energy/total", 1.0 + k) for k in range(20) for scene in SCENES]
+    made = make_tables(run_of([*all_rows(), *many]))["overview"]
+    methods = [line[0] for line in made.rows]
+    assert len(methods) <= ROWS and {"simulation", "snug", "skinning"} < set(methods)
+    energies = make_tables(run_of([*all_rows(), *many]))["energies"]
+    short = shortened(energies, 12)
+    assert len(short.rows) == 12 and short.note.startswith("12 more rows are in tables/energies.csv")
 
 
 def test_no_number_of_the_report_is_infinite_or_nan():
@@ -351,7 +394,8 @@ def test_no_number_of_the_report_is_infinite_or_nan():
 def test_the_page_says_how_many_seeds_there_were():
     rows = seeds_of("snug", "energy/strain", (1.0, 1.1, 1.2)) + seeds_of("pbns", "energy/strain", (2.0, 2.1))
     run = run_of(rows + seeds_of("simulation", "energy/strain", (1.0,)))
-    (block,) = document(run, make_tables(run), [], [])["main"]
+    sections = document(run, make_tables(run), [], [])["sections"]
+    block = sections[0]["blocks"][0]
     assert "±: standard deviation over 2 or 3 seeds. Without it: one seed" in block["note"]
 
 

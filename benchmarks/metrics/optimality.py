@@ -115,7 +115,7 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
     return found | ({"gap/scale": scale} if roll_out is group.reference else {})
 
 
-def series(roll_out: RollOut) -> dict[str, Floats]:
+def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
     """step/vertices (T,V) [mm]: how far each vertex lies from y_t; nan in frames that were not looked at."""
     away = roll_out.kept(_judge_steps).away
     shown = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
