@@ -27,7 +27,7 @@ TEMPLATE = Path(__file__).parent / "report.typ"
 FIGURES = (
     "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "energy_series_*", "error_against_time*",
     "failures.*", "frames_*", "hem_*", "histograms.*", "known_answers.*", "lead.*", "map_*",
-    "performance_profile.*", "stability_maps.*", "strip_*", "training_*", "training.*",
+    "stability_maps.*", "strip_*", "training_*", "training.*",
 )  # fmt: skip
 
 
@@ -74,14 +74,13 @@ def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
     from reports import figures, training
     from reports.break_even import break_even
     from reports.convergence import convergence_curve
-    from reports.profile import performance_profile
     from reports.roll_outs import draw_roll_outs
     from reports.stability import stability_maps
     from reports.work_precision import error_against_time
 
     pictures = draw_roll_outs(folder, run, lambda path: read_trajectory(folder, path, problems))
     for make in (
-        error_against_time, performance_profile, break_even, figures.dots, figures.against_vertices,
+        error_against_time, break_even, figures.dots, figures.against_vertices,
         figures.known_answers, stability_maps,
     ):  # fmt: skip
         pictures += make(folder.figures, run)

@@ -54,8 +54,7 @@ def document(
         "The paper's tables": printed(*PAPER),
         "Findings": [pairs_block(found) for found in [summary(run)] if found]
             + printed("findings", most=40) + printed("ablation_effects"),
-        "Error against run time": drawn("speed", "scenes") + beside("break_even", "sizes")
-            + drawn("profile"),
+        "Error against run time": drawn("speed", "scenes") + beside("break_even", "sizes"),
         "Garments in motion": drawn("frames", "strip", "colours", "failures"),
         "Behind the means": drawn("dots", "histograms"),
         "Dynamics": printed("dynamics") + drawn("hem", "series"),

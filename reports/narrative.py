@@ -10,12 +10,10 @@ import pandas as pd
 from reports import claims, tables
 from reports.break_even import NETWORK, compared_scenes, cost_of, crossing, frames_text, rivals
 from reports.data import Run
-from reports.means import mean_of, pair, shared_scenes, value_of
-from reports.numbers import duration, number, with_spread
+from reports.means import value_of
+from reports.numbers import duration, number
 from reports.pareto import (
     SMALLER_STEPS,
-    TIME,
-    WHOLE,
     Point,
     beaten_by,
     fastest,
@@ -25,21 +23,14 @@ from reports.pareto import (
 )
 
 SHOWN = 4  # names of files
-TOTAL, CURVATURE, DISTANCE = "energy/total", "curvature/error", "distance/rms"
+CURVATURE, DISTANCE = "curvature/error", "distance/rms"
 
 
 def summary(run: Run) -> list[tuple[str, str]]:
-    """(topic, sentences), of what the run holds numbers for; means are of the first garment."""
-    scenes = next(iter(run.garments(run.worn).values()), [])
-    worn = run.worn[run.worn["scene"].isin(scenes)]
+    """(topic, sentences), of what the run holds numbers for."""
     cells = run.cells("speed", "garments")
     compared = next(iter(compared_scenes(run, cells).values()), [])
-    has_network = NETWORK in set(worn["method"])
     found = [
-        ("Changed since", changed(run)),
-        ("Total energy", least(run, worn, TOTAL, "J")),
-        ("Wrinkles", least(run, worn, CURVATURE, "1/m")),
-        ("Run time", run_time(run, worn if has_network else cells[cells["scene"].isin(compared)])),
         ("Error against time", fronts(run, cells, compared)),
         ("When training pays", training_pays(run, cells, compared)),
         ("The reference", reference(run, cells[cells["scene"].isin(compared)])),
@@ -60,42 +51,6 @@ def changed(run: Run) -> str:
         return ""
     more = f" and {len(run.changed) - SHOWN} more" if len(run.changed) > SHOWN else ""
     return f"Not as the run wrote them: {', '.join(run.changed[:SHOWN])}{more}. What is said here is of them."
-
-
-def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
-    """The networks by a metric, the lowest first, and then what was not trained, over the scenes of all."""
-    rows = worn[(worn["metric"] == metric) | ~worn["usable"]]
-    have = set(rows[rows["usable"]]["method"])
-    networks = [name for name in run.with_role("network") if name in have and not run.methods[name].base]
-    others = [name for name in run.ordered(run.with_role("reference", "bound", "baseline")) if name in have]
-    scenes = shared_scenes(rows, [*networks, *others], metric)
-    means = {name: mean_of(rows, name, metric, scenes) for name in (*networks, *others)}
-    found = {name: mean for name, mean in means.items() if mean is not None}
-    order = sorted((name for name in networks if name in found), key=lambda name: found[name].value)
-    if not order:
-        return ""
-    best = found[order[0]]
-    text = (
-        f"{run.label(order[0])} has {with_spread(best.value, best.spread_or_uncertainty)} {unit}{best.fewer}"
-    )
-    said = {name: f"{run.label(name)} {number(mean.value)}{mean.fewer}" for name, mean in found.items()}
-    after, beside = (", ".join(said[name] for name in names if name in said) for names in (order[1:], others))
-    text += f", {after}." if after else "."
-    text += f" Beside them: {beside}." if beside else ""
-    asked = worn[worn["metric"] == metric]["scene"].nunique()
-    return text + (f" Over {len(scenes)} of {asked} scenes." if len(scenes) < asked else "")
-
-
-def run_time(run: Run, frame: pd.DataFrame) -> str:
-    own, reference = pair(frame, NETWORK, run.reference, TIME)
-    if own is None or reference is None or not own.value:
-        return ""
-    text = f"{run.label(NETWORK)} takes {number(own.value)} ms per frame, the simulation "
-    text += f"{number(reference.value)} ms: {number(reference.value / own.value, 2)} times{own.fewer}."
-    whole = pair(frame, NETWORK, run.reference, WHOLE)
-    if whole[0] is None or whole[1] is None:
-        return text
-    return f"{text} From pose to vertices {number(whole[0].value)} and {number(whole[1].value)} ms."
 
 
 def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str], first_only: bool = False) -> str:

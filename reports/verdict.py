@@ -7,7 +7,7 @@ import pandas as pd
 from reports import claims, tables
 from reports.break_even import NETWORK, compared_scenes
 from reports.data import Run
-from reports.means import Mean, mean_of, pair, value_of
+from reports.means import Mean, mean_of, pair, shared_scenes, value_of
 from reports.narrative import fronts, unbroken
 from reports.numbers import number, with_spread
 from reports.overview import leads
@@ -35,17 +35,25 @@ def verdict(run: Run) -> list[tuple[str, str]]:
 
 
 def _near(run: Run, worn: pd.DataFrame) -> str:
-    _, own, *others = (*leads(run, worn), "", "")
-    one, other = pair(worn, own, run.reference, TOTAL)
-    if not own or one is None or other is None:
+    """The network's total energy beside the simulation's, over the scenes that all of page one have."""
+    rows = worn[(worn["metric"] == TOTAL) | ~worn["usable"]]
+    have = set(rows[rows["usable"]]["method"])
+    names = [name for name in leads(run, worn) if name in have]
+    scenes = shared_scenes(rows, names, TOTAL)
+    found = {name: mean_of(rows, name, TOTAL, scenes) for name in names}
+    means = {name: mean for name, mean in found.items() if mean is not None}
+    own = next((name for name in means if run.methods[name].role == "network"), "")
+    if not own or run.reference not in means:
         return ""
+    one, other = means.pop(own), means.pop(run.reference)
     tie = within_uncertainty(one, other) or abs(one.value - other.value) <= _scatter(one, other)
     how = "as low as" if tie else "above" if one.value > other.value else "below"
-    text = f"On {one.scenes} unseen motions {run.label(own)}'s total energy, "
-    text += f"{with_spread(one.value, one.spread_or_uncertainty)} J, is {how} the simulation's, "
+    asked = worn[worn["metric"] == TOTAL]["scene"].nunique()
+    count = f"{len(scenes)} of {asked}" if len(scenes) < asked else str(asked)
+    text = f"On {count} unseen motion{'' if asked == 1 else 's'} {run.label(own)}'s total energy, "
+    text += f"{with_spread(one.value, one.spread_or_uncertainty)} J{one.fewer}, is {how} the simulation's, "
     text += with_spread(other.value, other.spread_or_uncertainty)
-    beside = [(name, mean_of(worn, name, TOTAL)) for name in others if name]
-    words = [f"{run.label(name)} has {number(mean.value)}" for name, mean in beside if mean]
+    words = [f"{run.label(name)} has {number(mean.value)}{mean.fewer}" for name, mean in means.items()]
     return text + (f"; {', '.join(words)}." if words else ".")
 
 
@@ -59,7 +67,7 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
     if own is None or reference is None or not own.value:
         return ""
     text = f"{run.label(NETWORK)} takes {number(own.value)} ms a frame, the simulation "
-    text += f"{number(reference.value)}: {number(reference.value / own.value, 2)} times as long"
+    text += f"{number(reference.value)}: {number(reference.value / own.value, 2)} times as long{own.fewer}"
     more = fronts(run, run.cells("speed", "garments"), scenes, first_only=True) if scenes else ""
     return f"{text}; {more[:1].lower()}{more[1:]}" if more else f"{text}."
 
