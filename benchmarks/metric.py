@@ -12,7 +12,7 @@ and where numbers compare a roll-out with the reference simulation
 which is called with the reference, and with each simulation that is as right as the reference: how far a
 number moves with them is its uncertainty. And where it wants curves beside the trajectory
 
-    series(roll_out: RollOut) -> dict[str, np.ndarray]  name -> (T,)
+    series(roll_out: RollOut) -> dict[str, np.ndarray]  name -> (T,), or (T,V) of every vertex
 
 and where a roll-out that ended well by itself may still have failed
 

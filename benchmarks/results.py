@@ -229,7 +229,7 @@ class RunFolder:
         return self.trajectory_path(scene, f"{method}-quasi-static", seed)
 
     def curves_path(self, scene: str, method: str, seed: int = 0) -> Path:
-        """What was measured of each frame of a trajectory, beside it: name -> (T,)."""
+        """What was measured of each frame of a trajectory, beside it: name -> (T,) or (T,V)."""
         return self.trajectory_path(scene, method, seed).with_suffix(".npz")
 
     def start_path(self, scene: str) -> Path:

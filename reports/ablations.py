@@ -20,7 +20,7 @@ SHOWN = (
 COMPARED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
 HEAD = (
     Column("garment", "Garment", text=True),
-    Column("method", "Method", text=True, method=True, width="1fr"),
+    Column("method", "Method", text=True, method=True),
 )
 
 

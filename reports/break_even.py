@@ -109,8 +109,8 @@ def crossings(run: Run) -> list[Table]:
             lines.append((garment, network.method, rival.method, why[rival.method], rounded, total))
     columns = (
         Column("garment", "Garment", text=True),
-        Column("method", "Network", text=True, method=True, width="1fr"),
-        Column("solver", "Overtakes", text=True, method=True, width="1.3fr"),
+        Column("method", "Network", text=True, method=True),
+        Column("solver", "Overtakes", text=True, method=True),
         Column("as_good", "As good by", text=True),
         Column("crossing", "From frames on", digits=2, trim=True),
         Column("total_time", "Total time by then", "s"),
@@ -132,7 +132,7 @@ def break_even(folder: Path, run: Run) -> list[Picture]:
     costs = [*others, *trained]
     if not trained or len(costs) < 2:
         return []
-    figure = new_figure(PAGE_WIDTH * 0.8, 3.1)
+    figure = new_figure(PAGE_WIDTH / 2, 2.7)
     axes = figure.subplots()
     frames = np.logspace(0, math.log10(MOST_FRAMES), 200)
     for cost in costs:

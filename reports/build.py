@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 TEMPLATE = Path(__file__).parent / "report.typ"
 # Names of what draw() makes.
 FIGURES = (
-    "break_even.*", "convergence.*", "energy_series_*", "error_against_time*", "frames_*", "hem_*",
-    "performance_profile.*", "stability_maps.*", "throughput.*", "training_*", "training.*",
+    "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "energy_series_*", "error_against_time*",
+    "failures.*", "frames_*", "hem_*", "histograms.*", "known_answers.*", "lead.*", "map_*",
+    "stability_maps.*", "strip_*", "training_*", "training.*",
 )  # fmt: skip
 
 
@@ -77,40 +78,18 @@ def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
     from reports import figures, training
     from reports.break_even import break_even
     from reports.convergence import convergence_curve
-    from reports.profile import performance_profile
+    from reports.roll_outs import draw_roll_outs
     from reports.stability import stability_maps
     from reports.work_precision import error_against_time
 
-    pictures = draw_trajectories(folder, run, problems)
+    pictures = draw_roll_outs(folder, run, lambda path: read_trajectory(folder, path, problems))
     for make in (
-        error_against_time, performance_profile, break_even, figures.throughput,
-        stability_maps,
+        error_against_time, break_even, figures.dots, figures.against_vertices,
+        figures.known_answers, stability_maps,
     ):  # fmt: skip
         pictures += make(folder.figures, run)
     pictures += training.training_curves(folder, run, problems)
     return pictures + convergence_curve(folder, problems)
-
-
-def draw_trajectories(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
-    """What the trajectories on disk show of each scene on a moving body; a broken file becomes a problem."""
-    from reports.figures import energy_series
-    from reports.hem import hem_curves
-    from reports.render import side_by_side
-    from reports.styles import leading
-
-    pictures: list[Picture | None] = []
-    energies = run.worn[run.worn["metric"] == "energy/total"]
-    for scene, rows in energies.groupby("scene", sort=False):
-        seeds = rows.drop_duplicates("method").set_index("method")["seed"]
-        paths = {m: folder.trajectory_path(str(scene), m, int(seeds[m])) for m in leading(run, seeds.index)}
-        read = {method: read_trajectory(folder, path, problems) for method, path in paths.items()}
-        series = {method: trajectory for method, trajectory in read.items() if trajectory is not None}
-        if series:
-            body = read_trajectory(folder, folder.trajectory_path(str(scene), "body"), problems)
-            pictures.append(side_by_side(folder.figures, run, str(scene), series, body))
-            pictures.append(energy_series(folder.figures, run, str(scene), series))
-            pictures.append(hem_curves(folder.figures, run, str(scene), series, body))
-    return [picture for picture in pictures if picture is not None]
 
 
 def read_trajectory(folder: RunFolder, path: Path, problems: list[str]) -> Trajectory | None:

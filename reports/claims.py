@@ -105,16 +105,16 @@ def findings(run: Run) -> list[Table]:
     """The claims that this run can judge, over the scenes of the first garment that both methods share."""
     columns = (
         Column("claim", "Claim", text=True),
-        Column("metric", "Measure", text=True, width="1.2fr"),
-        Column("lower", "First", text=True, method=True, width="1fr"),
+        Column("metric", "Measure", text=True),
+        Column("lower", "First", text=True, method=True),
         Column("claimed", "Claim", text=True),
-        Column("higher", "Second", text=True, method=True, width="1fr"),
+        Column("higher", "Second", text=True, method=True),
         Column("first", "Of the first", mixed=True),
         Column("second", "Of the second", mixed=True),
         Column("difference", "Difference", mixed=True),
         Column("effect", "Effect", mixed=True),
         Column("p", "p", digits=2, mixed=True),
-        Column("verdict", "Here", text=True, width="1fr"),
+        Column("verdict", "Here", text=True),
     )
     rows: list[tuple[Cell, ...]] = [
         (

@@ -1,4 +1,4 @@
-"""The configuration of a run as groups of names and values, for the last pages of the report."""
+"""The configuration of a run as names and values, for the report's page on its protocol."""
 
 from __future__ import annotations
 
@@ -10,37 +10,28 @@ import pandas as pd
 
 from reports.numbers import DASH, duration, number
 
-# What the rows mean, not how they were made: the tables say it. Nor is what earlier runs in the folder did.
-DECLARED = ("format", "metrics", "cases", "earlier", "digests")
+# What the rows mean and where they lie, not how they were made; run.json has it all.
+NOT_SHOWN = (
+    "format", "metrics", "cases", "earlier", "digests", "tasks", "cells", "outdated", "scenes", "methods",
+    "motion_sources", "stages", "body", "garment",
+)  # fmt: skip
 UNITS = {" gb": "GB", " mb": "MB", " seconds": "s"}  # endings of names
+LONGEST = 420  # letters of a value
 
 
-def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Groups {"title", "pairs": [[name, value], ...]} of run.json, whatever it holds, three floors deep.
-
-    Of the scenes and methods that are declared in full, the names alone.
-    """
-    run: dict[str, str] = {}
-    groups: dict[str, dict[str, str]] = {"Run": run}
-    for name, value in config.items():
-        if name in DECLARED or value in (None, "", [], {}):
-            continue
-        if name == "stages":
-            groups["Time of each stage"] = {s["name"]: duration(s["seconds"]) for s in value}
-        elif isinstance(value, dict) and name not in ("scenes", "methods"):
-            groups[_title(name)] = {_title(key): _text(item) for key, item in value.items()}
-        else:
-            run[_title(name)] = _text(list(value) if isinstance(value, dict) else value)
+def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[list[str]]:
+    """Names and values of run.json, whatever it holds, each value in one text."""
+    pairs = {
+        _title(name): _text(value)
+        for name, value in config.items()
+        if name not in NOT_SHOWN and value not in (None, "", [], {})
+    }
     start, end = moment(config.get("started")), moment(config.get("finished"))
     if start and end and (start.tzinfo is None) == (end.tzinfo is None):
-        run["Wall time"] = duration((end - start).total_seconds())
+        pairs["Wall time"] = duration((end - start).total_seconds())
     for name in ("dtype", "threads", "hardware"):
-        run[f"{_title(name)} of the rows"] = ", ".join(sorted(set(frame[name].astype(str)) - {""})) or DASH
-    return [
-        {"title": title, "pairs": [list(pair) for pair in pairs.items()]}
-        for title, pairs in groups.items()
-        if pairs
-    ]
+        pairs[f"{_title(name)} of the rows"] = ", ".join(sorted(set(frame[name].astype(str)) - {""})) or DASH
+    return [[title, text if len(text) <= LONGEST else f"{text[:LONGEST]}…"] for title, text in pairs.items()]
 
 
 def _text(value: Any) -> str:
@@ -51,8 +42,7 @@ def _text(value: Any) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(_text(item) for item in value) or DASH
     if isinstance(value, dict):
-        plain = {name: item for name, item in value.items() if not isinstance(item, dict)}
-        return ", ".join(f"{name} {_text(item)}" for name, item in plain.items()) or DASH
+        return "; ".join(f"{_title(name).lower()} {_text(item)}" for name, item in value.items()) or DASH
     return DASH if value is None else str(value)
 
 

@@ -1,4 +1,4 @@
-"""Energies frame by frame, and frames per second."""
+"""Energies frame by frame, the cells behind the means, curvatures, sizes of meshes, and checks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 from reports.data import Run
 from reports.means import means
 from reports.numbers import number
-from reports.pareto import TIME
 from reports.plotting import (
     PAGE_WIDTH,
     Picture,
@@ -21,6 +20,7 @@ from reports.plotting import (
     log_axis,
     new_figure,
     save,
+    wrapped,
 )
 from reports.styles import leading, style
 
@@ -30,7 +30,12 @@ if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
 
 SERIES_TERMS = ("strain", "bending", "inertia")
-BATCH = "cost/batch"
+DOTTED = ("energy/total", "curvature/error", "penetration/vertices")
+SIZED, VERTICES = ("curvature/error", "curvature/mean"), "mesh/vertices"
+EVERY = 3  # of a roll-out's frames, in histograms
+RARE = 0.01  # [%] the lowest share that they show
+MOST_LINES = 24  # methods that have room below each other
+LEAST = 1e-6  # tolerances away: what is nearer is drawn here
 
 
 def energy_series(folder: Path, run: Run, scene: str, series: Mapping[str, Trajectory]) -> Picture | None:
@@ -73,43 +78,117 @@ def _log_energy_axis(axes: Axes) -> None:
         log_axis(axes, "y")
 
 
-def throughput(folder: Path, run: Run) -> list[Picture]:
-    """Frames per second of each network of the first garment, alone (hollow) and in a batch (full).
-
-    Of the scenes that were measured both ways.
-    """
-    cells = run.cells("garments", "speed")
-    batched = cells[(cells["metric"] == BATCH) & cells["usable"] & (cells["garment"] != "")]
-    if not len(batched):
-        return []
-    garment, scenes = next(iter(run.garments(batched).items()))
-    rows = cells[cells["scene"].isin(scenes) & cells["metric"].isin([TIME, BATCH])]
-    rows = rows.merge(batched[["scene", "method"]].drop_duplicates(), on=["scene", "method"])
-    times = means(rows, "method", "metric")
-    apart = run.standing_apart(batched)
-    methods = [m for m in run.ordered(rows["method"]) if m not in apart and (m, TIME) in times.index]
-    figure = new_figure(PAGE_WIDTH, 0.75 + 0.24 * len(methods))
-    axes = figure.subplots()
-    rates = {m: [1e3 / times[m, TIME].value, 1e3 / times[m, BATCH].value] for m in methods}
-    for place, (method, both) in enumerate(rates.items()):
-        look = style(run, method)
-        axes.plot(both, [place, place], color=look.colour, linewidth=1.6, zorder=2)
-        for rate, fill in zip(both, ("white", look.colour)):
-            axes.plot(rate, place, marker=look.marker, color=look.colour, markerfacecolor=fill, zorder=3)
-        for rate, shift, side in ((min(both), -7, "right"), (max(both), 7, "left")):
-            axes.annotate(
-                number(float(f"{rate:.2e}"), 6, trim=True), (rate, place), (shift, 0), fontsize=8,
-                textcoords="offset points", ha=side, va="center",
-            )  # fmt: skip
-    every = [rate for both in rates.values() for rate in both]
-    axes.set_xlim(min(every) / 1.7, max(every) * 1.7)
-    log_axis(axes, "x")
-    axes.set_yticks(range(len(methods)), [run.label(method) for method in methods])
-    axes.set_ylim(len(methods) - 0.5, -0.5)
-    axes.set_xlabel("frames per second")
-    grid(axes, "x")
-    caption = (
-        f"{garment}: frames per second of each network with its skinning, one frame at a time (hollow) and "
+def dots(folder: Path, run: Run) -> list[Picture]:
+    """The cells behind the means of the first garment: a dot per motion and seed, a bar at the mean."""
+    garment, rows = next(
+        ((g, run.worn[run.worn["garment"] == g]) for g in run.garments(run.worn)), ("", run.worn)
     )
-    caption += "many bodies at once (full), both on one core."
-    return [save(figure, folder, "throughput", caption=caption, kind="throughput")]
+    rows = rows[rows["usable"]]
+    shown = [name for name in DOTTED if name in set(rows["metric"])]
+    methods = leading(run, set(rows[rows["metric"].isin(shown)]["method"]))[:MOST_LINES]
+    if not shown or not methods or not garment:
+        return []
+    found = means(rows[rows["metric"].isin(shown)], "method", "metric")
+    figure = new_figure(PAGE_WIDTH, 0.65 + 0.21 * len(methods))
+    for axes, name in zip(np.atleast_1d(figure.subplots(1, len(shown), sharey=True)), shown):
+        for place, method in enumerate(methods):
+            mean = found.get((method, name))
+            if mean is None:
+                continue
+            look, values = style(run, method), np.array(list(mean.cells.values()))
+            axes.plot(values, np.full(len(values), place), look.marker, color=look.colour, alpha=0.55,
+                markersize=4, linestyle="none")  # fmt: skip
+            axes.plot([mean.value] * 2, [place - 0.36, place + 0.36], color="#111111", linewidth=1.4)
+        every = np.concatenate(
+            [list(found[m, name].cells.values()) for m in methods if (m, name) in found.index]
+        )
+        if every.min() > 0.0 and every.max() > 20.0 * every.min():
+            axes.set_xlim(every.min() / 1.3, every.max() * 1.3)
+            log_axis(axes, "x")
+        axes.set_xlabel(run.metrics[name].heading)
+        grid(axes, "x")
+    figure.axes[0].set_yticks(range(len(methods)), [wrapped(run.label(method), 24) for method in methods])
+    figure.axes[0].set_ylim(len(methods) - 0.4, -0.6)
+    caption = f"{garment}: each motion and seed behind the means; the bar is the mean."
+    return [save(figure, folder, "dots", caption=caption, kind="dots")]
+
+
+def histograms(
+    folder: Path, run: Run, scene: str, series: Mapping[str, Trajectory], rest: np.ndarray | None
+) -> Picture:
+    """How often vertices have which mean curvature, and change of area, in a roll-out; a line per method.
+
+    rest: areas (F,) [m^2] of faces at rest.
+    """
+    from reports.page.vertex_values import area_change, mean_curvature
+
+    methods = leading(run, series)
+    frames = min(series[method].frames for method in methods)
+    some = {m: series[m].positions[frames // 5 : frames : EVERY] for m in methods}
+    panels = {"mean curvature [1/m]": {m: mean_curvature(x, series[m].faces) for m, x in some.items()}}
+    if rest is not None and all(len(series[m].faces) == len(rest) for m in methods):
+        panels["change of area [%]"] = {m: area_change(x, series[m].faces, rest) for m, x in some.items()}
+    figure = new_figure(PAGE_WIDTH, 2.2)
+    for axes, (title, found) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels.items()):
+        ends = [np.percentile(own, (1.0, 98.0)) for own in found.values()]
+        low, high = min(end[0] for end in ends), max(end[1] for end in ends)
+        edges = np.linspace(low, max(high, low + 1e-9), 41)
+        for method in reversed(methods):
+            share = 100.0 * np.histogram(found[method], edges)[0] / found[method].size
+            middles, look = 0.5 * (edges[1:] + edges[:-1]), style(run, method)
+            axes.plot(middles, np.maximum(share, RARE), color=look.colour, linestyle=look.line)
+        axes.set(xlabel=title, ylabel="share of vertices [%]", ylim=(RARE, None))
+        log_axis(axes, "y")
+        grid(axes)
+    legend_above(figure, [style(run, method) for method in methods], lines=True)
+    caption = f"{scene}: of all vertices, in one frame of {EVERY}."
+    return save(figure, folder, "histograms", caption=caption, kind="histograms")
+
+
+def against_vertices(folder: Path, run: Run) -> list[Picture]:
+    """Errors against the number of vertices, a line per method, of the scenes that declare that number."""
+    rows = run.frame[run.frame["usable"]]
+    sizes = rows[rows["metric"] == VERTICES].drop_duplicates("scene").set_index("scene")["value"]
+    rows = rows[rows["scene"].isin(sizes.index) & (rows["method"] != "")]
+    shown = [name for name in SIZED if len(rows[rows["metric"] == name])]
+    if sizes.nunique() < 2 or not shown:
+        return []
+    figure = new_figure(PAGE_WIDTH / 2, 2.5)
+    drawn: set[str] = set()
+    for axes, name in zip(np.atleast_1d(figure.subplots(1, len(shown))), shown):
+        own = rows[rows["metric"] == name].assign(size=lambda r: r["scene"].map(sizes))
+        for method, line in own.groupby("method"):
+            curve = line.groupby("size")["value"].mean()
+            look = style(run, str(method))
+            axes.plot(curve.index, curve.to_numpy(), color=look.colour, marker=look.marker, markersize=4)
+            drawn.add(str(method))
+        axes.set(xlabel="vertices", ylim=(0.0, None))
+        axes.set_ylabel(run.metrics[name].heading)
+        grid(axes)
+    legend_above(figure, [style(run, method) for method in run.ordered(drawn)], lines=False)
+    caption = "The same motion on meshes of several sizes, each beside the simulation on its own mesh."
+    return [save(figure, folder, "against_vertices", caption=caption, kind="sizes")]
+
+
+def known_answers(folder: Path, run: Run) -> list[Picture]:
+    """Every check as a mark: how many tolerances it lies from its known answer."""
+    from reports.tables import checks, tolerances_away
+
+    rows = checks(run)
+    away = np.array([np.nan if (far := tolerances_away(row)) is None else far for row in rows.itertuples()])
+    judged = np.sort(away[np.isfinite(away)])
+    if len(judged) < 2:
+        return []
+    figure = new_figure(PAGE_WIDTH, 1.75)
+    axes = figure.subplots()
+    heights = np.maximum(judged, LEAST)
+    axes.plot(range(1, len(judged) + 1), heights, "o", color="#0072B2", markersize=3)
+    axes.axhline(1.0, color="#D55E00", linewidth=1.2)
+    axes.annotate("tolerance", (1, 1.0), (0, 3), textcoords="offset points", fontsize=8, color="#B04A00")
+    axes.set_ylim(LEAST / 2.0, max(3.0, 2.0 * heights[-1]))
+    axes.set(xlabel="checks, in order", ylabel="tolerances away")
+    log_axis(axes, "y")
+    grid(axes)
+    caption = f"{len(judged)} checks with a known answer: distance from it over the tolerance"
+    caption += f"; {number(LEAST, 1)} stands for all that is less."
+    return [save(figure, folder, "known_answers", caption=caption, kind="known answers")]

@@ -15,9 +15,10 @@ from reports.significance import Effect
 from reports.table import Cell, Column, Table
 
 Block = dict[str, Any]
-LONG = 24  # rows from which a table may run over pages
+LONG = 5  # rows from which a table may run over pages
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
-MOST = 8  # columns of numbers that fit on a page; a wider table goes on below
+NARROW, MOST_WIDE = 12, 40  # letters: what is no longer is not broken, what is longer gets no more room
+MOST = 9  # columns of numbers that fit on a page; a wider table goes on below
 REMARKS = {
     "*": "* A mean over fewer scenes or seeds than in the other rows, for want of the rest.",
     "†": "† The solver left some frames unconverged.",
@@ -44,6 +45,14 @@ def table_blocks(run: Run, table: Table) -> Iterator[Block]:
         yield _block(run, replace(table, columns=columns, rows=tuple(rows), caption=caption))
 
 
+def shortened(table: Table, most: int) -> Table:
+    """Its first rows, and in its note where the others are."""
+    if len(table.rows) <= most:
+        return table
+    left = f"{len(table.rows) - most} more rows are in tables/{table.name}.csv."
+    return replace(table, rows=table.rows[:most], note=f"{left} {table.note}".strip())
+
+
 def _block(run: Run, table: Table) -> Block:
     heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
     places = [place for place in range(len(table.columns)) if place not in heads]
@@ -63,7 +72,7 @@ def _block(run: Run, table: Table) -> Block:
         "note": remarks_of(table, lines),
         "columns": [
             {"title": column.title, "unit": column.unit, "left": column.text, "width": width}
-            for column, width in zip(columns, _widths(columns))
+            for column, width in zip(columns, _widths(columns, cells))
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
         "references": lines[len(table.rows) :],
@@ -89,11 +98,17 @@ def remarks_of(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
     return " ".join([*remarks, *(REMARKS[mark] for mark in sorted(marks))])
 
 
-def _widths(columns: Sequence[Column]) -> list[str]:
-    """Columns of numbers share the width evenly; beside columns of words they take what they need."""
+def _widths(columns: Sequence[Column], cells: Sequence[Sequence[dict[str, str]]]) -> list[str]:
+    """Columns of numbers share the width evenly; beside several columns of words they take what they need,
+    and long words share the rest.
+    """
     if all(not column.text for column in columns[1:]):
         return ["1.4fr" if len(columns) <= FEW else "2.4fr", *["1fr"] * (len(columns) - 1)]
-    return [column.width for column in columns]
+    letters = [max((len(cell["text"]) for cell in own), default=0) for own in cells]
+    return [
+        f"{min(count, MOST_WIDE)}fr" if column.text and count > NARROW else "auto"
+        for column, count in zip(columns, letters)
+    ]
 
 
 def column_texts(
@@ -143,6 +158,16 @@ def figure_block(picture: Picture) -> Block:
     }
 
 
+def row_block(pictures: Sequence[Picture]) -> Block:
+    """Figures side by side."""
+    return {"kind": "row", "items": [figure_block(picture) for picture in pictures]}
+
+
 def list_block(intro: str, items: Sequence[str]) -> Block:
     """A sentence and a list under it."""
     return {"kind": "list", "intro": intro, "items": list(items)}
+
+
+def pairs_block(pairs: Sequence[tuple[str, str]]) -> Block:
+    """Names and what is said of each."""
+    return {"kind": "pairs", "pairs": [list(pair) for pair in pairs]}

@@ -1,4 +1,4 @@
-"""The summary on page one: a few sentences, computed from the numbers and printed as they come out."""
+"""What the run found: a few sentences, computed from the numbers and printed as they come out."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ import pandas as pd
 from reports import claims, tables
 from reports.break_even import NETWORK, compared_scenes, cost_of, crossing, frames_text, rivals
 from reports.data import Run
-from reports.means import mean_of, pair, shared_scenes, value_of
-from reports.numbers import duration, number, with_spread
+from reports.means import value_of
+from reports.numbers import duration, number
 from reports.pareto import (
     SMALLER_STEPS,
-    TIME,
-    WHOLE,
     Point,
     beaten_by,
     fastest,
@@ -25,30 +23,26 @@ from reports.pareto import (
 )
 
 SHOWN = 4  # names of files
-TOTAL, CURVATURE, DISTANCE = "energy/total", "curvature/error", "distance/rms"
+CURVATURE, DISTANCE = "curvature/error", "distance/rms"
 
 
 def summary(run: Run) -> list[tuple[str, str]]:
-    """(topic, sentences), of what the run holds numbers for; means are of the first garment."""
-    scenes = next(iter(run.garments(run.worn).values()), [])
-    worn = run.worn[run.worn["scene"].isin(scenes)]
+    """(topic, sentences), of what the run holds numbers for."""
     cells = run.cells("speed", "garments")
     compared = next(iter(compared_scenes(run, cells).values()), [])
-    has_network = NETWORK in set(worn["method"])
     found = [
-        ("Changed since", changed(run)),
-        ("Total energy", least(run, worn, TOTAL, "J")),
-        ("Wrinkles", least(run, worn, CURVATURE, "1/m")),
-        ("Run time", run_time(run, worn if has_network else cells[cells["scene"].isin(compared)])),
         ("Error against time", fronts(run, cells, compared)),
         ("When training pays", training_pays(run, cells, compared)),
         ("The reference", reference(run, cells[cells["scene"].isin(compared)])),
         ("Claims of the paper", claims.counts(run)),
         ("Known answers", checks(run).strip()),
-        ("Not finished", trouble(run)),
     ]
-    # A number keeps its unit on its line.
-    return [(topic, re.sub(r"(?<=\d) (?=(J|ms|1/m|%)\b|%)", "\u00a0", said)) for topic, said in found if said]
+    return [(topic, unbroken(said)) for topic, said in found if said]
+
+
+def unbroken(text: str) -> str:
+    """A number keeps its unit on its line."""
+    return re.sub(r"(?<=\d) (?=(J|ms|mm|1/m|%)\b|%)", "\u00a0", text)
 
 
 def changed(run: Run) -> str:
@@ -59,46 +53,10 @@ def changed(run: Run) -> str:
     return f"Not as the run wrote them: {', '.join(run.changed[:SHOWN])}{more}. What is said here is of them."
 
 
-def least(run: Run, worn: pd.DataFrame, metric: str, unit: str) -> str:
-    """The networks by a metric, the lowest first, and then what was not trained, over the scenes of all."""
-    rows = worn[(worn["metric"] == metric) | ~worn["usable"]]
-    have = set(rows[rows["usable"]]["method"])
-    networks = [name for name in run.with_role("network") if name in have and not run.methods[name].base]
-    others = [name for name in run.ordered(run.with_role("reference", "bound", "baseline")) if name in have]
-    scenes = shared_scenes(rows, [*networks, *others], metric)
-    means = {name: mean_of(rows, name, metric, scenes) for name in (*networks, *others)}
-    found = {name: mean for name, mean in means.items() if mean is not None}
-    order = sorted((name for name in networks if name in found), key=lambda name: found[name].value)
-    if not order:
-        return ""
-    best = found[order[0]]
-    text = (
-        f"{run.label(order[0])} has {with_spread(best.value, best.spread_or_uncertainty)} {unit}{best.fewer}"
-    )
-    said = {name: f"{run.label(name)} {number(mean.value)}{mean.fewer}" for name, mean in found.items()}
-    after, beside = (", ".join(said[name] for name in names if name in said) for names in (order[1:], others))
-    text += f", {after}." if after else "."
-    text += f" Beside them: {beside}." if beside else ""
-    asked = worn[worn["metric"] == metric]["scene"].nunique()
-    return text + (f" Over {len(scenes)} of {asked} scenes." if len(scenes) < asked else "")
-
-
-def run_time(run: Run, frame: pd.DataFrame) -> str:
-    own, reference = pair(frame, NETWORK, run.reference, TIME)
-    if own is None or reference is None or not own.value:
-        return ""
-    text = f"{run.label(NETWORK)} takes {number(own.value)} ms per frame, the simulation "
-    text += f"{number(reference.value)} ms: {number(reference.value / own.value, 2)} times{own.fewer}."
-    whole = pair(frame, NETWORK, run.reference, WHOLE)
-    if whole[0] is None or whole[1] is None:
-        return text
-    return f"{text} From pose to vertices {number(whole[0].value)} and {number(whole[1].value)} ms."
-
-
-def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
+def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str], first_only: bool = False) -> str:
     """By each error, what beats the network, and the fastest truncated solver that is as accurate."""
     text = ""
-    for metric in ("gap/energy", CURVATURE):
+    for metric in ("gap/energy",) if first_only else ("gap/energy", CURVATURE):
         points = points_of(run, frame, scenes, metric)
         own = next((p for p in points if p.method == NETWORK), None)
         if own is None:
@@ -164,15 +122,6 @@ def checks(run: Run) -> str:
     return text + (
         f"{(tests == 'ok').sum()} of {len(tests)} stress tests converged{others}." if len(tests) else ""
     )
-
-
-def trouble(run: Run) -> str:
-    """How cells ended: what has any usable number has run, whatever became of its other metrics."""
-    best_first = {"stalled": 0, "ok": 1}
-    cells = run.suite("garments", "speed")
-    cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
-    words = counts(cells.drop_duplicates(["scene", "method", "seed"]).sort_index()["status"])
-    return f"Cells of garments and speed: {words}; the reasons stand near the end." if words else ""
 
 
 def counts(statuses: pd.Series) -> str:

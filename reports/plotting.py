@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
 LINE_LETTERS = 115  # of a legend that fit on one line of a figure as wide as the page
+MOST_LINES = 13  # of a legend beside a figure
 GRID = "#E3E3E3"
 _LOOK: dict[Any, Any] = {
     "font.family": "STIXGeneral",
@@ -78,18 +79,17 @@ def log_axis(axes: Axes, which: str) -> None:
 
 
 def power_text(value: float) -> str:
-    """For matplotlib, whose serif font has no raised digits: "0.25", "$2{\\times}10^{-7}$"."""
+    """For matplotlib, whose raised digits are too small to read: "0.25", "2e-7"."""
     if value == 0.0 or 1e-3 <= abs(value) < 1e4:
         return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
     mantissa, _, power = f"{value:.0e}".partition("e")
-    times = "" if mantissa == "1" else rf"{mantissa}{{\times}}"
-    return f"${times}10^{{{int(power)}}}$"
+    return f"{mantissa}e{int(power)}"
 
 
 def wrapped(name: str, width: int = 44) -> str:
     """A long name on several lines, broken after a separator where there is one."""
     lines = [""]
-    for piece in re.findall(r"[^_/ :-]*[_/ :-]?", name):
+    for piece in re.findall(rf"[^_/ :-]{{1,{max(width - 1, 1)}}}[_/ :-]?|[_/ :-]", name):
         if lines[-1] and len(lines[-1]) + len(piece) > width:
             lines.append("")
         lines[-1] += piece
@@ -130,6 +130,17 @@ def save(figure: Figure, folder: Path, name: str, *, caption: str, kind: str, ve
 
 def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
     """One legend for all panels, above them: of lines, or else of markers (of none where that is empty)."""
+    letters = [len(look.label) + 8 for look in entries]
+    columns = _columns(letters, figure.get_figwidth() / PAGE_WIDTH)
+    _legend(figure, entries, lines, loc="outside upper center", ncols=columns)
+
+
+def legend_beside(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
+    """The same in columns to the right."""
+    _legend(figure, entries, lines, loc="outside right center", ncols=-(-len(entries) // MOST_LINES))
+
+
+def _legend(figure: Figure, entries: Sequence[Style], lines: bool, **more: Any) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
@@ -140,18 +151,17 @@ def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> No
             linestyle=look.line if lines or not look.marker else "none",  # type: ignore[arg-type]
             marker="" if lines else look.marker,
             markersize=9 if look.marker == "*" else 6,
-            label=look.label,
+            label=wrapped(look.label, 30),
         )
         for look in entries
     ]
     figure.legend(
         handles=handles,
-        loc="outside upper center",
-        ncols=_columns([len(look.label) + 8 for look in entries], figure.get_figwidth() / PAGE_WIDTH),
         frameon=False,
         handlelength=1.6 if lines else 0.8,
         handletextpad=0.5,
         columnspacing=1.4,
+        **more,
     )
 
 

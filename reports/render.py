@@ -1,134 +1,148 @@
-"""Pictures of garments on the body, side by side for every method at the same frame.
+"""Shaded pictures of meshes: an orthographic camera, a depth buffer, light from the side.
 
-Drawn with matplotlib alone, triangles painted back to front: no OpenGL is needed, whose drivers kill the
-process where there is no display, and every machine gives the same bytes.
+Drawn with numpy alone: no OpenGL is needed, whose drivers kill the process where there is no display, and
+the same machine gives the same bytes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
-from reports.data import Run
-from reports.numbers import number
-from reports.plotting import PAGE_WIDTH, Picture, file_name, new_figure, save, wrapped
-from reports.styles import leading, style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from reference_sim.trajectory import Trajectory
-
-BODY_COLOUR = "#D9CFC6"
-CLOTH_COLOUR = "#7FA8C9"
-LIGHT = (0.35, 0.45, 0.82)  # towards the light, in the camera's axes: right, up, towards
-TALL = 1.24  # height of a view over its width
-LIFT = 0.03  # [m] that cloth is nearer in the order of painting: about a triangle, for it lies on the body
-LETTERS = 15  # of a view's title in an inch
-PER_ROW = 6  # of up to so many views; more share as few rows as there have to be evenly
-INERTIA = "energy/inertia"
+BODY_COLOUR = (0.80, 0.77, 0.74)
+CLOTH_COLOUR = (0.72, 0.33, 0.22)  # mid-tone: folds show in both directions, in grey too
+KEY, FILL = np.array([-0.78, 0.42, 0.46]), np.array([0.7, 0.1, 0.7])  # lights: right, up, towards
+LIFT = 0.012  # [m] that cloth is nearer: a coarse triangle cuts through the skin between its corners
+SAMPLES = 2  # of a pixel along each axis
+CREASE = 0.008  # [m] below its surroundings at which a fold is at its darkest
 
 
 @dataclass(frozen=True)
 class Camera:
-    """An orthographic camera: the middle [m] and the height [m] of what it sees, from the front, a little to
-    the left and above; y is up and the body faces +z.
+    """An orthographic camera: centre (3,) [m] and height [m] of what it sees, turned by `turn` degrees about
+    the vertical, a little from above; y is up and a body faces +z.
     """
 
     centre: np.ndarray
     height: float
+    turn: float = -25.0
 
     def seen(self, positions: np.ndarray) -> np.ndarray:
         """(V,3) [m] -> (V,3): right, up and towards the camera, from the middle of the picture [m]."""
-        side, lift = np.radians(25.0), np.radians(8.0)
-        towards = np.array([np.sin(side) * np.cos(lift), np.sin(lift), np.cos(side) * np.cos(lift)])
-        right = np.array([np.cos(side), 0.0, -np.sin(side)])
-        return (positions - self.centre) @ np.stack([right, np.cross(towards, right), towards], axis=1)
+        return (positions - self.centre) @ _axes(self.turn)
 
 
-def camera_for(positions: np.ndarray) -> Camera:
-    """One that sees all of a garment, positions (V,3) [m], with some of its body."""
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    width = float(np.hypot(high[0] - low[0], high[2] - low[2]))
-    return Camera((low + high) / 2.0, 1.1 * max(float(high[1] - low[1]), width * TALL) + 0.1)
+def _axes(turn: float) -> np.ndarray:
+    side, lift = np.radians(-turn), np.radians(8.0)
+    towards = np.array([np.sin(side) * np.cos(lift), np.sin(lift), np.cos(side) * np.cos(lift)])
+    right = np.array([np.cos(side), 0.0, -np.sin(side)])
+    return np.stack([right, np.cross(towards, right), towards], axis=1)
 
 
-def paint(axes: Axes, meshes: list[tuple[np.ndarray, np.ndarray, str, float]], camera: Camera) -> None:
-    """Draw meshes (positions (V,3) [m], faces (F,3), colour, lift [m]), triangles in order of their depth."""
-    from matplotlib.collections import PolyCollection
-
-    parts = [_shaded(camera.seen(x)[faces], colour, lift) for x, faces, colour, lift in meshes]
-    corners, depths, colours = (np.concatenate(part) for part in zip(*parts))
-    order = np.argsort(depths)
-    # One array, not a list: matplotlib then makes all outlines at once.
-    polygons: Any = corners[order]
-    painted = PolyCollection(polygons, facecolors=colours[order], edgecolors=colours[order], linewidths=0.2)
-    painted.set_in_layout(False)
-    axes.add_collection(painted)
-    half = camera.height / 2.0
-    axes.set(xlim=(-half / TALL, half / TALL), ylim=(-half, half), aspect="equal")
-    axes.set_axis_off()
+def camera_for(positions: Sequence[np.ndarray], turn: float, tall: float) -> Camera:
+    """One that just sees all of these (V,3) [m], in a picture `tall` times as high as wide."""
+    seen = np.concatenate(positions) @ _axes(turn)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    width, height = (high - low)[:2]
+    return Camera(_axes(turn) @ ((low + high) / 2.0), 1.06 * float(max(height, width * tall)), turn)
 
 
-def _shaded(corners: np.ndarray, colour: str, lift: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles (F,3,3) in camera axes -> outlines (F,3,2), depths (F,), colours (F,3), lit on both sides."""
-    from matplotlib.colors import to_rgb
+@dataclass(frozen=True)
+class Surface:
+    """A mesh to be painted: positions (V,3) [m], faces (F,3), a colour (3,) or one of each vertex (V,3)."""
 
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    positions: np.ndarray
+    faces: np.ndarray
+    colour: np.ndarray | tuple[float, float, float]
+    lift: float = 0.0
+
+
+def views(
+    body: Surface | None, cloths: Sequence[Surface], camera: Camera, width: int, height: int
+) -> list[np.ndarray]:
+    """A picture (height,width,3) of each cloth on the same body: colours 0 to 1 on white."""
+    w, h = width * SAMPLES, height * SAMPLES
+    depth, image = np.full(h * w, -np.inf), np.ones((h * w, 3))
+    if body is not None:
+        _paint(body, camera, (w, h), depth, image)
+    pictures = []
+    for cloth in cloths:
+        own, painted = depth.copy(), image.copy()
+        _paint(cloth, camera, (w, h), own, painted)
+        painted = _creased(painted.reshape(h, w, 3), own.reshape(h, w))
+        pictures.append(painted.reshape(height, SAMPLES, width, SAMPLES, 3).mean(axis=(1, 3)))
+    return pictures
+
+
+def _paint(
+    surface: Surface, camera: Camera, size: tuple[int, int], depth: np.ndarray, image: np.ndarray
+) -> None:
+    """Into the buffers (h*w,) and (h*w,3), where the surface is the nearest yet."""
+    w, h = size
+    seen = camera.seen(surface.positions)
+    scale = h / camera.height
+    points = np.stack([w / 2.0 + scale * seen[:, 0], h / 2.0 - scale * seen[:, 1]], axis=1)
+    pixels, faces, weights = _covered(points[surface.faces], w, h)
+    near = np.einsum("pk,pk->p", weights, seen[surface.faces[faces], 2]) + surface.lift
+    np.maximum.at(depth, pixels, near)
+    kept = near == depth[pixels]
+    pixels, corners, weights = pixels[kept], surface.faces[faces[kept]], weights[kept, :, None]
+    normals = (weights * _normals(seen, surface.faces)[corners]).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
-    light = np.array(LIGHT) / np.linalg.norm(LIGHT)
-    brightness = 0.45 + 0.6 * np.clip(normals @ light, 0.0, 1.0)
-    shade = np.clip(brightness[:, None] * np.array(to_rgb(colour)), 0.0, 1.0)
-    return corners[:, :, :2], corners[:, :, 2].mean(axis=1) + lift, shade
+    key, fill = (np.clip(normals @ (light / np.linalg.norm(light)), 0.0, 1.0) for light in (KEY, FILL))
+    own = np.broadcast_to(np.asarray(surface.colour, dtype=float), (len(seen), 3))
+    image[pixels] = (0.36 + 0.72 * key + 0.16 * fill)[:, None] * (weights * own[corners]).sum(axis=1)
 
 
-def chosen_frame(series: Mapping[str, Trajectory], reference: str) -> tuple[int, str]:
-    """The frame worth looking at, and why: where the simulation's inertia is largest, else the middle one.
+def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles (F,3,2) in pixels -> for each pixel in each of them: its number, the face, weights (P,3)."""
+    low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, [w, h])
+    high = np.clip(np.ceil(corners.max(axis=1)).astype(int), 0, [w, h])
+    first, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+    seen = np.flatnonzero((high > low).all(axis=1) & (area != 0.0))  # from its edge one covers nothing
+    low, spans, first, area = low[seen], (high - low)[seen], first[seen], area[seen, None]
+    # Weights of the second and third corner are linear in the pixel: slopes and the value at the low corner.
+    slopes = [
+        np.stack([ac[seen, 1], -ac[seen, 0]], axis=1) / area,
+        np.stack([-ab[seen, 1], ab[seen, 0]], axis=1) / area,
+    ]
+    starts = [(slope * (low + 0.5 - first)).sum(axis=1) for slope in slopes]
+    counts = spans.prod(axis=1)
+    own = np.repeat(np.arange(len(seen)), counts)
+    place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    y, x = np.divmod(place, spans[own, 0])
+    weights: list[np.ndarray] = []
+    for slope, start in zip(slopes, starts):
+        weight = start[own] + slope[own, 0] * x + slope[own, 1] * y
+        kept = weight >= 0.0
+        own, x, y = own[kept], x[kept], y[kept]
+        weights = [one[kept] for one in (*weights, weight)]
+    weights.insert(0, 1.0 - weights[0] - weights[1])
+    kept = weights[0] >= 0.0
+    own, x, y = own[kept], x[kept] + low[own[kept], 0], y[kept] + low[own[kept], 1]
+    return y * w + x, seen[own], np.stack([weight[kept] for weight in weights], axis=1)
 
-    The first fifth is left out, in which a method may still be settling.
-    """
-    frames = min(mesh.frames for mesh in series.values())
-    inertia = series[reference].frame_fields.get(INERTIA) if reference in series else None
-    if inertia is None:
-        return frames // 2, "the middle"
-    first = frames // 5
-    most = first + int(np.argmax(np.nan_to_num(inertia[first:frames])))
-    return most, "where the simulation's inertia term is largest"
+
+def _normals(seen: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(V,3) of vertices, by the areas of their faces."""
+    corners = seen[faces]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    found = np.stack(
+        [np.bincount(faces.ravel(), np.repeat(flat[:, k], 3), len(seen)) for k in range(3)], axis=1
+    )
+    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
 
 
-def side_by_side(
-    folder: Path, run: Run, scene: str, series: Mapping[str, Trajectory], body: Trajectory | None
-) -> Picture:
-    """One picture of a scene: a view per method, all at the same frame from the same place."""
-    last = max(mesh.frames for mesh in series.values())
-    ended = run.ordered(method for method, mesh in series.items() if mesh.frames < last)
-    methods = leading(run, series.keys() - set(ended))
-    whole = {method: series[method] for method in methods}
-    frame, why = chosen_frame(whole | ({"": body} if body else {}), run.reference)
-    camera = camera_for(whole[methods[0]].positions[frame])
-    behind = [(body.positions[frame], body.faces, BODY_COLOUR, 0.0)] if body else []
-    lines = -(-len(methods) // PER_ROW)
-    columns = -(-len(methods) // lines)
-    width = min(PAGE_WIDTH, columns * 1.6)
-    titles = [wrapped(run.label(method), round(LETTERS * width / columns)) for method in methods]
-    room = 0.2 * max(title.count("\n") for title in titles) + 0.25
-    figure = new_figure(width, lines * (width / columns * TALL + room))
-    panels = np.atleast_1d(figure.subplots(lines, columns)).ravel()
-    for axes in panels[len(methods) :]:
-        axes.set_axis_off()
-    for axes, method, title in zip(panels, methods, titles):
-        paint(
-            axes, [*behind, (whole[method].positions[frame], whole[method].faces, CLOTH_COLOUR, LIFT)], camera
-        )
-        axes.set_title(title, color=style(run, method).colour, fontsize=9)
-    caption = f"{scene}: frame {frame} (t = {number(float(whole[methods[0]].times[frame]))} s), {why}."
-    if ended:
-        names = ", ".join(map(run.label, ended))
-        caption += f" Not shown, for they ended before their last frame: {names}."
-    name = f"frames_{file_name(scene)}"
-    return save(figure, folder, name, caption=caption, kind="frames", vector=False)
+def _creased(image: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Darker where the surface lies a little below its surroundings, as in a fold; not behind an arm."""
+    shown = np.isfinite(depth)
+    level, reach = np.where(shown, depth, 0.0), image.shape[1] / 66.0
+    share = np.maximum(gaussian_filter(shown.astype(float), reach), 1e-6)
+    below = np.maximum(gaussian_filter(level, reach) / share - level, 0.0) / CREASE
+    dark = 1.0 - 0.3 * below * np.exp(1.0 - below)
+    return np.clip(np.where(shown[..., None], image * dark[..., None], image), 0.0, 1.0)

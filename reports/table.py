@@ -26,9 +26,8 @@ Cell = float | int | str | Mean | Effect | None
 class Column:
     """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
 
-    text: words, set from the left; method: names of methods, printed by their labels. width: "auto", or a
-    share of the page's width as "1fr". digits: of its numbers; trim: without zeros at their end; mixed: of
-    several units, whose decimal points need not stand in a column.
+    text: words, set from the left; method: names of methods, printed by their labels. digits: of its numbers;
+    trim: without zeros at their end; mixed: of several units, whose points need not stand in a column.
     """
 
     name: str
@@ -36,7 +35,6 @@ class Column:
     unit: str = ""
     text: bool = False
     method: bool = False
-    width: str = "auto"
     digits: int = 3
     trim: bool = False
     mixed: bool = False

@@ -19,13 +19,14 @@ from reports.break_even import crossings
 from reports.claims import findings
 from reports.data import SUITES, Run
 from reports.means import means
+from reports.overview import overview
 from reports.pareto import ERRORS, TIME, WHOLE
 from reports.table import Cell, Column, Table, metric_column, table
 
 BY_SCENE = ("suite", "scene")  # what groups the lines of a table that is not averaged over scenes
-METHOD = Column("method", "Method", text=True, method=True, width="1fr")
+METHOD = Column("method", "Method", text=True, method=True)
 GARMENT, SCENE, SUITE = (Column(name, name.capitalize(), text=True) for name in ("garment", "scene", "suite"))
-REASON = Column("reason", "Reason", text=True, width="2fr")
+REASON = Column("reason", "Reason", text=True)
 
 
 def make_tables(run: Run) -> dict[str, Table]:
@@ -33,8 +34,8 @@ def make_tables(run: Run) -> dict[str, Table]:
     names = list(dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table))
     found = [made for name in names for made in (*by_garment(run, name), *by_scene(run, name))]
     for make in (
-        findings, ablations, ablation_effects, crossings, speed, validation, extremes, unfinished,
-        metrics,
+        overview, findings, ablations, ablation_effects, crossings, speed, validation, extremes,
+        unfinished, metrics,
     ):  # fmt: skip
         found += make(run)
     return {made.name: made for made in found}
@@ -125,7 +126,7 @@ def validation(run: Run) -> list[Table]:
         for row in checks(run).itertuples()
     ]
     columns = (
-        Column("check", "Check", text=True, width="1fr"),
+        Column("check", "Check", text=True),
         Column("unit", "Unit", text=True),
         Column("measured", "Measured", digits=7, trim=True),
         Column("expected", "Expected", digits=7, trim=True),
@@ -171,11 +172,11 @@ def extremes(run: Run) -> list[Table]:
         for r in rows.itertuples()]  # fmt: skip
     unit = rows["unit"].iloc[0] if len(rows) else ""
     columns = (
-        Column("case", "Case", text=True, width="1fr"),
+        Column("case", "Case", text=True),
         Column("method", "Method", text=True, method=True),
         Column("outcome", "Outcome", text=True),
         Column("gradient", "Largest gradient", unit, digits=2, trim=True),
-        Column("reason", "In words", text=True, width="2fr"),
+        Column("reason", "In words", text=True),
     )
     return table("extremes", columns, lines, "Every stress test and how it ended.")
 
@@ -199,7 +200,7 @@ def unfinished(run: Run) -> list[Table]:
     rows = run.frame[(run.frame["status"] != "ok") & ~judged_elsewhere]
     names = ["suite", "scene", "method", "seed", "status", "reason"]
     lines = rows[names].drop_duplicates().itertuples(index=False)
-    columns = (SUITE, Column("scene", "Scene", text=True, width="1fr"),
+    columns = (SUITE, Column("scene", "Scene", text=True),
         Column("method", "Method", text=True, method=True),
         Column("seed", "Seed", text=True), Column("status", "Status", text=True), REASON)  # fmt: skip
     cells = [(*line[:5], line[5] or "no reason given") for line in lines]

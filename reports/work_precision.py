@@ -31,10 +31,12 @@ from reports.plotting import (
     file_name,
     grid,
     legend_above,
+    legend_beside,
     log_axis,
     new_figure,
     power_text,
     save,
+    wrapped,
 )
 from reports.styles import family_style, style
 
@@ -46,12 +48,34 @@ if TYPE_CHECKING:
 OWN_STEP = ("gap/energy", "gap/relative", "step/curvature", "step/distance", "gradient/norm")
 DECADES = 9  # below the largest error; what is smaller is drawn on the lower edge
 GREY = "#B4B4B4"
+MOST_PANELS, MOST_SCENES = 4, 9  # in the PDF; the page has all
 
 
 def error_against_time(folder: Path, run: Run) -> list[Picture]:
-    """One figure per scene: a panel per error, a marker per method, members of a family joined by a line.
+    """Of the leading scene the first error for page one, then all errors; then the first error of each scene.
 
-    The first garment comes first, and of its scenes the one on which most methods ran.
+    A marker per method, members of a family joined by a line.
+    """
+    frame, scenes = compared_cells(run)
+    shown = {}
+    for scene in scenes:
+        rows = frame[frame["scene"] == scene]
+        points = {name: found for name in ERRORS if len(found := error_points(run, rows, name)) > 1}
+        if points:
+            shown[scene] = (rows, [(run.metrics[name], found) for name, found in points.items()])
+    if not shown:
+        return []
+    rows, panels = next(iter(shown.values()))
+    pictures = [_draw_errors(folder, run, rows, panels[:1], lead=True)]
+    if len(panels) > 1:
+        pictures.append(_draw_errors(folder, run, rows, panels[:MOST_PANELS]))
+    others = [(own, found[0]) for own, found in shown.values()][1:MOST_SCENES]
+    return pictures + _draw_scenes(folder, run, others)
+
+
+def compared_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:
+    """The rows of these plots, and their scenes: those of the first garment come first, and of these the ones
+    on which most methods were timed.
     """
     cells = run.cells("speed", "garments")
     timed = cells[cells["usable"] & (cells["metric"] == TIME)]
@@ -59,17 +83,8 @@ def error_against_time(folder: Path, run: Run) -> list[Picture]:
     frame = cells[~cells["method"].isin(apart)]
     ran = timed[~timed["method"].isin(apart)].groupby("scene")["method"].nunique()
     first = next(iter(run.garments(frame).values()), [])
-    pictures: list[Picture] = []
-    for scene in sorted(dict.fromkeys(frame["scene"]), key=lambda s: (s not in first, -int(ran.get(s, 0)))):
-        rows = frame[frame["scene"] == scene]
-        panels = [
-            (run.metrics[name], points) for name in ERRORS if len(points := error_points(run, rows, name)) > 1
-        ]
-        if panels:
-            if not pictures:
-                pictures.append(_draw_errors(folder, run, rows, panels[:2], lead=True))
-            pictures.append(_draw_errors(folder, run, rows, panels))
-    return pictures
+    scenes = [scene for scene in dict.fromkeys(frame["scene"]) if scene in ran]
+    return frame, sorted(scenes, key=lambda scene: (scene not in first, -int(ran[scene])))
 
 
 def metric_against_metric(folder: Path, run: Run, x: str, y: str, scenes: Sequence[str]) -> Picture | None:
@@ -117,13 +132,13 @@ def _draw_errors(
     panels: Sequence[tuple[Metric, list[Point]]],
     lead: bool = False,
 ) -> Picture:
-    """All panels of one scene; as the lead of page one only some of them, with a short caption."""
+    """All panels of one scene; the one of page one is wide and has its legend beside it."""
     scene = rows["scene"].iloc[0]
     time = run_time(rows)
     words = "pose to vertices" if time == WHOLE else "own work"
     reference = value_of(rows, run.reference, time)
     lines, columns = -(-len(panels) // 2), min(2, len(panels))
-    figure = new_figure(PAGE_WIDTH * (1.0 if columns > 1 else 0.6), 0.9 + (1.7 if lead else 2.3) * lines)
+    figure = new_figure(PAGE_WIDTH, 2.05 if lead else 0.75 + 2.0 * lines)
     every = np.atleast_1d(figure.subplots(lines, columns)).ravel()
     for axes in every[len(panels) :]:
         axes.set_axis_off()
@@ -132,31 +147,44 @@ def _draw_errors(
     for axes, (metric, points) in zip(every, panels):
         bands.append(indistinct(run, rows, metric.name))
         below |= _draw_points(axes, run, points, reference, bands[-1])
-        unit = "" if metric.unit == "1" else f" [{metric.unit}]"
-        axes.set(xlabel=f"run time, {words} [ms per frame]", title=f"{metric.title}{unit}")
+        axes.set(xlabel=f"run time, {words} [ms per frame]", title=metric.heading)
         grid(axes)
     shown = [p for _, points in panels for p in points]
-    _legend(figure, run, shown, reference)
-    brief = f"{scene}: error against run time, both logarithmic; lower left is better. Pale line: the best "
-    brief += "of all methods at each time."
-    caption = f"{brief} Joined: one family, its first and last number beside."
-    if reference:
-        caption += f" Dotted: the converged simulation, {number(reference)} ms."
-    if any(p.time_spread or p.error_spread for p in shown):
-        caption += (
-            " Bars: run time, the range of repeats (without them, two standard deviations over seeds); "
-        )
-        caption += "error, one standard deviation over seeds or, where larger, what another simulation as "
-        caption += "right as the reference changes."
-    if any(bands):
-        caption += " Grey: as near as such simulations are to each other; of the gap, what the reference "
-        caption += "leaves where contact planes are searched at the end of its steps. A tenth of that is the "
-        caption += "lower edge."
+    _legend(figure, run, shown, reference, beside=lead)
+    caption = f"{scene}: lower left is better. Pale line: the best at each time. Grey: within the "
+    caption += "reference's uncertainty."
     if lead:
-        return save(figure, folder, "error_against_time", caption=brief, kind="lead")
-    name = f"error_against_time_{file_name(scene)}"
+        return save(figure, folder, "error_against_time", caption=caption, kind="lead")
+    caption += f" Dotted: the converged simulation, {number(reference)} ms." if reference else ""
+    caption += " Joined: one family, its first and last number beside. Bars: repeats and seeds or, where "
+    caption += "larger, what another simulation as right as the reference changes."
     caption += _hollow(run, below) + _fewer(run, shown)
+    name = f"error_against_time_{file_name(scene)}"
     return save(figure, folder, name, caption=caption, kind="speed")
+
+
+def _draw_scenes(
+    folder: Path, run: Run, scenes: Sequence[tuple[pd.DataFrame, tuple[Metric, list[Point]]]]
+) -> list[Picture]:
+    """A small panel for each scene."""
+    if not scenes:
+        return []
+    columns = min(4, len(scenes))
+    lines = -(-len(scenes) // columns)
+    figure = new_figure(PAGE_WIDTH, 0.35 + 1.45 * lines)
+    every = np.atleast_1d(figure.subplots(lines, columns)).ravel()
+    for axes in every[len(scenes) :]:
+        axes.set_axis_off()
+    for axes, (rows, (metric, points)) in zip(every, scenes):
+        reference = value_of(rows, run.reference, run_time(rows))
+        _draw_points(axes, run, points, reference, indistinct(run, rows, metric.name), small=True)
+        axes.set_title(wrapped(str(rows["scene"].iloc[0]), 24), fontsize=8)
+        axes.tick_params(labelsize=7)
+        grid(axes)
+    figure.supxlabel("run time [ms per frame]", fontsize=8.5)
+    titles = dict.fromkeys(metric.heading for _, (metric, _) in scenes)
+    caption = f"The same of other scenes, in the colours above: {', '.join(titles)} against run time."
+    return [save(figure, folder, "error_against_time_scenes", caption=caption, kind="scenes")]
 
 
 def _hollow(run: Run, below: set[str]) -> str:
@@ -169,15 +197,18 @@ def _fewer(run: Run, points: Sequence[Point]) -> str:
     return f" Seeds that did not finish are left out: {', '.join(words)}." if words else ""
 
 
-def _legend(figure: Figure, run: Run, points: Sequence[Point], reference: float | None) -> None:
+def _legend(
+    figure: Figure, run: Run, points: Sequence[Point], reference: float | None, beside: bool = False
+) -> None:
     methods = [run.methods[name] for name in run.ordered(p.method for p in points)]
     looks = {method.family: family_style(run, method) for method in methods}
     dotted = [replace(style(run, run.reference), marker="", line=":")] if reference else []
-    legend_above(figure, [*dotted, *looks.values()], lines=False)
+    legend = legend_beside if beside else legend_above
+    legend(figure, [*dotted, *looks.values()], lines=False)
 
 
 def _draw_points(
-    axes: Axes, run: Run, points: Sequence[Point], reference: float | None, band: float
+    axes: Axes, run: Run, points: Sequence[Point], reference: float | None, band: float, small: bool = False
 ) -> set[str]:
     """The markers of one panel; returns the methods whose error is too small for it."""
     # What cannot be told from the reference needs no decades of its own.
@@ -196,13 +227,21 @@ def _draw_points(
             edge if hollow else point.error,
             xerr=[[min(point.time_spread / 2, 0.9 * point.time)], [point.time_spread / 2]],
             yerr=[[min(point.error_spread, 0.9 * abs(point.error))], [point.error_spread]],
-            color=colour, marker=look.marker, markersize=5.5, linestyle="none", elinewidth=0.8, zorder=3,
+            color=colour, marker=look.marker, markersize=3.5 if small else 5.5, linestyle="none",
+            elinewidth=0.8, zorder=3,
             markerfacecolor="white" if hollow else colour,
         )  # fmt: skip
         if run.methods[point.method].level is not None:
             families.setdefault(run.methods[point.method].family, []).append(point)
     for members in families.values():
-        _join(axes, run, sorted(members, key=lambda p: run.methods[p.method].level or 0.0), least, edge)
+        _join(
+            axes,
+            run,
+            sorted(members, key=lambda p: run.methods[p.method].level or 0.0),
+            least,
+            edge,
+            named=not small,
+        )
     if band:
         axes.axhspan(edge / 10.0, band, color="#F0F0F0", zorder=0)
     if reference:
@@ -212,16 +251,16 @@ def _draw_points(
     return {p.method for p in points if p.error <= least}
 
 
-def _join(axes: Axes, run: Run, members: Sequence[Point], least: float, edge: float) -> None:
-    """The line through a family, its first and last member marked by their numbers."""
+def _join(axes: Axes, run: Run, members: Sequence[Point], least: float, edge: float, named: bool) -> None:
+    """The line through a family, its first and last member marked by their numbers where they are named."""
     look = family_style(run, run.methods[members[0].method])
     heights = [point.error if point.error > least else edge for point in members]
     times = [point.time for point in members]
     axes.plot(times, heights, color=look.colour, linestyle=look.line, linewidth=0.9, zorder=2)
-    for place in sorted({0, len(members) - 1}):
+    for place in sorted({0, len(members) - 1}) if named else ():
         text = power_text(run.methods[members[place].method].level or 0.0)
         spot = (times[place], heights[place])
-        axes.annotate(text, spot, (4, 3), textcoords="offset points", fontsize=6.5, color=look.colour)
+        axes.annotate(text, spot, (4, 3), textcoords="offset points", fontsize=7, color=look.colour)
 
 
 def _limits(axes: Axes, points: Sequence[Point], reference: float | None, least: float) -> float:

@@ -197,6 +197,10 @@ def test_one_scale_serves_all_methods_of_a_scene():
         found = values(module.measure(roll_out))
         assert found["gap/relative"] == pytest.approx(found["gap/energy"] / scale, rel=1e-12)
         assert ("gap/scale" in found) == (roll_out is group.reference)
+        away = module.series(roll_out)["step/vertices"]
+        assert away.shape == x.shape[:2] and np.isnan(away[: scene.warm_up]).all()
+        rms = np.sqrt((away[scene.warm_up :] ** 2).mean(axis=1))
+        assert rms.mean() == pytest.approx(found["step/distance"], rel=1e-5, abs=1e-9)
     alone = roll_outs(scene)
     assert gap_scale(alone) is None
 

@@ -6,7 +6,18 @@ import numpy as np
 from report_folder import FRAMES, mesh, row, run_of, sheet, write_model
 
 from benchmarks.results import RunFolder
-from reports import build, figures, hem, render, stability, styles, training, work_precision
+from reports import (
+    build,
+    figures,
+    hem,
+    pictures,
+    render,
+    roll_outs,
+    stability,
+    styles,
+    training,
+    work_precision,
+)
 from reports.pareto import Point
 
 
@@ -93,17 +104,77 @@ def test_a_stop_is_where_the_body_no_longer_moves(tmp_path):
     assert hem.overshoot(curves["creeps"], 12) == 0.0
 
 
-def test_what_ended_early_moves_nobody_elses_picture(tmp_path):
-    cloth, faces = sheet(0.1)
+def filmed(tmp_path, methods, height=0.1):
+    cloth, faces = sheet(height)
     inertia = {"energy/inertia": np.array([0.0, 0.0, 1.0, 5.0, 2.0])}
-    series = {}
-    for method, frames in (("simulation", FRAMES), ("snug", FRAMES), ("lbfgs-5", 2)):
-        fields = {name: values[:frames] for name, values in inertia.items()}
-        series[method] = mesh(cloth[:frames], faces, fields)
-    run = run_of([row(method=method) for method in series])
-    picture = render.side_by_side(tmp_path, run, "tshirt/a", series, None)
+    series = {
+        method: mesh(cloth[:frames], faces, {name: values[:frames] for name, values in inertia.items()})
+        for method, frames in methods.items()
+    }
+    return pictures.Filmed("tshirt/a", series, mesh(*sheet(0.0), {}))
+
+
+def test_what_ended_early_moves_nobody_elses_picture(tmp_path):
+    shown = filmed(tmp_path, {"simulation": FRAMES, "snug": FRAMES, "lbfgs-5": 2})
+    run = run_of([row(method=method) for method in shown.series])
+    picture = pictures.side_by_side(tmp_path, run, shown, ["simulation", "snug"])
     assert "frame 3 " in picture.caption
-    assert "Not shown, for they ended before their last frame: L-BFGS, 5 iterations." in picture.caption
+    assert "Not shown, for they ended before it: L-BFGS, 5 iterations." in picture.caption
+
+
+def test_the_frame_of_page_one_is_one_whose_step_was_judged(tmp_path):
+    shown = filmed(tmp_path, {"simulation": FRAMES, "snug": FRAMES})
+    for cloth in shown.series.values():
+        cloth.frame_fields["step/vertices"] = np.zeros((FRAMES, 16))
+        cloth.frame_fields["step/vertices"][3] = np.nan
+    assert shown.chosen_frame(["simulation", "snug"], "simulation")[0] == 4
+    shown.series["snug"].frame_fields["step/vertices"][4, :4] = 7.0
+    scale = pictures.scales(shown, ["simulation", "snug"], 4, "simulation")["step"]
+    assert scale.top == 7.0
+    pale, dark = scale.colours("simulation")[0], scale.colours("snug")[0]
+    assert dark.mean() < pale.mean() - 0.3  # told apart in grey
+
+
+def test_a_view_shows_the_nearer_surface_and_what_lies_behind_around_it():
+    cloth, faces = sheet(0.1)
+    camera = render.camera_for([cloth[0]], 0.0, 1.0)
+    body = render.Surface(cloth[0] * [1.0, 1.0, 0.0], faces, (0.0, 0.0, 1.0))
+    front = render.Surface(cloth[0], faces, (1.0, 0.0, 0.0))
+    image, other = render.views(
+        body, [front, render.Surface(cloth[0] - [0, 0, 0.2], faces, (0, 1, 0))], camera, 60, 60
+    )
+    assert image.shape == (60, 60, 3) and image[0, 0].min() == 1.0  # white around
+    assert image[30, 30, 0] > 0.3 > image[30, 30, 2] and other[30, 30, 2] > 0.3 > other[30, 30, 1]
+    # A corner of the mesh comes to where the camera says that it is.
+    x, y, _ = camera.seen(cloth[0])[0]
+    column, line = int(30 + 60 * x / camera.height), int(30 - 60 * y / camera.height)
+    assert image[line - 2, column + 2].max() < 1.0 or image[line - 2, column + 2, 2] < 0.9
+
+
+def test_light_from_the_side_tells_a_fold_from_a_sheet():
+    x, y = np.meshgrid(np.linspace(-0.3, 0.3, 61), np.linspace(1.0, 1.4, 41))
+    corner = (np.arange(40)[:, None] * 61 + np.arange(60)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + 1, corner + 62], 1), np.stack([corner, corner + 62, corner + 61], 1)]
+    )
+
+    def shades(depth: float) -> float:
+        points = np.stack([x.ravel(), y.ravel(), depth * np.sin(40.0 * x.ravel())], axis=1)
+        camera = render.camera_for([points], 0.0, 0.7)
+        (image,) = render.views(None, [render.Surface(points, faces, render.CLOTH_COLOUR)], camera, 90, 63)
+        return float(image[20:43, 20:70].mean(axis=2).std())
+
+    assert shades(0.01) > 0.04 > 5.0 * shades(0.0)
+
+
+def test_a_failure_is_shown_at_its_worst_frame(tmp_path):
+    rows = [row("tshirt/a", m, "energy/strain", v) for m, v in (("simulation", 0.1), ("snug", 2.0))]
+    folder, run = RunFolder(tmp_path), run_of(rows)
+    cloth, faces = sheet(0.1)
+    strain = {"energy/strain": np.array([0.0, 9.0, 1.0, 1.0, 1.0])}
+    assert roll_outs._failures(folder, run, lambda path: None) == []
+    (picture,) = roll_outs._failures(folder, run, lambda path: mesh(cloth, faces, strain))
+    assert picture.path.is_file() and picture.kind == "failures"
 
 
 def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
@@ -156,22 +227,64 @@ def test_a_map_of_every_outcome_is_drawn_from_what_its_cases_declare(tmp_path):
     assert blues == sorted(blues, reverse=True) and blues[0] == blues[1] and blues[3] == blues[4]
 
 
-def test_throughput_is_of_the_scenes_that_were_measured_both_ways(tmp_path, monkeypatch):
-    cost = {"unit": "ms", "method": "snug"}
-    rows = [row(metric="cost/frame", value=0.5, **cost), row(metric="cost/batch", value=0.1, **cost)]
-    rows += [row("tshirt/jump", metric="cost/frame", value=9.0, **cost)]
-    rows += [row(metric="cost/frame", value=70.0, unit="ms", method="simulation")]
-    ablation = {"unit": "ms", "method": "snug-springs"}
-    rows += [row(metric="cost/frame", **ablation), row(metric="cost/batch", **ablation)]
-    drawn = []
-    monkeypatch.setattr(figures, "save", lambda figure, *_, **more: drawn.append(figure) or more["caption"])
-    assert figures.throughput(tmp_path, run_of(rows))[0].startswith("tshirt: frames per second")
-    (axes,) = drawn.pop().axes
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["SNUG"]
-    assert [list(line.get_xdata()) for line in axes.get_lines()] == [[2000.0, 10000.0], [2000.0], [10000.0]]
-    figures.throughput(tmp_path, run_of(rows[-2:]))  # without its base the ablation stands for itself
-    assert [label.get_text() for label in drawn.pop().axes[0].get_yticklabels()] == ["SNUG, springs"]
-    assert figures.throughput(tmp_path, run_of(rows[3:4])) == []
+def drawn_by(monkeypatch, make, *given):
+    """The figures that a function saves."""
+    figures_, name = [], make.__module__
+    monkeypatch.setattr(f"{name}.save", lambda figure, *_, **more: figures_.append(figure) or more["caption"])
+    make(*given)
+    return figures_
+
+
+def test_a_dot_stands_for_each_motion_and_seed(tmp_path, monkeypatch):
+    rows = [
+        row(s, "snug", "energy/total", v, seed=k)
+        for s in ("tshirt/a", "tshirt/b")
+        for k, v in enumerate((1, 3))
+    ]
+    (figure,) = drawn_by(monkeypatch, figures.dots, tmp_path, run_of(rows))
+    dots, bar = figure.axes[0].get_lines()
+    assert sorted(dots.get_xdata()) == [1.0, 1.0, 3.0, 3.0] and list(bar.get_xdata()) == [2.0, 2.0]
+    assert figures.dots(tmp_path, run_of([row("flag", garment="")])) == []
+
+
+def test_errors_are_drawn_against_the_vertices_that_scenes_declare(tmp_path, monkeypatch):
+    sizes = {"mesh/a": 500.0, "mesh/b": 2000.0}
+    rows = [row(s, "simulation", "mesh/vertices", n, suite="validation", unit="1") for s, n in sizes.items()]
+    rows += [row(s, "snug", "curvature/error", n / 100.0, unit="1/m") for s, n in sizes.items()]
+    (figure,) = drawn_by(monkeypatch, figures.against_vertices, tmp_path, run_of(rows))
+    (line,) = figure.axes[0].get_lines()
+    assert list(line.get_xdata()) == [500.0, 2000.0] and list(line.get_ydata()) == [5.0, 20.0]
+    assert figures.against_vertices(tmp_path, run_of(rows[2:])) == []
+
+
+def test_histograms_hold_every_vertex_once(tmp_path, monkeypatch):
+    cloth, faces = sheet(0.1)
+    run = run_of([row(method="simulation")])
+    areas = np.full(len(faces), 0.5 * (0.4 / 3) * (0.5 / 3))
+    (figure,) = drawn_by(
+        monkeypatch,
+        figures.histograms,
+        tmp_path,
+        run,
+        "tshirt/a",
+        {"simulation": mesh(cloth, faces, {})},
+        areas,
+    )
+    shares = [line.get_ydata() for axes in figure.axes for line in axes.get_lines()]
+    assert len(shares) == 2 and all(np.isclose(own[own > figures.RARE].sum(), 100.0) for own in shares)
+
+
+def test_checks_are_drawn_by_their_tolerances_in_order(tmp_path, monkeypatch):
+    more = {
+        "suite": "validation",
+        "method": "simulation",
+        "metric": "check",
+        "expected": 0.0,
+        "tolerance": 2.0,
+    }
+    rows = [row(f"case {k}", value=v, **more) for k, v in enumerate((1.0, 0.5, 0.0))]
+    (figure,) = drawn_by(monkeypatch, figures.known_answers, tmp_path, run_of(rows))
+    assert list(figure.axes[0].get_lines()[0].get_ydata()) == [figures.LEAST, 0.25, 0.5]
 
 
 def test_only_what_was_drawn_is_read(tmp_path):
@@ -181,4 +294,5 @@ def test_only_what_was_drawn_is_read(tmp_path):
     path = folder.trajectory_path("tshirt/there_and_back", "snug")
     path.parent.mkdir(parents=True)
     path.write_bytes(b"no mesh")
-    assert build.draw_trajectories(folder, run, problems) == [] and problems == []
+    read = lambda path: build.read_trajectory(folder, path, problems)  # noqa: E731
+    assert roll_outs.draw_roll_outs(folder, run, read) == [] and problems == []

@@ -17,10 +17,12 @@ from reports import numbers
 from reports.ablations import ablation_effects, ablations
 from reports.data import run_data
 from reports.document import document
-from reports.layout import table_blocks
+from reports.layout import shortened, table_blocks
 from reports.means import Mean, mean_of, pair
-from reports.narrative import least, run_time, summary, trouble
+from reports.narrative import summary
+from reports.overview import ROWS, leads
 from reports.tables import make_tables, map_points, merged
+from reports.verdict import endings, failures, verdict
 
 
 def seeds_of(method, metric, values, **more):
@@ -134,11 +136,11 @@ def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
 
 
 def test_a_wide_table_goes_on_below_with_its_heads():
-    rows = [row(metric=f"energy/{k}", value=float(k)) for k in range(11)]
+    rows = [row(metric=f"energy/{k}", value=float(k)) for k in range(13)]
     run = run_of(rows)
     blocks = list(table_blocks(run, make_tables(run)["energies"]))
     heads = [[column["title"] for column in block["columns"]] for block in blocks]
-    assert [len(head) for head in heads] == [7, 6] and {head[0] for head in heads} == {"Method"}
+    assert [len(head) for head in heads] == [8, 7] and {head[0] for head in heads} == {"Method"}
     assert blocks[1]["caption"].endswith("(continued)")
 
 
@@ -240,57 +242,53 @@ def test_decimal_points_stand_in_a_column():
 # --- the page -----------------------------------------------------------------------------------------------
 
 
-def test_the_summary_follows_the_numbers():
-    def said(snug: float, pbns: float) -> str:
-        rows = [row(method=m, metric="energy/total", value=v) for m, v in (("snug", snug), ("pbns", pbns))]
-        return dict(summary(run_of(rows)))["Total energy"]
-
-    assert (
-        said(1.0, 2.5) == "SNUG has 1.00\u00a0J, PBNS 2.50."
-        and said(2.5, 1.0) == "PBNS has 1.00\u00a0J, SNUG 2.50."
-    )
+def near(rows) -> str:
+    return dict(verdict(run_of(rows)))["How near"].replace("\u00a0", " ")
 
 
-def test_the_summary_compares_means_over_the_scenes_that_all_have():
-    rows = [row(scene, "snug", "energy/total", v) for scene, v in zip(SCENES, (1.0, 9.0))]
+def test_the_verdict_compares_means_over_the_scenes_that_all_have():
+    rows = on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
+    assert near(rows) == ("On 2 unseen motions SNUG's total energy, 5.00 J, is above the simulation's, 3.75.")
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
-    run = run_of(rows)
-    said = "SNUG has 1.00 J, PBNS 2.00. Over 1 of 2 scenes."
-    assert least(run, run.worn, "energy/total", "J") == said
-    alone = run_of(rows[:2])
-    assert least(alone, alone.worn, "energy/total", "J") == "SNUG has 5.00 J."
+    fewer = "On 1 of 2 unseen motions SNUG's total energy, 1.00 J, is above the simulation's, 0.500; "
+    assert near(rows).startswith(fewer + "PBNS has 2.00")
     # The reference's twin is no rival, however near it is.
-    twin = [row(s, "simulation-perturbed-1e-9", "energy/total", 1e-8) for s in SCENES]
-    assert least(run_of(rows + twin), run_of(rows + twin).worn, "energy/total", "J") == said
+    assert near(rows + on_two_scenes("simulation-perturbed-1e-9", 0.5, 7.0)) == near(rows)
 
 
-def test_the_summary_says_how_many_seeds_are_left():
-    rows = seeds_of("snug", "energy/total", (1.0, 1.2)) + seeds_of("pbns", "energy/total", (2.0,))
+def test_the_verdict_says_how_many_seeds_are_left():
+    rows = [*seeds_of("snug", "energy/total", (1.0, 1.2)), row(method="simulation", metric="energy/total")]
     rows.append(row(metric="cost/frame", value=None, seed=2, status="diverged", reason="no end"))
-    rows.append(row(method="pbns", metric="cost/frame", value=None, seed=1, status="failed", reason="gone"))
-    run = run_of(rows)
-    said = "SNUG has 1.10 ± 0.14 J (2 of 3 seeds), PBNS 2.00 (1 of 2 seeds)."
-    assert least(run, run.worn, "energy/total", "J") == said
+    assert "1.10 ± 0.14 J (2 of 3 seeds), is as low as" in near(rows)
 
 
 def test_run_times_are_of_the_scenes_that_both_have():
     times = [(SCENES[0], "snug", 9.0), (SCENES[1], "snug", 0.25), (SCENES[1], "simulation", 100.0)]
     run = run_of([row(s, m, "cost/frame", t, unit="ms") for s, m, t in times])
-    assert run_time(run, run.worn) == (
-        "SNUG takes 0.250 ms per frame, the simulation 100 ms: 400 times (1 scene only)."
+    assert (
+        dict(verdict(run))["At what cost"]
+        .replace("\u00a0", " ")
+        .startswith("SNUG takes 0.250 ms a frame, the simulation 100: 400 times as long (1 scene only)")
     )
 
 
-def test_what_did_not_end_well_is_counted_by_cell():
+def test_page_one_counts_every_kind_of_ending():
     rows = [*all_rows(), row("tshirt/walk", "pbns", "energy/bending", status="stalled", reason="a frame")]
-    assert trouble(run_of(rows)).startswith("Cells of garments and speed: 2 failed, 1 skipped, 1 stalled;")
-    assert trouble(run_of(rows[:3])) == ""
+    rows.append(
+        row("tshirt/jump", "pbns", "energy/strain", None, status="timeout", reason="over 600 s", seed=1)
+    )
+    said = endings(run_of(rows))
+    assert (
+        "cells 2 failed, 1 timeout, 1 stalled, 1 skipped; of 3 checks 1 failed; of 2 stress tests 1 timeout"
+        in said
+    )
+    assert endings(run_of(rows[:3])) == "Of 1 cells all ended well."
     # A metric that is not finite, or off its tolerance, fails no cell that has others.
     rows[:3] = [
         *rows[:3],
         row("tshirt/walk", "pbns", "gap/energy", None, status="failed", reason="no number"),
     ]
-    assert "2 failed, 1 skipped, 1 stalled;" in trouble(run_of(rows))
+    assert "cells 2 failed, 1 timeout, 1 stalled, 1 skipped;" in endings(run_of(rows))
 
 
 @pytest.mark.parametrize(
@@ -303,43 +301,76 @@ def test_times_say_what_ran_beside(workers, said):
 
 
 def test_sections_exist_only_for_what_ran():
-    check = row("falls", "simulation", "check", 0.0, suite="validation", expected=0.0, tolerance=1.0)
-    run = run_of([check])
+    check = row("falls", "simulation", "check", 0.5, suite="validation", expected=0.0, tolerance=1.0)
+    failed = dataclasses.replace(check, scene="sag", status="failed", reason="off")
+    run = run_of([check, failed])
     made_tables = make_tables(run)
     content = document(run, made_tables, [], [])
-    assert [section["title"] for section in content["sections"]] == ["Validation: known answers"]
-    assert content["definitions"] == [] and content["lead"] is None and content["main"] == []
+    assert [section["title"] for section in content["sections"]] == ["Findings", "Validation"]
+    assert content["definitions"] == content["first"]["verdict"] == content["first"]["blocks"] == []
     assert set(made_tables) == {"validation", "metrics"}
+    (block,) = content["sections"][1]["blocks"]
+    assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
 
 
-def test_every_metric_in_a_table_is_defined_as_it_defines_itself():
+def test_every_metric_of_a_printed_table_is_defined_as_it_defines_itself():
     run = run_of(all_rows())
-    groups = document(run, make_tables(run), [], [])["definitions"]
-    assert [group["title"] for group in groups] == ["Energies", "Cost", "Curvature"]
-    assert ["Strain [J]", "definition of energy/strain"] in groups[0]["pairs"]
+    definitions = dict(document(run, make_tables(run), [], [])["definitions"])
+    assert (
+        definitions["Strain [J]"] == "definition of energy/strain" and "Curvature error [1/m]" in definitions
+    )
 
 
-def test_other_suites_stand_scene_by_scene_in_their_sections():
-    run = run_of([*all_rows(), row("tshirt/fast", suite="extremes"), row("tshirt/walk", suite="extremes")])
-    sections = {s["title"]: s["blocks"] for s in document(run, make_tables(run), [], [])["sections"]}
-    (block,) = [b for b in sections["Extremes: where it breaks"] if b["caption"].startswith("Energies")]
-    assert [group["title"] for group in block["groups"]] == [
-        "tshirt/fast"
-    ]  # the walk stands in its own suite
-
-
-def test_the_page_lists_the_stress_tests_that_did_not_converge_and_the_table_all():
+def test_the_report_lists_the_stress_tests_that_did_not_converge_and_the_table_all():
     run = run_of(all_rows())
     made = make_tables(run)
     assert [line[:3] for line in made["extremes"].rows] == [
         ("stiff", "simulation", "converged"), ("teleport", "simulation", "timeout"),
     ]  # fmt: skip
     sections = {s["title"]: s["blocks"] for s in document(run, made, [], [])["sections"]}
-    (block,) = sections["Extremes: where it breaks"]
+    (block,) = sections["Stress"]
     assert [[cell["text"] for cell in line[:3]] for line in block["groups"][0]["rows"]] == [
         ["teleport", "Simulation", "timeout"]
     ]
     assert dict(summary(run))["Known answers"].endswith("1 of 2 stress tests converged; 1 timeout.")
+
+
+def test_page_one_names_the_worst_of_each_kind():
+    stretched = [row("tshirt/kick", m, "energy/strain", v) for m, v in (("simulation", 0.1), ("snug", 0.9))]
+    found = failures(run_of([*all_rows(), *stretched]))
+    assert ("Supervised, tshirt/walk", "failed: diverged at step 7") in found
+    assert any(name == "Simulation, teleport" for name, _ in found)
+    assert ("SNUG, tshirt/kick", "strain 0.900 J, 9.00 times the simulation's") in found
+    assert failures(run_of([row(method="simulation"), row()])) == []  # as much strain is no failure
+
+
+def test_the_verdict_says_tie_only_within_the_uncertainty():
+    def said(snug: float) -> str:
+        rows = seeds_of("snug", "energy/total", (snug, snug + 0.02))
+        return near([*rows, row(method="simulation", metric="energy/total")])
+
+    assert "is as low as the simulation's" in said(0.99)
+    assert "is above the simulation's, 1.00." in said(2.0) and "is below" in said(0.5)
+
+
+def test_page_one_shows_the_network_the_best_of_others_and_a_baseline():
+    run = run_of(all_rows())
+    assert leads(run, run.worn) == ["simulation", "snug", "pbns", "skinning"]
+    better = run_of(
+        [*all_rows(), *(row(s, "supervised", "curvature/error", 0.1, unit="1/m") for s in SCENES)]
+    )
+    assert leads(better, better.worn)[2] == "supervised"
+    assert leads(run, run.worn, ["pbns", "simulation"]) == ["simulation", "pbns"]
+
+
+def test_the_table_of_page_one_stays_short():
+    many = [row(scene, f"mine-{k}", "energy/total", 1.0 + k) for k in range(20) for scene in SCENES]
+    made = make_tables(run_of([*all_rows(), *many]))["overview"]
+    methods = [line[0] for line in made.rows]
+    assert len(methods) <= ROWS and {"simulation", "snug", "skinning"} < set(methods)
+    energies = make_tables(run_of([*all_rows(), *many]))["energies"]
+    short = shortened(energies, 12)
+    assert len(short.rows) == 12 and short.note.startswith("12 more rows are in tables/energies.csv")
 
 
 def test_no_number_of_the_report_is_infinite_or_nan():
@@ -351,7 +382,8 @@ def test_no_number_of_the_report_is_infinite_or_nan():
 def test_the_page_says_how_many_seeds_there_were():
     rows = seeds_of("snug", "energy/strain", (1.0, 1.1, 1.2)) + seeds_of("pbns", "energy/strain", (2.0, 2.1))
     run = run_of(rows + seeds_of("simulation", "energy/strain", (1.0,)))
-    (block,) = document(run, make_tables(run), [], [])["main"]
+    sections = document(run, make_tables(run), [], [])["sections"]
+    block = sections[0]["blocks"][0]
     assert "±: standard deviation over 2 or 3 seeds. Without it: one seed" in block["note"]
 
 

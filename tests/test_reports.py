@@ -17,17 +17,16 @@ from report_folder import (
     all_rows,
     declaration,
     row,
-    run_of,
     sheet,
     write_mesh,
     write_model,
 )
 
 from benchmarks.results import COLUMNS, FORMAT, RunFolder, digest_of_file
-from reports import build, render, training
+from reports import build, training
 from reports.data import run_data
+from reports.document import document
 from reports.means import Mean
-from reports.narrative import summary
 from reports.tables import make_tables
 
 
@@ -79,9 +78,9 @@ def test_every_file_of_the_report_is_there(made):
     wanted = ("energies", "energies_by_scene", "curvature", "cost", "validation", "extremes", "unfinished")
     assert {f"{name}.csv" for name in wanted} <= names
     pictures = {path.name for path in made.figures.iterdir()}
-    for stem in ("energy_series_tshirt-walk", "error_against_time_tshirt-walk", "training"):
+    for stem in ("energy_series_tshirt-walk", "error_against_time", "training", "dots", "histograms"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
-    assert {"frames_tshirt-walk.png", "frames_tshirt-jump.png"} <= pictures
+    assert {"lead.png", "frames_tshirt-walk.png", "strip_tshirt-jump.png", "failures.png"} <= pictures
     assert made.report_path.read_bytes().startswith(b"%PDF")
 
 
@@ -174,27 +173,11 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     run.write_rows(all_rows())
     digests = {"results.csv": digest_of_file(run.rows_path), "trajectories/gone.vtkhdf": "0"}
     run.write_config(declaration(all_rows(), digests=digests))
-    assert build.read_run(run).changed == [] and "Changed since" not in dict(summary(build.read_run(run)))
+    assert build.read_run(run).changed == []
+    assert document(build.read_run(run), {}, [], [])["first"]["changed"] == ""
     run.write_rows(all_rows()[:-1])
-    said = dict(summary(build.read_run(run)))
-    assert (
-        next(iter(said)) == "Changed since"
-        and "Not as the run wrote them: results.csv." in said["Changed since"]
-    )
-
-
-def test_cloth_is_painted_over_the_body_on_white(made, tmp_path):
-    run, scene = run_of(all_rows()), SCENES[0]
-    body = build.read_trajectory(made, made.trajectory_path(scene, "body"), [])
-    cloth = build.read_trajectory(made, made.trajectory_path(scene, "snug"), [])
-    picture = render.side_by_side(tmp_path, run, scene, {"snug": cloth}, body)
-    from matplotlib.image import imread
-
-    image = imread(picture.path)
-    # The sheet is in front of the body and of the same size: the middle has the cloth's hue, blue over red.
-    red, _, blue = image[image.shape[0] * 3 // 5, image.shape[1] // 2, :3]
-    assert blue > red + 0.05
-    assert image[-1, 0, :3].min() == 1.0
+    said = document(build.read_run(run), {}, [], [])["first"]["changed"]
+    assert said.startswith("Not as the run wrote them: results.csv.")
 
 
 def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, capsys):

@@ -25,7 +25,7 @@ from reports.pareto import (
     truncated,
 )
 from reports.plotting import _columns
-from reports.profile import performance_profile, staircases, times_to_reach
+from reports.verdict import verdict
 from reports.work_precision import error_against_time
 
 # method: ms a frame, relative gap, curvature error
@@ -95,16 +95,6 @@ def test_points_need_every_scene():
     alone = {"newton-1", "newton-4", "lbfgs-5", "lbfgs-20"}
     assert {p.method for p in solvers(run, worn)} == {"simulation", *alone}
     assert {p.method for p in truncated(run, worn)} == alone
-
-
-def test_a_profile_counts_scenes_within_a_ratio_of_the_fastest():
-    times = times_to_reach(run_of(all_rows()), ["sheet", *SCENES], 0.15)
-    assert times["sheet"] == {"simulation": 100.0, "newton": 45.0}
-    assert times["tshirt/walk"]["snug"] == 0.25 and times["tshirt/walk"]["lbfgs"] == 16.0
-    stairs = staircases(times)
-    ratios, shares = stairs["newton"]
-    assert ratios[:3] == [1.0, 180.0, 180.0] and shares[:3] == pytest.approx([1 / 3, 2 / 3, 1.0])
-    assert stairs["snug"][1][-1] == pytest.approx(2 / 3)
 
 
 def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_path):
@@ -233,8 +223,9 @@ def test_a_training_without_rivals_has_no_sentence():
 
 def test_run_times_on_page_one_are_of_the_garment_compared():
     rows = all_rows() + [row("skirt/stop", m, "cost/frame", 500.0, "ms") for m in ("snug", "simulation")]
-    assert plain(run_of(rows))["Run time"] == (
-        "SNUG takes 0.250 ms per frame, the simulation 100 ms: 400 times."
+    said = dict(verdict(run_of(rows)))["At what cost"].replace("\u00a0", " ")
+    assert said.startswith(
+        "SNUG takes 0.250 ms a frame, the simulation 100: 400 times as long; by energy gap"
     )
 
 
@@ -251,16 +242,11 @@ def test_the_table_of_crossings_has_every_network_and_the_figure_those_it_has_ro
     assert {line[1] for line in table.rows} == {"snug", *more}
 
 
-def test_a_profile_says_that_scenes_nobody_asked_of_a_family_count(tmp_path):
-    (picture,) = performance_profile(tmp_path, run_of(all_rows()))
-    assert "a scene that it cannot do" in picture.caption
-
-
 def test_ablations_are_drawn_where_the_full_recipe_is_not(tmp_path):
     costs = (("cost/frame", 1.0), ("gap/energy", 0.1))
     rows = [row("tshirt/walk", m, k, v) for m in ("snug-springs", "newton-1") for k, v in costs]
-    (lead, picture) = error_against_time(tmp_path, run_of(rows))
-    assert (lead.kind, picture.kind) == ("lead", "speed")
+    (picture,) = error_against_time(tmp_path, run_of(rows))
+    assert picture.kind == "lead"
     rows += [row("tshirt/walk", "snug", *cost) for cost in costs]
     kept = [r for r in rows if r.method != "newton-1"]
     assert error_against_time(tmp_path, run_of(kept)) == []  # one point is no plot
@@ -309,13 +295,11 @@ def test_the_summary_says_what_beats_the_network_and_when_training_pays():
 
 def test_every_figure_of_the_suite_is_drawn(tmp_path):
     run = run_of(all_rows())
-    pictures = [
-        picture
-        for make in (error_against_time, performance_profile, break_even)
-        for picture in make(tmp_path, run)
-    ]
-    assert len(pictures) == 6 and all(p.path.is_file() for p in pictures)
-    assert "Grey: as near as such simulations are to each other" in pictures[1].caption
+    pictures = [picture for make in (error_against_time, break_even) for picture in make(tmp_path, run)]
+    assert [p.kind for p in pictures] == ["lead", "speed", "scenes", "break_even"] and all(
+        p.path.is_file() for p in pictures
+    )
+    assert "Grey: within the reference's uncertainty." in pictures[0].caption
     walk = run.frame[run.frame["scene"] == "tshirt/walk"]
     assert indistinct(run, walk, "distance/rms") == 21.0  # no rival of whom it may be said who is nearer
     assert indistinct(run, walk, "gap/energy") == 0.015 and indistinct(run, walk, "curvature/error") == 0.0

@@ -105,7 +105,7 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
     group = roll_out.group
     scale = group.kept(gap_scale)
     found: dict[str, float | Estimate] = {}
-    found |= optimality(roll_out.scene, roll_out.positions, samples=group.gap_samples, scale=scale).metrics()
+    found |= roll_out.kept(_judge_steps).metrics()
     if scale is None or not found:
         return found
     gap = found["gap/energy"]
@@ -113,6 +113,21 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
     if scale > 0.0:
         found["gap/relative"] = Estimate(gap.value / scale, gap.uncertainty / scale)
     return found | ({"gap/scale": scale} if roll_out is group.reference else {})
+
+
+def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
+    """step/vertices (T,V) [mm]: how far each vertex lies from y_t; nan in frames that were not looked at."""
+    away = roll_out.kept(_judge_steps).away
+    shown = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
+    for frame, distances in away.items():
+        shown[frame] = distances
+    return {"step/vertices": shown} if away else {}
+
+
+def _judge_steps(roll_out: RollOut) -> Optimality:
+    group = roll_out.group
+    scale = group.kept(gap_scale)
+    return optimality(roll_out.scene, roll_out.positions, samples=group.gap_samples, scale=scale)
 
 
 def gap_scale(group: SceneRollOuts) -> float | None:
@@ -134,7 +149,7 @@ def gap_scale(group: SceneRollOuts) -> float | None:
 @dataclass
 class Optimality:
     """What was found at sampled frames, of `judged` in all. found_by: whose minimum was the lowest; of equals
-    the first in FINDERS. refrozen: at the first of these frames alone.
+    the first in FINDERS. refrozen: at the first of these frames alone. away: frame -> (V,) [mm] from y_t.
     """
 
     judged: int = 0
@@ -145,6 +160,7 @@ class Optimality:
     curvatures: list[float] = field(default_factory=list)
     gradients: list[float] = field(default_factory=list)
     found_by: dict[str, int] = field(default_factory=lambda: dict.fromkeys(FINDERS, 0))
+    away: dict[int, Floats] = field(default_factory=dict)
 
     def estimate(self, values: list[float]) -> Estimate:
         """Mean, and its standard error as a sample of the judged frames; 0 where all were looked at."""
@@ -190,7 +206,7 @@ def optimality(
         here, gradient = potential.value_and_gradient(x)
         if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
             found.gaps, found.local, found.gradients = [np.nan], [np.nan], [np.nan]
-            found.refrozen, found.distances, found.curvatures = [], [], []
+            found.refrozen, found.distances, found.curvatures, found.away = [], [], [], {}
             return found
         below = minimiser.minimise(x)
         energies = {"simulator": minimiser.minimise(guess).energy, "from_frame": below.energy, "frame": here}
@@ -202,7 +218,8 @@ def optimality(
         found.local.append(here - min(here, below.energy))
         found.gradients.append(float(np.abs(gradient[scene.cloth.free]).max()) / mean_weight(potential))
         y = below.positions
-        found.distances.append(MM * float(np.sqrt(((x - y) ** 2).sum(1).mean())))
+        found.away[frame] = MM * np.linalg.norm(x - y, axis=1)
+        found.distances.append(float(np.sqrt((found.away[frame] ** 2).mean())))
         found.curvatures.append(_curvature_error(x, y, scene.cloth.faces, inner))
         if scene.obstacle is not None and len(found.refrozen) < samples:
             prepare(scene, potential, positions, frame, guess=x)

@@ -125,9 +125,9 @@ def compared(
 
 
 def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
-    """An .npz of curves (T,), nan after the last frame that was measured."""
+    """An .npz of curves (T,...), nan after the last frame that was measured."""
     padded: dict[str, Any] = {
-        name: np.pad(curve, (0, frames - len(curve)), constant_values=np.nan)
+        name: np.pad(curve, [(0, frames - len(curve))] + [(0, 0)] * (curve.ndim - 1), constant_values=np.nan)
         for name, curve in curves.items()
     }
     with replacing(path) as temporary:

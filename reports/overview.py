@@ -1,0 +1,82 @@
+"""The methods of page one and their numbers: few rows, few columns, the rest is in the other tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pandas as pd
+
+from reports.break_even import NETWORK, compared_scenes, rivals
+from reports.data import Run
+from reports.means import mean_of, value_of
+from reports.pareto import TIME, WHOLE
+from reports.table import Cell, Column, Table, metric_column, table
+
+ROWS = 8
+WORN = ("energy/total", "energy/strain", "curvature/error", "penetration/vertices")
+STEPS = ("gap/energy", "step/distance")
+BEST_BY = ("step/distance", "gap/energy", "curvature/error", "energy/total")
+
+
+def leads(run: Run, rows: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
+    """The reference, the network, the best of other networks in these rows, and the first baseline; of those
+    in `among` alone where that is given.
+    """
+    usable = set(rows[rows["usable"]]["method"])
+    have = usable if among is None else usable & set(among)
+    others = [name for name in run.with_role("network") if name in have and not run.methods[name].base]
+    own = NETWORK if NETWORK in others else next(iter(others), "")
+    best = _best(run, rows, [name for name in others if name != own])
+    baseline = next((name for name in run.with_role("baseline") if name in have), "")
+    return [name for name in (run.reference, own, best, baseline) if name in have]
+
+
+def _best(run: Run, rows: pd.DataFrame, names: Iterable[str]) -> str:
+    """By the first metric that any of them has."""
+    names = list(names)
+    for metric in BEST_BY:
+        values = {name: value_of(rows, name, metric) for name in names}
+        found = {name: value for name, value in values.items() if value is not None}
+        if found:
+            return min(found, key=lambda name: found[name])
+    return next(iter(names), "")
+
+
+def overview(run: Run) -> list[Table]:
+    """Reference, baselines and networks of the first garment, and the fastest solvers as good as the network.
+
+    Energies and curvature are means over its motions, what is said of steps and times is of the scenes in
+    which solvers were timed.
+    """
+    worn = run.worn
+    garment = next(iter(run.garments(worn)), None)
+    worn = worn[worn["garment"] == garment]
+    cells = run.cells("speed", "garments")
+    scenes = next(iter(compared_scenes(run, cells).values()), [])
+    timed = cells[cells["scene"].isin(scenes)] if scenes else worn
+    plain = set(worn[worn["usable"]]["method"]) - run.standing_apart(worn)
+    chosen = leads(run, worn)
+    chosen += [
+        m
+        for m in run.ordered(plain)
+        if m not in chosen and run.methods[m].role in ("network", "bound", "baseline")
+    ]
+    why = rivals(run, cells, scenes) if scenes else {}
+    solvers = [m for m in why if m not in chosen]
+    chosen = run.ordered([*chosen[: ROWS - len(solvers)], *solvers])
+    time = WHOLE if len(timed[timed["metric"] == WHOLE]) else TIME
+    wanted = [(name, worn) for name in WORN] + [(name, timed) for name in (*STEPS, time)]
+    wanted += [("cost/train", worn)]
+    asked = [(run.metrics[name], rows) for name, rows in wanted if name in run.metrics]
+    lines: list[tuple[Cell, ...]] = [
+        (method, *(mean_of(rows, method, metric.name) for metric, rows in asked)) for method in chosen
+    ]
+    kept = [k for k in range(1, len(asked) + 1) if any(line[k] is not None for line in lines)]
+    lines = [(line[0], *(line[k] for k in kept)) for line in lines]
+    columns = [metric_column(asked[k - 1][0]) for k in kept]
+    if not columns:
+        return []
+    caption = f"{garment}: means over its motions"
+    caption += f"; gaps, single steps and run times over {', '.join(scenes)}." if scenes else "."
+    method = Column("method", "Method", text=True, method=True)
+    return table("overview", (method, *columns), lines, caption)

@@ -1,0 +1,161 @@
+"""What page one says in words: three sentences, what went wrong, and the worst by name."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from reports import claims, tables
+from reports.break_even import NETWORK, compared_scenes
+from reports.data import Run
+from reports.means import Mean, mean_of, pair, shared_scenes, value_of
+from reports.narrative import fronts, unbroken
+from reports.numbers import number, with_spread
+from reports.overview import leads
+from reports.pareto import TIME, WHOLE, indistinct
+from reports.significance import within_uncertainty
+
+TOTAL, CURVATURE, DISTANCE, SWING = "energy/total", "curvature/error", "distance/rms", "dynamics/amplitude"
+STRAIN = ("motion/strain", "energy/strain")
+MOST = 5  # of failures said on page one
+BAD = ("failed", "diverged", "timeout", "out-of-memory", "stalled")
+
+
+def verdict(run: Run) -> list[tuple[str, str]]:
+    """(topic, sentence) on how near, at what cost, and how certain: what the run holds numbers for."""
+    scenes = next(iter(run.garments(run.worn).values()), [])
+    worn = run.worn[run.worn["scene"].isin(scenes)]
+    cells = run.cells("speed", "garments")
+    compared = next(iter(compared_scenes(run, cells).values()), [])
+    timed = cells[cells["scene"].isin(compared)] if compared else worn
+    said = {
+        "How near": _near(run, worn), "At what cost": _cost(run, timed, compared),
+        "How certain": _trust(run, worn, timed),
+    }  # fmt: skip
+    return [(topic, unbroken(sentence)) for topic, sentence in said.items() if sentence]
+
+
+def _near(run: Run, worn: pd.DataFrame) -> str:
+    """The network's total energy beside the simulation's, over the scenes that all of page one have."""
+    rows = worn[(worn["metric"] == TOTAL) | ~worn["usable"]]
+    have = set(rows[rows["usable"]]["method"])
+    names = [name for name in leads(run, worn) if name in have]
+    scenes = shared_scenes(rows, names, TOTAL)
+    found = {name: mean_of(rows, name, TOTAL, scenes) for name in names}
+    means = {name: mean for name, mean in found.items() if mean is not None}
+    own = next((name for name in means if run.methods[name].role == "network"), "")
+    if not own or run.reference not in means:
+        return ""
+    one, other = means.pop(own), means.pop(run.reference)
+    tie = within_uncertainty(one, other) or abs(one.value - other.value) <= _scatter(one, other)
+    how = "as low as" if tie else "above" if one.value > other.value else "below"
+    asked = worn[worn["metric"] == TOTAL]["scene"].nunique()
+    count = f"{len(scenes)} of {asked}" if len(scenes) < asked else str(asked)
+    text = f"On {count} unseen motion{'' if asked == 1 else 's'} {run.label(own)}'s total energy, "
+    text += f"{with_spread(one.value, one.spread_or_uncertainty)} J{one.fewer}, is {how} the simulation's, "
+    text += with_spread(other.value, other.spread_or_uncertainty)
+    words = [f"{run.label(name)} has {number(mean.value)}{mean.fewer}" for name, mean in means.items()]
+    return text + (f"; {', '.join(words)}." if words else ".")
+
+
+def _scatter(one: Mean, other: Mean) -> float:
+    return (one.spread_or_uncertainty or 0.0) + (other.spread_or_uncertainty or 0.0)
+
+
+def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
+    time = WHOLE if len(timed[timed["metric"] == WHOLE]) else TIME
+    own, reference = pair(timed, NETWORK, run.reference, time)
+    if own is None or reference is None or not own.value:
+        return ""
+    text = f"{run.label(NETWORK)} takes {number(own.value)} ms a frame, the simulation "
+    text += f"{number(reference.value)}: {number(reference.value / own.value, 2)} times as long{own.fewer}"
+    more = fronts(run, run.cells("speed", "garments"), scenes, first_only=True) if scenes else ""
+    return f"{text}; {more[:1].lower()}{more[1:]}" if more else f"{text}."
+
+
+def _trust(run: Run, worn: pd.DataFrame, timed: pd.DataFrame) -> str:
+    """What the network lacks, and how far the reference itself is uncertain."""
+    parts = []
+    swing = value_of(worn, NETWORK, SWING)
+    if swing is not None:
+        parts.append(f"the hem's own motion is {number(swing, 2)} of the simulation's")
+    apart = [indistinct(run, timed, metric) for metric in (CURVATURE, DISTANCE)]
+    if all(apart):
+        parts.append(
+            f"right simulations lie up to {number(apart[0])} 1/m and {number(apart[1])} mm apart, and what "
+            "is nearer cannot be told"
+        )
+    counted = claims.counts(run)
+    if counted:
+        parts.append(f"of the paper's claims tested here: {counted.partition(': ')[2].rstrip('.')}")
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}." if parts else ""
+
+
+def endings(run: Run) -> str:
+    """How many cells, checks and stress tests ended how, with every kind that is not ok."""
+    cells = run.frame[(run.frame["case"] == "") & (run.frame["method"] != "")]
+    best_first = {"stalled": 0, "ok": 1}  # what has any usable number has run, whatever became of the others
+    cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
+    ends = cells.drop_duplicates(["suite", "scene", "method", "seed"])["status"]
+    checks = tables.checks(run)
+    groups = {
+        "cells": ends,
+        "checks": checks[checks["tolerance"].notna() | (checks["status"] != "ok")]["status"],
+        "stress tests": tables.stress_tests(run)["status"],
+    }
+    words = []
+    for what, statuses in groups.items():
+        counts = statuses.value_counts()
+        found = [f"{counts[name]} {name}" for name in (*BAD, "skipped") if name in counts]
+        if len(statuses):
+            words.append(f"of {len(statuses):,} {what} {', '.join(found) if found else 'all ended well'}")
+    text = "; ".join(words)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def failures(run: Run) -> list[tuple[str, str]]:
+    """(name, what happened): cells and checks that failed first, then stress tests, then overstretched
+    networks; MOST of them in all, some of each kind.
+    """
+    rows = run.frame[run.frame["status"].isin(BAD)]
+    rows = rows.assign(rank=rows["status"].map(BAD.index)).sort_values("rank", kind="stable")
+    rows = rows.drop_duplicates(["scene", "method", "seed"])
+    tested = rows["case"] != ""
+    kinds: list[list[tuple[str, str]]] = [
+        [
+            (
+                f"{run.label(row.method)}, {row.scene}" + (f", seed {row.seed}" if row.seed else ""),
+                f"{row.status}: {row.reason}",
+            )
+            for row in part.itertuples()
+        ]
+        for part in (rows[~tested], rows[tested])
+    ]
+    kinds.append(
+        [
+            (
+                f"{run.label(method)}, {scene}",
+                f"strain {number(own)} J, {number(ratio)} times the simulation's",
+            )
+            for method, scene, own, ratio in overstretched(run)[:3]
+        ]
+    )
+    found: list[tuple[str, str]] = []
+    for left, kind in zip((3, 2, 1), kinds):
+        found += kind[: max((MOST - len(found)) // left, 1)]
+    return found[:MOST]
+
+
+def overstretched(run: Run) -> list[tuple[str, str, float, float]]:
+    """Method, scene, its strain [J] and that over the simulation's: of trained networks, the worst first."""
+    networks = [name for name in run.with_role("network") if not run.methods[name].base]
+    found: dict[tuple[str, str], tuple[float, float]] = {}
+    for metric in STRAIN:
+        rows = run.frame[(run.frame["metric"] == metric) & run.frame["usable"] & (run.frame["garment"] != "")]
+        values = rows.groupby(["scene", "method"])["value"].mean()
+        for scene, method in values.index:
+            base = values.get((scene, run.reference))
+            if method in networks and base and (method, scene) not in found:
+                found[method, scene] = (float(values[scene, method]), float(values[scene, method] / base))
+    worst = [(method, scene, own, ratio) for (method, scene), (own, ratio) in found.items() if ratio > 1.0]
+    return sorted(worst, key=lambda line: -line[3])
