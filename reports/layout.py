@@ -17,7 +17,6 @@ from reports.table import Cell, Column, Table
 Block = dict[str, Any]
 LONG = 5  # rows from which a table may run over pages
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
-NARROW, MOST_WIDE = 12, 40  # letters: what is no longer is not broken, what is longer gets no more room
 MOST = 9  # columns of numbers that fit on a page; a wider table goes on below
 REMARKS = {
     "*": "* A mean over fewer scenes or seeds than in the other rows, for want of the rest.",
@@ -72,7 +71,7 @@ def _block(run: Run, table: Table) -> Block:
         "note": remarks_of(table, lines),
         "columns": [
             {"title": column.title, "unit": column.unit, "left": column.text, "width": width}
-            for column, width in zip(columns, _widths(columns, cells))
+            for column, width in zip(columns, _widths(columns))
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
         "references": lines[len(table.rows) :],
@@ -98,17 +97,11 @@ def remarks_of(table: Table, lines: Sequence[Sequence[dict[str, str]]]) -> str:
     return " ".join([*remarks, *(REMARKS[mark] for mark in sorted(marks))])
 
 
-def _widths(columns: Sequence[Column], cells: Sequence[Sequence[dict[str, str]]]) -> list[str]:
-    """Columns of numbers share the width evenly; beside several columns of words they take what they need,
-    and long words share the rest.
-    """
+def _widths(columns: Sequence[Column]) -> list[str]:
+    """Columns of numbers share the width evenly; where words stand among them each takes what it needs."""
     if all(not column.text for column in columns[1:]):
         return ["1.4fr" if len(columns) <= FEW else "2.4fr", *["1fr"] * (len(columns) - 1)]
-    letters = [max((len(cell["text"]) for cell in own), default=0) for own in cells]
-    return [
-        f"{min(count, MOST_WIDE)}fr" if column.text and count > NARROW else "auto"
-        for column, count in zip(columns, letters)
-    ]
+    return ["auto"] * len(columns)
 
 
 def column_texts(

@@ -24,8 +24,8 @@ LINE_LETTERS = 115  # of a legend that fit on one line of a figure as wide as th
 MOST_LINES = 13  # of a legend beside a figure
 GRID = "#E3E3E3"
 _LOOK: dict[Any, Any] = {
-    "font.family": "STIXGeneral",
-    "mathtext.fontset": "stix",
+    "font.family": ["STIXGeneral", "DejaVu Sans"],  # the second has what the first lacks
+    "text.parse_math": False,  # a name may hold dollars
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.labelsize": 9.0,

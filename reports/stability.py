@@ -72,8 +72,6 @@ def _cell(axes: Axes, column: int, line: int, status: str, iterations: float) ->
     word = f"{iterations:.0f}" if converged else "✕" if status == "failed" else status
     text = axes.text(column, line, word, ha="center", va="center", fontsize=7.5)
     text.set_color("white" if not converged or iterations > 40.0 else "#222222")
-    if word == "✕":
-        text.set_fontfamily("DejaVu Sans")  # the serif has no cross
 
 
 def shade(iterations: float) -> tuple[float, float, float]:
