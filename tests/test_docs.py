@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from benchmarks.metrics import declared
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+PAPER = ROOT / "docs" / "paper.md"
+FINDINGS = ROOT / "reports" / "published" / "quick" / "tables" / "findings.csv"
+SAID = {"holds": "reproduced", "does not hold": "refuted", "tie": "tie", "cannot be told": "cannot be told"}
 EXTEND = ROOT / "docs" / "extend.md"
 FILE = re.compile(r"File `([^`]+)`:$")
 SHORT = ("A method", "A scene", "A metric", "A package")
@@ -110,6 +114,36 @@ def test_every_metric_is_defined_as_declared():
     table = re.findall(r"^\| `[^`|]+/[^`|]+` \|.*$", text, re.M)
     assert not [line for line in lines if line not in table], "add these lines to the table"
     assert not [line for line in table if line not in lines], "remove these lines from the table"
+
+
+def table_rows(path: Path) -> list[list[str]]:
+    """The cells of each row of each table of a document."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return [[cell.strip() for cell in line[1:-1].split("|")] for line in lines if line.startswith("|")]
+
+
+def ratio(text: str) -> str:
+    """A ratio as docs/paper.md writes it: two places, or two digits where it is small."""
+    value = float(text)
+    return (f"{value:.2f}" if value >= 0.1 else f"{value:.2g}").removeprefix("0")
+
+
+def test_the_page_of_the_paper_counts_its_own_verdicts():
+    rows = table_rows(PAPER)
+    judged = Counter(row[1] for row in rows if row[1] in (*SAID.values(), "not tested"))
+    assert {row[0]: int(row[1]) for row in rows if row[0] in judged} == judged
+    assert f"| of {judged.total()} claims |" in PAPER.read_text(encoding="utf-8")
+
+
+def test_the_page_of_the_paper_says_what_the_published_findings_say():
+    with FINDINGS.open(newline="", encoding="utf-8") as stream:
+        published = list(csv.DictReader(stream))
+    judged = [row for row in table_rows(PAPER) if row[-1] == "findings"]
+    for found in published:
+        effect, low, high = (ratio(found[name]) for name in ("effect", "effect_low", "effect_high"))
+        verdict, words = SAID[found["verdict"]], f"{effect} ({low} to {high})"
+        assert any(row[1] == verdict and words in row[2] for row in judged), f"{verdict}: {words}"
+    assert len(judged) == len(published)
 
 
 def heading_anchors(path: Path) -> set[str]:
