@@ -227,16 +227,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
             except (SpeedupError, ResultsError) as error:  # the others are measured all the same
                 print(f"{PROGRAM}: {error}", file=sys.stderr)
                 failed = True
+            if options.out:
+                _write(Path(options.out), lines)
     _show(lines)
-    if options.out:
-        with (
-            replacing(Path(options.out)) as temporary,
-            temporary.open("w", newline="", encoding="utf-8") as stream,
-        ):
-            writer = csv.DictWriter(stream, list(Line.__dataclass_fields__), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(vars(line) for line in lines)
     return 1 if failed else 0
+
+
+def _write(path: Path, lines: Sequence[Line]) -> None:
+    """What is measured so far, whole or not at all: an hour's work is not lost with its end."""
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, list(Line.__dataclass_fields__), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(vars(line) for line in lines)
 
 
 def _show(lines: Sequence[Line]) -> None:

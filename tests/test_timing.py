@@ -6,6 +6,7 @@ import multiprocessing
 import threading
 import time
 
+import numba
 import numpy as np
 import pytest
 
@@ -53,6 +54,21 @@ def test_short_work_is_done_again_until_enough_is_measured_and_long_work_once():
     assert len(clocked(run, of=positions_of)[1].runs) == 1
     _, reading = clocked(lambda: np.zeros(1), of=positions_of, least=60.0)
     assert len(reading.runs) == MOST
+
+
+@pytest.mark.parametrize("always", [False, True])
+def test_a_first_run_that_compiles_is_no_measurement(always):
+    kernels, calls = [], []
+
+    def run():
+        if always or not kernels:
+            kernels.append(numba.njit(lambda x: x + 1.0))
+        calls.append(kernels[-1](1.0))
+        return np.zeros((2, 3, 3))
+
+    _, reading = clocked(run, of=positions_of)
+    assert len(calls) == 2 and len(reading.runs) == 1  # whoever compiles in each run is measured so
+    assert (reading.seconds < 0.02) is not always and reading.complaint == ""
 
 
 def test_an_answer_that_was_kept_from_the_first_run_is_found():

@@ -115,7 +115,8 @@ class CellTask(Task):
             frames.append(made.frame_seconds)
             return made
 
-        return *clocked(run, of=lambda made: made.positions, least=least), frames
+        made, reading = clocked(run, of=lambda made: made.positions, least=least)
+        return made, reading, frames[-len(reading.runs) :]  # a first run that compiled is not among them
 
     def times(self, reading: Reading, frames: list[np.ndarray]) -> dict[str, float]:
         """Result of these runs [s]: of the median one, and of its middle, late and slowest frame."""
