@@ -214,4 +214,5 @@ def test_a_motion_without_a_step_has_no_laws_and_no_pins_are_asked_for(dropped):
 def test_who_is_asked():
     asked = {entry.name for entry in METHODS if entry.conserving}
     assert {"simulation", "skinning", "snug", "supervised", "pbns", "snug+cleanup"} <= asked
+    assert {"fast-lbfgs-10", "snug+fast-lbfgs-1"} <= asked
     assert not asked & {"untrained", "newton-1", "snug+lbfgs-1", "simulation-dt/2"}

@@ -31,7 +31,7 @@ _LBFGS: dict[str, Any] = {
 
 def _truncated(
     family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *, module: str,
-    counted: str = "iterations", dtype: str = "float64", **options: Any,
+    counted: str = "iterations", dtype: str = "float64", conserving: bool = False, **options: Any,
 ) -> tuple[MethodEntry, ...]:  # fmt: skip
     """One entry for each number of iterations, which is the option `counted` of the module."""
     return tuple(
@@ -42,6 +42,7 @@ def _truncated(
             module=module,
             options={counted: count, **options},
             dtype=dtype,
+            conserving=conserving,
             truncated=True,
             role="solver",
             family=family,
@@ -66,6 +67,7 @@ def warm_started(
             trained=trained,
             seeded=trained is not None,
             truncated=True,
+            conserving=solver == "fast-lbfgs",
             role="warm-started",
             family=f"{base}+{solver}",
             level=count,
@@ -154,7 +156,7 @@ SOLVERS = (
     *_truncated(
         "fast-lbfgs", "Fast L-BFGS", "iteration",
         "L-BFGS compiled as a whole, float32, sliding contact planes, stopped after {}", (5, 10, 20, 40),
-        module="benchmarks.methods.fast_lbfgs", dtype="float32",
+        module="benchmarks.methods.fast_lbfgs", dtype="float32", conserving=True,
     ),
     *_truncated(
         "gradient-descent", "Gradient descent", "iteration",

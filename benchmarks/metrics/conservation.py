@@ -77,7 +77,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Of the reference, skinning and what was trained: nobody asks a truncated solver for conservation."""
+    """Of the reference, skinning, what was trained, and the cheapest solvers, which stand beside networks."""
     if roll_out not in _asked(roll_out.group):
         return {}
     laws = roll_out.group.kept(_laws_of)[roll_out]
