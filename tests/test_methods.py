@@ -155,7 +155,9 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
             still = network or (on_body and method in ("skinning", "simulation"))
             assert ("dynamics/quasi_static_difference" in values) == still
             assert ("dynamics/amplitude" in values) == on_body
-            asked = on_body and (method in ("simulation", "skinning") or (network and method != "untrained"))
+            bounds = ("simulation", "skinning")
+            asked = method in bounds or (network and method != "untrained") or "fast-lbfgs" in method
+            asked = asked and on_body
             assert ("conservation/momentum" in values) == asked
             if method == "simulation" and on_body:
                 assert values["dynamics/amplitude"] == pytest.approx(1.0)
