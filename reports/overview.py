@@ -54,6 +54,7 @@ def overview(run: Run) -> list[Table]:
     cells = run.cells("speed", "garments")
     scenes = next(iter(compared_scenes(run, cells).values()), [])
     timed = cells[cells["scene"].isin(scenes)] if scenes else worn
+    worn = timed if worn.empty else worn  # of a run of suite speed alone
     plain = set(worn[worn["usable"]]["method"]) - run.standing_apart(worn)
     chosen = leads(run, worn)
     chosen += [
@@ -76,7 +77,7 @@ def overview(run: Run) -> list[Table]:
     columns = [metric_column(asked[k - 1][0]) for k in kept]
     if not columns:
         return []
-    caption = f"{garment}: means over its motions"
-    caption += f"; gaps, single steps and run times over {', '.join(scenes)}." if scenes else "."
+    caption = f"{garment}: means over its motions" if garment else f"Means over {', '.join(scenes)}"
+    caption += f"; gaps, single steps and run times over {', '.join(scenes)}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)

@@ -25,6 +25,7 @@ from reports.pareto import (
     truncated,
 )
 from reports.plotting import _columns
+from reports.tables import make_tables
 from reports.verdict import verdict
 from reports.work_precision import error_against_time
 
@@ -352,3 +353,9 @@ def test_a_rival_within_the_uncertainty_of_the_reference_is_as_near():
     assert "PBNS is as near, within the scatter of seeds and of right simulations, and no slower" in said
     sure = [dataclasses.replace(r, uncertainty=0.1 if r.uncertainty else None) for r in rows]
     assert "PBNS is nearer and no slower" in plain(run_of(sure))["Error against time"]
+
+
+def test_a_run_of_suite_speed_alone_has_its_methods_on_page_one():
+    made = make_tables(run_of(all_rows()))["overview"]
+    assert {"simulation", "snug", "skinning"} < {line[0] for line in made.rows}
+    assert "None" not in made.caption and all(scene in made.caption for scene in SCENES)
