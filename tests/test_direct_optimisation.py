@@ -8,31 +8,25 @@ import numpy as np
 import pytest
 from dressing import swaying, tube_dress
 
+from benchmarks.assets import open_assets
 from benchmarks.methods.direct_optimisation import ClipInertia, DirectOptimisation
 from benchmarks.metrics.energy import energy_series
-from benchmarks.scene import BuiltScene, Dressed
-from reference_sim import Obstacle
+from benchmarks.presets import find_preset
+from benchmarks.scenes import of_garment
 from reference_sim.cloth import Cloth
-from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
+from reference_sim.energies import Inertia
+from snug.dressed_body import DressedBody
 
 FRAMES = 6
 
 
 @pytest.fixture(scope="module")
 def scene():
-    dressed, motion = tube_dress(), swaying(FRAMES)
-    body, cloth = dressed.body, dressed.cloth
-    skin = body.vertices(motion.poses, motion.translations)
-    return BuiltScene(
-        name="tshirt/sway",
-        cloth=cloth,
-        energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth)),
-        dt=1 / 30,
-        frames=FRAMES,
-        settle=lambda: dressed.skinned(motion, smoothing=20)[0],
-        obstacle=Obstacle(skin, body.faces, rest_positions=body.shaped()),
-        dressed=Dressed(body, dressed.garment, motion),
-    )
+    """A T-shirt: what no shoulder holds falls without end, and has no bound."""
+    preset = dataclasses.replace(find_preset("smoke"), frames=FRAMES)
+    assets = open_assets(preset, [swaying(FRAMES)], ["tshirt"])
+    built = of_garment("tshirt").scene("sway").at(preset).build(assets)
+    return dataclasses.replace(built, origin_heights=None)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +75,8 @@ def test_the_bound_is_far_below_skinning_and_below_a_simulation(scene, bound):
     simulated = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=FRAMES, obstacle=scene.obstacle, start=scene.start
     )
-    skinned = tube_dress().skinned(scene.dressed.motion, smoothing=20)
+    dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+    skinned = dressed.skinned(scene.dressed.motion, smoothing=20)
     clips = (trajectory.positions, simulated.positions, skinned)
     free, reference, start = (s["total"].sum() for s in energy_series(scene, clips))
     assert trajectory.status == "ok" and trajectory.positions.shape == skinned.shape
