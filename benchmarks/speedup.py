@@ -51,11 +51,11 @@ class Measurement:
     after: str
     time: str
     bought: str
-    others: tuple[str, str] = ("", "")
+    others: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def words(self, side: int) -> tuple[str, ...]:
-        """Arguments of the run of then (0) or now (1)."""
-        methods = ",".join(filter(None, ((self.before, self.after)[side], self.others[side])))
+        """Arguments of the run of then (0) or now (1): the same for all rows that one run serves."""
+        methods = ",".join(sorted({(self.before, self.after)[side], *self.others[side]}))
         return tuple(word.format(methods=methods) for word in self.arguments)
 
 
@@ -67,14 +67,14 @@ _GAP = {"time": "cost/frame", "bought": "gap/energy"}
 
 
 def _on_clips(
-    group: str, clips: Sequence[str], before: str, afters: Sequence[str], beside: str
+    group: str, clips: Sequence[str], before: str, afters: Sequence[str], beside: tuple[str, ...]
 ) -> list[Measurement]:
     """One run of each code serves all rows."""
     arguments = ("--suite", "speed", "--scenes", ",".join(clips), "--methods", "{methods}")
     return [
         Measurement(
             group, f"{before}, now {after}", arguments, before, after, **_GAP,
-            others=(beside, ",".join([beside, *(name for name in afters if name != after)])),
+            others=(beside, (*beside, *afters)),
         )
         for after in afters
     ]  # fmt: skip
@@ -86,13 +86,13 @@ def _performance(group: str, case: str, method: str, time: str, bought: str) -> 
 
 
 MEASUREMENTS = (
-    *_on_clips("solver", CLIPS, "lbfgs-10", ("lbfgs-10", "fast-lbfgs-10"), "simulation,skinning"),
+    *_on_clips("solver", CLIPS, "lbfgs-10", ("lbfgs-10", "fast-lbfgs-10"), ("simulation", "skinning")),
     *_on_clips(
         "hybrid",
         CLIPS[:3],
         "snug+lbfgs-2",
         ("snug+fast-lbfgs-1", "snug+fast-lbfgs-2", "snug+fast-lbfgs-4"),
-        "simulation,skinning,snug",
+        ("simulation", "skinning", "snug"),
     ),
     *(
         _performance("inference", f"inference/{n}", "snug", "inference", "inference_p95")
@@ -162,17 +162,20 @@ def _values(run: RunFolder, method: str, metric: str) -> dict[str, float]:
 
 
 def compared(
-    what: Measurement, before: Path, folder: Path, turns: int, runs: dict[tuple[object, ...], RunFolder]
+    what: Measurement,
+    before: Path,
+    folder: Path,
+    turns: int,
+    runs: dict[tuple[int, int, tuple[str, ...]], RunFolder],
 ) -> list[Line]:
     """Both codes in turn; medians over the turns. runs: those made so far. Raises SpeedupError."""
     found: list[list[dict[str, float]]] = [[], [], [], []]
     for turn in range(turns):
         for side, (tree, method) in enumerate(((before, what.before), (ROOT, what.after))):
             words = what.words(side)
-            made = (turn, side, frozenset(",".join(words).split(",")))
-            if made not in runs:
-                runs[made] = measured(tree, words, folder / str(len(runs)))
-            run = runs[made]
+            if (turn, side, words) not in runs:
+                runs[turn, side, words] = measured(tree, words, folder / str(len(runs)))
+            run = runs[turn, side, words]
             for place, metric in enumerate((what.time, what.bought)):
                 found[2 * place + side].append(_values(run, method, metric))
     scenes = [scene for scene in found[0][0] if all(scene in values for side in found for values in side)]
@@ -210,7 +213,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
     lines: list[Line] = []
-    runs: dict[tuple[object, ...], RunFolder] = {}
+    runs: dict[tuple[int, int, tuple[str, ...]], RunFolder] = {}
     failed = False
     with tempfile.TemporaryDirectory() as name:
         try:
