@@ -141,7 +141,7 @@ SUITES = (
             *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
             "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
-        named_methods=tuple(entry.name for entry in RECIPE_DEVIATIONS),
+        named_methods=("simulation-springs", *(entry.name for entry in RECIPE_DEVIATIONS)),
     ),
     Suite(
         name="speed",
@@ -162,6 +162,7 @@ SUITES = (
         scenes=_dependence,
         methods=lambda extent: ["simulation", "skinning", "newton-1"],
         more_methods=("simulation-printed-bending",),
+        named_methods=("simulation-springs",),
     ),
     Suite(
         name="extremes",

@@ -28,6 +28,8 @@ from benchmarks.tasks.cell import Cell, built
 from benchmarks.tasks.metrics import measured
 from reference_sim import Trajectory
 from reference_sim.array_file import read_arrays
+from snug.loss import static_terms
+from snug.recipes import RECIPES
 
 SIZES = {"frames": 16, "settle_frames": 4, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 SIZES["least_seconds"] = 0.01
@@ -234,22 +236,29 @@ def test_a_warm_started_solver_goes_on_from_skinning_and_has_its_time_on_the_clo
     assert warm.frame_fields["iterations"].tolist() == [0] + [1] * (scenes[BODY].frames - 1)
 
 
-def test_printed_bending_is_simulated_and_judged_by_the_scenes_own():
+@pytest.mark.parametrize(("exchange", "place"), [("springs", 0), ("printed-bending", 1)])
+def test_another_material_is_simulated_and_judged_by_the_scenes_own(exchange, place):
     scene = small_scene("hanging_sheet", cells=4, frames=5)
-    entry = find_method("simulation-printed-bending")
+    entry = find_method(f"simulation-{exchange}")
     made = entry.make(models=None, seed=0)
     made.prepare(scene)
     own, declared = made.scene.energies, scene.energies
-    k = scene.cloth.material.bending_stiffness
-    assert [term.name for term in own] == [term.name for term in declared] == ["strain", "bending", "gravity"]
-    assert (own[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
-    assert own[0] is declared[0] and own[2] is declared[2] and np.array_equal(made.scene.start, scene.start)
-    group = SceneRollOuts(scene)
-    group.roll_outs.append(RollOut(group, entry, made.run(), suites=("validation",)))
+    assert [term.name for term in declared] == ["strain", "bending", "gravity"]
+    assert [mine is theirs for mine, theirs in zip(own, declared)] == [k != place for k in range(3)]
+    if exchange == "springs":  # the very membrane that its recipe trains on
+        trained = static_terms(scene.cloth, RECIPES["springs"])["strain"]
+        assert type(own[0]) is type(trained) and own[0].parameters() == trained.parameters()
+    else:
+        k = scene.cloth.material.bending_stiffness
+        assert (own[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
+    assert np.array_equal(made.scene.start, scene.start)
+    group, trajectory = SceneRollOuts(scene), made.run()
+    assert trajectory.status == "converged"
+    group.roll_outs.append(RollOut(group, entry, trajectory, suites=("validation",)))
     values = measured(group.roll_outs[0], ("energy",))[0]
-    x = group.roll_outs[0].positions
-    judged = np.mean([declared[1].value_and_gradient(frame)[0] for frame in x[2:]])
-    assert values["energy/bending"] == pytest.approx(judged, rel=1e-9)
+    term = declared[place]
+    judged = np.mean([term.value_and_gradient(frame)[0] for frame in trajectory.positions[2:]])
+    assert values[f"energy/{term.name}"] == pytest.approx(judged, rel=1e-9)
     # No uncertainty of the reference and no approximation of it: a variant that stands beside its base.
     assert group.reference is None and group.find(role="reference-variant") is None
     assert (entry.role, entry.base) == ("ablation", "simulation")
