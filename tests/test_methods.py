@@ -11,6 +11,7 @@ import pytest
 from tasks_by_hand import InProcess, dressed_scene, small_scene
 from test_cell_tasks import NoLog, plan_of
 
+from benchmarks import frame_energies
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.cache import Cache
 from benchmarks.method import Method
@@ -272,6 +273,27 @@ def test_every_method_has_the_whole_protocol(tmp_path):
     assert Method().quasi_static() is None
     with pytest.raises(NotImplementedError):
         Method().batch(2)
+
+
+def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks(run, rows, scenes, tmp_path):
+    folder, scene = run[1].cache.folder, scenes[BODY]
+    assert not folder.frame_energies_path.is_file()
+    frame_energies.write(folder, rows)
+    columns, lines = frame_energies.read(folder.frame_energies_path)
+    assert columns == ["scene", "method", "seed", "seconds", *scene.terms, "total"]
+    kept = {entry.name for entry in DRESSED_METHODS if entry.role in ("reference", "baseline", "network")}
+    assert {line[1] for line in lines} == kept and {line[0] for line in lines} == {BODY}
+    means = {
+        (row.method, row.metric): row.value for row in rows if (row.suite, row.scene) == ("garments", BODY)
+    }
+    for method in kept:
+        own = np.array([line[3:] for line in lines if line[1] == method])
+        assert own[:, 0] == pytest.approx(scene.dt * np.arange(scene.warm_up, scene.frames), abs=1e-4)
+        for place, term in enumerate(columns[4:], start=1):
+            assert own[:, place].mean() == pytest.approx(means[method, f"energy/{term}"], rel=1e-4, abs=1e-9)
+    other = dataclasses.replace(rows[0], suite="speed")
+    frame_energies.write(folder, [other])  # nothing takes part any more
+    assert not folder.frame_energies_path.is_file()
 
 
 def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_metrics():

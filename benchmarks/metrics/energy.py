@@ -134,10 +134,10 @@ def correlation_with_body(roll_out: RollOut) -> float | None:
         return None
     frames = roll_out.judged_beside(bare)
     masses = group.scene.cloth.masses
-    pair = [accelerations(x, masses, group.scene.dt)[frames] for x in (roll_out.positions, bare)]
-    if len(pair[0]) < 3 or min(np.ptp(own) / own.max(initial=1e-300) for own in pair) < 1e-9:
+    own, body = (accelerations(x, masses, group.scene.dt)[frames] for x in (roll_out.positions, bare))
+    if len(own) < 3 or min(np.ptp(size) / size.max(initial=1e-300) for size in (own, body)) < 1e-9:
         return None
-    return float(np.corrcoef(*pair)[0, 1])
+    return float(np.corrcoef(own, body)[0, 1])
 
 
 def accelerations(
