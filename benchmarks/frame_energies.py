@@ -69,8 +69,10 @@ def read(path: Path) -> tuple[list[str], list[list[str | int | float]]]:
         with path.open(newline="", encoding="utf-8") as stream:
             reader = csv.reader(stream)
             columns = next(reader, [])
-            if tuple(columns[: len(CELL)]) != CELL or len(columns) == len(CELL):
-                raise ResultsError(f"{path}: line 1: the columns should be {','.join(CELL)} and energies")
+            own = tuple(columns[: len(CELL)]) == CELL and len(set(columns)) == len(columns)
+            if not own or len(columns) == len(CELL):
+                due = ",".join(CELL)
+                raise ResultsError(f"{path}: line 1: the columns should be {due} and energies, each once")
             return columns, [_line(f"{path}: line {reader.line_num}", columns, cells) for cells in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({error})") from None
@@ -83,7 +85,7 @@ def _line(where: str, columns: list[str], cells: list[str]) -> list[str | int | 
     for name, cell in list(zip(columns, cells))[2:]:
         try:
             number = int(cell) if name == "seed" else float(cell or "nan")
-            if cell and not math.isfinite(number):
+            if (cell and not math.isfinite(number)) or (name == "seed" and abs(number) >= 1 << 63):
                 raise ValueError
             line.append(number)
         except ValueError:
