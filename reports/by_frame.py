@@ -22,7 +22,7 @@ def read_frames(path: Path) -> pd.DataFrame:
 
 def share_of_frames(term: str) -> Metric:
     """What `with_shares` measures."""
-    return Metric(f"frames/{term}", "%", f"Frames with more {term} than the other", lower_is_better=True)
+    return Metric(f"frames/{term}", "%", f"Frames with more {term}", lower_is_better=True)
 
 
 def with_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, other: str) -> pd.DataFrame:
