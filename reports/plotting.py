@@ -100,17 +100,16 @@ def wrapped(name: str, width: int = 44) -> str:
 
 def printable(text: str) -> str:
     """The text with letters that the typesetter's fonts do not have as "U+88FE"."""
-    return "".join(
-        c if c.isascii() or not c.isalpha() or ord(c) in _letters() else f"U+{ord(c):04X}" for c in text
-    )
+    lacking = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
+    return text.translate({ord(c): f"U+{ord(c):04X}" for c in lacking})
 
 
 @cache
-def _letters() -> frozenset[int]:
-    """Codes of the letters of DejaVu Sans Mono: the widest of the typesetter's fonts, and in matplotlib too."""
+def _letters() -> frozenset[str]:
+    """What DejaVu Sans Mono has: the widest of the typesetter's fonts, and in matplotlib too."""
     from matplotlib.font_manager import findfont, get_font
 
-    return frozenset(get_font(findfont("DejaVu Sans Mono")).get_charmap())
+    return frozenset(map(chr, get_font(findfont("DejaVu Sans Mono")).get_charmap()))
 
 
 def grid(axes: Axes, which: str = "both") -> None:
