@@ -83,7 +83,10 @@ CLAIMS = (
     Claim(SMOOTH, "curvature/error", "snug", "supervised"),
     Claim(UNSEEN, "energy/total", "snug", "supervised"),
     Claim(SPRINGS, "curvature/mean", "snug-springs", "snug"),
-    Claim(SIMULATED_SPRINGS, "curvature/mean", "simulation-springs", "simulation"),
+    *(
+        Claim(SIMULATED_SPRINGS, "curvature/mean", f"simulation-{material}", "simulation")
+        for material in ("springs", "pbns-springs")
+    ),
     *(Claim(SAME, "curvature/change", "pbns-springs", method) for method in ("snug", "simulation")),
     *(
         Claim(DYNAMICS, "dynamics/amplitude", f"snug-{name}", "snug")

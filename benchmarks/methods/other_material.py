@@ -1,4 +1,4 @@
-"""The simulation of the scene with one energy exchanged for another.
+"""The simulation of the scene with energies of another material.
 
 It is judged, as every method, by the energies that the scene declares. Its start is theirs too.
 """
@@ -9,7 +9,10 @@ import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from reference_sim.energies import BendHinge, Energy, StretchSpring, StretchStVK
+from snug.baselines.springs import BENDING
 
 from ..scene import BuiltScene
 from .simulation import Simulation
@@ -17,7 +20,7 @@ from .simulation import Simulation
 
 @dataclass(kw_only=True)
 class OtherMaterial(Simulation):
-    """The reference with another energy in one place. exchange: one of EXCHANGES."""
+    """The reference with other energies in places. exchange: one of EXCHANGES."""
 
     exchange: str
 
@@ -39,7 +42,15 @@ def _springs(term: Energy) -> Energy:
     return StretchSpring(term.cloth) if isinstance(term, StretchStVK) else term
 
 
-EXCHANGES = {"printed-bending": _printed_bending, "springs": _springs}
+def _pbns_springs(term: Energy) -> Energy:
+    """PBNS's own springs and hinges, which recipe `pbns-springs` trains on; the weight stays the scene's."""
+    own = _printed_bending(_springs(term))
+    if isinstance(own, BendHinge):
+        own.stiffness = np.full(len(own.stencils), 2.0 * BENDING)
+    return own
+
+
+EXCHANGES = {"printed-bending": _printed_bending, "springs": _springs, "pbns-springs": _pbns_springs}
 
 
 def make(*, models: Path, seed: int, exchange: str) -> OtherMaterial:

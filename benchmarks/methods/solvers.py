@@ -150,6 +150,7 @@ SOLVERS = (
         for exchange, words in (
             ("printed-bending", "hinges as the paper prints them, not scaled: some 3 times as stiff"),
             ("springs", "springs on the edges in place of StVK's membrane, those of recipe springs"),
+            ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),
         )
     ),
     *_truncated(
