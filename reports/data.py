@@ -10,6 +10,7 @@ import pandas as pd
 
 from benchmarks.results import COLUMNS, ROLES, Row, as_right
 
+STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
 USABLE = ("ok", "stalled")
 SUITES = ("garments", "speed", "validation", "extremes", "performance")
 
