@@ -15,7 +15,9 @@ from snug.dressed_body import DressedBody
 from snug.recipe import Recipe
 from snug.skinning import joint_transforms
 
-STD_FLOOR = 0.05  # an input that hardly moved in training must not explode on a motion where it does
+# Spread below which an input's is not taken for a scale: rotations are numbers up to 1 in size, and one that
+# hardly moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
+STD_FLOOR = 0.2
 CONSTANT = 1e-5  # spread below which an input did not move at all, but for rounding
 
 
