@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 TEMPLATE = Path(__file__).parent / "report.typ"
 # Names of what draw() makes.
 FIGURES = (
-    "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "energy_series_*", "error_against_time*",
+    "against_shape.*", "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "energy_series_*", "error_against_time*",
     "failures.*", "frames_*", "hem_*", "histograms.*", "known_answers.*", "lead.*", "map_*",
     "stability_maps.*", "strip_*", "training_*", "training.*",
 )  # fmt: skip
@@ -79,12 +79,13 @@ def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
     from reports.break_even import break_even
     from reports.convergence import convergence_curve
     from reports.roll_outs import draw_roll_outs
+    from reports.shapes import against_shape
     from reports.stability import stability_maps
     from reports.work_precision import error_against_time
 
     pictures = draw_roll_outs(folder, run, lambda path: read_trajectory(folder, path, problems))
     for make in (
-        error_against_time, break_even, figures.dots, figures.against_vertices,
+        error_against_time, break_even, figures.dots, figures.against_vertices, against_shape,
         figures.known_answers, stability_maps,
     ):  # fmt: skip
         pictures += make(folder.figures, run)

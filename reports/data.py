@@ -11,7 +11,7 @@ import pandas as pd
 from benchmarks.results import COLUMNS, ROLES, Row, as_right
 
 USABLE = ("ok", "stalled")
-SUITES = ("garments", "speed", "validation", "extremes", "performance")
+SUITES = ("garments", "speed", "validation", "extremes", "shapes", "performance")
 
 
 @dataclass(frozen=True)

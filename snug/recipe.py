@@ -38,13 +38,15 @@ class Recipe:
     h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
     remembered: that noise is added to the state which the network last had after the frame before (see
         snug.hidden_state_cache), instead of to nothing. Not for what learns simulated vertices, nor where
-        `shape_range` gives a sub-sequence another body each time; of little use where `window_stride` is no
+        each window gets a shape of its own (`shape_of`); of little use where `window_stride` is no
         divisor of `window`, for then few frames before a window ever end one.
     window, batch: frames of a sub-sequence, sub-sequences of a step.
     window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
     even: parts of an epoch that each pass over all motions, each taking one sub-sequence of so many: by
         chance alone (1) a hard pose may come so late that the network, by then settled, meets it with joules.
-    shape_range: each sub-sequence gets shape numbers from U(-r, r).
+    shape_range: bodies get shape numbers from U(-r, r). shape_of: who gets them, each `window` in each step
+        anew, as the paper has it, or each mixed `clip` once, while given motions stay on the mean body: what
+        is known of a frame (its posed body, its anchors, the state before it) then stays true.
     contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
     contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most one
@@ -84,6 +86,7 @@ class Recipe:
     window_stride: int = 1
     even: int = 20
     shape_range: float = 0.0
+    shape_of: str = "window"
     contact_samples: str = "all"
     contact_stiffness: float | None = None
     contact_margin: float | None = None
@@ -109,6 +112,7 @@ class Recipe:
             ("contact_samples", ("all", "vertices")),
             ("material", ("stvk", "springs", "pbns")),
             ("bending", ("length_area", "none")),
+            ("shape_of", ("window", "clip")),
         ):
             if getattr(self, option) not in allowed:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
@@ -127,6 +131,10 @@ class Recipe:
         for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
+        if self.shape_of == "clip" and self.shape_range and not self.mixed:
+            raise RecipeError(
+                "recipe option shape_of='clip': mixed clips get the shapes, so mixed above zero"
+            )
         if self.mixed_lift > 1.0:
             raise RecipeError(f"recipe option mixed_lift={self.mixed_lift}: a share, so at most 1")
         for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):

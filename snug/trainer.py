@@ -33,6 +33,7 @@ from snug.training_contact import Posed, TrainingContact
 from snug.training_set import Batch, TrainingError, TrainingSet
 
 DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
+CLIP_SHAPES = 1  # stream of random numbers beside the seed's own
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -67,8 +68,9 @@ class Trainer:
         self.kernels = device.type == "cpu" if kernels is None else kernels
         mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
         self.data = TrainingSet(
-            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
-        )
+            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences,
+            device=device, shapes=self._shapes_of_clips(dressed, len(motions), len(mixed)),
+        )  # fmt: skip
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
         pins = dressed.garment.pins
         network = make_network(
@@ -83,9 +85,7 @@ class Trainer:
         )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
-        self.shaped = (
-            bool(recipe.shape_range and dressed.body.shape_count) and how.features == "motion" and how.physics
-        )
+        self.shaped = self._learns_shapes(dressed) and recipe.shape_of == "window"
         self.windows = recipe.batch if how.sequences else recipe.batch * recipe.window
         self.order = np.empty(0, np.int64)
         self.epoch = 0
@@ -126,6 +126,19 @@ class Trainer:
             )
             self.pretraining_seconds = time.perf_counter() - begun
 
+    def _learns_shapes(self, dressed: DressedBody) -> bool:
+        """Whether bodies of other shapes than the mean are drawn."""
+        drawn = self.recipe.shape_range and dressed.body.shape_count
+        return bool(drawn) and self.how.features == "motion" and self.how.physics
+
+    def _shapes_of_clips(self, dressed: DressedBody, given: int, mixed: int) -> np.ndarray | None:
+        """Shape numbers (given + mixed, S) where each mixed clip has its own; given motions have the mean."""
+        if not self._learns_shapes(dressed) or self.recipe.shape_of != "clip":
+            return None
+        random = np.random.default_rng([self.seed, CLIP_SHAPES])
+        drawn = random.uniform(-1, 1, (mixed, dressed.body.shape_count)) * self.recipe.shape_range
+        return np.concatenate([np.zeros((given, dressed.body.shape_count)), drawn])
+
     def _hidden_state_cache(self) -> HiddenStateCache | None:
         start = self.network.random_state(1, 0.0, torch.Generator())
         remembered = self.recipe.remembered and not self.shaped  # a state belongs to one body
@@ -141,7 +154,7 @@ class Trainer:
             data,
             self.loss.contact,
             refresh=self.recipe.contact_refresh,
-            one_shape=not self.shaped,
+            kept=not self.shaped,
             kernels=self.kernels,
             group=self.group if data is self.data else ALONE,
         )
