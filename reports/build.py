@@ -26,8 +26,8 @@ TEMPLATE = Path(__file__).parent / "report.typ"
 # Names of what draw() makes.
 FIGURES = (
     "against_shape.*", "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "energy_series_*",
-    "error_against_time*", "failures.*", "frames_*", "hem_*", "histograms.*", "known_answers.*", "lead.*", "map_*",
-    "stability_maps.*", "strip_*", "training_*", "training.*",
+    "error_against_time*", "failures.*", "frames_*", "hem_*", "histograms.*", "known_answers.*", "lead.*",
+    "map_*", "stability_maps.*", "strip_*", "training_*", "training.*",
 )  # fmt: skip
 
 

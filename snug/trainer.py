@@ -132,11 +132,13 @@ class Trainer:
         return bool(drawn) and self.how.features == "motion" and self.how.physics
 
     def _shapes_of_clips(self, dressed: DressedBody, given: int, mixed: int) -> np.ndarray | None:
-        """Shape numbers (given + mixed, S) where each mixed clip has its own; given motions have the mean."""
-        if not self._learns_shapes(dressed) or self.recipe.shape_of != "clip":
+        """Shape numbers (given + mixed, S) where mixed clips have their own; given motions have the mean."""
+        recipe = self.recipe
+        if not self._learns_shapes(dressed) or recipe.shape_of != "clip":
             return None
         random = np.random.default_rng([self.seed, CLIP_SHAPES])
-        drawn = random.uniform(-1, 1, (mixed, dressed.body.shape_count)) * self.recipe.shape_range
+        drawn = random.uniform(-1, 1, (mixed, dressed.body.shape_count)) * recipe.shape_range
+        drawn[random.random(mixed) >= recipe.shape_share] = 0.0
         return np.concatenate([np.zeros((given, dressed.body.shape_count)), drawn])
 
     def _hidden_state_cache(self) -> HiddenStateCache | None:
