@@ -45,6 +45,7 @@ MOST_MIXED = 20_000  # frames: each keeps its body and its anchors
 MOST_ANCHORS = 2e9  # bytes, of those of mixed frames
 ANCHORS = 24  # bytes of a frame's for each vertex: six samples, four bytes each
 HIPS, SIDEWAYS = (JOINT["left_hip"], JOINT["right_hip"]), np.array([1.0, 0.0, 0.0])
+SHAPES = 1  # stream of random numbers beside that of the clips
 OPENINGS = 5  # leave less than a degree missing, almost always
 
 
@@ -53,6 +54,16 @@ def mixed_for(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed:
     given = sum(motion.frames for motion in motions)
     frames = min(round(recipe.mixed * given), MOST_MIXED, int(MOST_ANCHORS / (ANCHORS * vertices)))
     return mixed_motions(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
+
+
+def shapes_of_mixed(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:
+    """Shape numbers (count, coefficients) of the bodies of mixed clips, where each has its own: those of the
+    recipe's share from its U(-r, r), the others zero.
+    """
+    random = np.random.default_rng([seed, SHAPES])
+    drawn = recipe.shape_range * random.uniform(-1.0, 1.0, (count, coefficients))
+    drawn[random.random(count) >= recipe.shape_share] = 0.0
+    return drawn
 
 
 def mixed_motions(

@@ -89,7 +89,7 @@ def _without(term: str) -> Recipe:
 
 # Longer windows get smaller batches, so that a step sees 48 frames in each.
 ABLATIONS = (
-    replace(DEFAULT, name="shapes", shape_range=3.0, shape_of="clip"),
+    replace(DEFAULT, name="shapes", shape_range=3.0, shape_of="clip", shape_share=0.5),
     *(_without(term) for term in ("bending", "strain", "gravity", "inertia")),
     replace(DEFAULT, name="no-noise", h0_sigma=0.0, remembered=False),
     replace(DEFAULT, name="noise-alone", h0_sigma=0.1, remembered=False),  # as the paper has it

@@ -21,7 +21,7 @@ from snug.dressed_body import DressedBody
 from snug.fast_skinning import FastSkin
 from snug.hidden_state_cache import HiddenStateCache
 from snug.loss import PhysicsLoss
-from snug.motion_augmentation import mixed_for
+from snug.motion_augmentation import mixed_for, shapes_of_mixed
 from snug.parallel import ALONE, Group, GroupError
 from snug.pca_dynamics import DynamicsSupervision
 from snug.recipe import Recipe
@@ -33,7 +33,6 @@ from snug.training_contact import Posed, TrainingContact
 from snug.training_set import Batch, TrainingError, TrainingSet
 
 DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
-CLIP_SHAPES = 1  # stream of random numbers beside the seed's own
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -67,9 +66,16 @@ class Trainer:
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
         mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
+        drawn = recipe.shape_range and dressed.body.shape_count and how.features == "motion" and how.physics
+        self.shaped = bool(drawn) and recipe.shape_of == "window"
+        shapes = None
+        if drawn and recipe.shape_of == "clip":
+            mean = np.zeros((len(motions), dressed.body.shape_count))
+            of_mixed = shapes_of_mixed(len(mixed), dressed.body.shape_count, recipe, seed=seed)
+            shapes = np.concatenate([mean, of_mixed])
         self.data = TrainingSet(
             dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences,
-            device=device, shapes=self._shapes_of_clips(dressed, len(motions), len(mixed)),
+            device=device, shapes=shapes,
         )  # fmt: skip
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
         pins = dressed.garment.pins
@@ -85,7 +91,6 @@ class Trainer:
         )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
-        self.shaped = self._learns_shapes(dressed) and recipe.shape_of == "window"
         self.windows = recipe.batch if how.sequences else recipe.batch * recipe.window
         self.order = np.empty(0, np.int64)
         self.epoch = 0
@@ -125,21 +130,6 @@ class Trainer:
                 self.network, steps=recipe.pretraining, sigma=recipe.h0_sigma, seed=self.seed
             )
             self.pretraining_seconds = time.perf_counter() - begun
-
-    def _learns_shapes(self, dressed: DressedBody) -> bool:
-        """Whether bodies of other shapes than the mean are drawn."""
-        drawn = self.recipe.shape_range and dressed.body.shape_count
-        return bool(drawn) and self.how.features == "motion" and self.how.physics
-
-    def _shapes_of_clips(self, dressed: DressedBody, given: int, mixed: int) -> np.ndarray | None:
-        """Shape numbers (given + mixed, S) where mixed clips have their own; given motions have the mean."""
-        recipe = self.recipe
-        if not self._learns_shapes(dressed) or recipe.shape_of != "clip":
-            return None
-        random = np.random.default_rng([self.seed, CLIP_SHAPES])
-        drawn = random.uniform(-1, 1, (mixed, dressed.body.shape_count)) * recipe.shape_range
-        drawn[random.random(mixed) >= recipe.shape_share] = 0.0
-        return np.concatenate([np.zeros((given, dressed.body.shape_count)), drawn])
 
     def _hidden_state_cache(self) -> HiddenStateCache | None:
         start = self.network.random_state(1, 0.0, torch.Generator())

@@ -190,6 +190,15 @@ def test_each_mixed_clip_has_a_body_of_its_own_and_given_motions_the_mean_one():
     assert not mine.shapes[0].any() and len(drawn) == 6 and len(np.unique(drawn)) == drawn.size
     assert 2.5 < np.abs(drawn).max() <= 3.0 and 0.2 < (drawn > 0).mean() < 0.8
     assert np.array_equal(data(0).shapes, mine.shapes) and not np.isin(data(1).shapes[1:], drawn).any()
+    half = Trainer(
+        "snug",
+        tube_dress(),
+        [swaying(30)],
+        steps=1,
+        seed=0,
+        recipe=replace(SHAPED, mixed=60.0, shape_share=0.5),
+    ).data.shapes
+    assert 8 <= (half == 0.0).all(1)[1:].sum() <= 22 and len(half) == 31
     clips = mixed_for([swaying(30)], SHAPED, vertices=dressed.vertices, seed=0)
     windows = np.array([4, np.flatnonzero(mine.starts == mine.first[3] + 7)[0]])
     batch = mine.batch(windows)
