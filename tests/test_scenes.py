@@ -117,6 +117,8 @@ def test_shapes_are_asked_for_by_name_or_by_the_largest_preset():
     assert scenes("--suite", "shapes") == every and scenes("--scenes", "shapes/*") == every
     assert not {*scenes(), *scenes("--suite", "garments")} & set(every)
     assert set(every) <= set(scenes("--preset", "paper"))
+    cells = planned("--suite", "shapes", "--methods", "snug*").cells
+    assert {c.suites for c in cells} == {("shapes",)} and "snug-shapes" in {c.method for c in cells}
 
 
 def test_the_sheet_is_a_square_without_slivers():
