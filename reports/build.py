@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 TEMPLATE = Path(__file__).parent / "report.typ"
 # Names of what draw() makes.
 FIGURES = (
-    "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "equal_data.*", "energy_series_*",
-    "error_against_time*", "failures.*", "frames_*", "held_out.*", "hem_*", "histograms.*",
+    "against_shape.*", "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "equal_data.*",
+    "energy_series_*", "error_against_time*", "failures.*", "frames_*", "held_out.*", "hem_*", "histograms.*",
     "known_answers.*", "lead.*", "map_*", "stability_maps.*", "strip_*", "training_*", "training.*",
 )  # fmt: skip
 
@@ -85,13 +85,14 @@ def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: li
     from reports.convergence import convergence_curve
     from reports.equal_data import error_against_frames, held_out_curves
     from reports.roll_outs import draw_roll_outs
+    from reports.shapes import against_shape
     from reports.stability import stability_maps
     from reports.training import training_curves
     from reports.work_precision import error_against_time
 
     pictures = draw_roll_outs(folder, run, lambda path: read_trajectory(folder, path, problems))
     for make in (
-        error_against_time, break_even, figures.dots, figures.against_vertices,
+        error_against_time, break_even, figures.dots, figures.against_vertices, against_shape,
         figures.known_answers, stability_maps, error_against_frames,
     ):  # fmt: skip
         pictures += make(folder.figures, run)

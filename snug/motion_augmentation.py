@@ -51,6 +51,7 @@ MOST_ANCHORS = 2e9  # bytes, of those of mixed frames
 ANCHORS = 24  # bytes of a frame's for each vertex: six samples, four bytes each
 HIPS, SIDEWAYS = (JOINT["left_hip"], JOINT["right_hip"]), np.array([1.0, 0.0, 0.0])
 SHOULDERS, FRONT = (JOINT["left_shoulder"], JOINT["right_shoulder"]), np.array([0.0, 0.0, 1.0])
+SHAPES = 1  # stream of random numbers beside that of the clips
 OPENINGS = 5  # leave less than a degree missing, almost always
 
 
@@ -66,6 +67,16 @@ def shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> lis
     recipe does. Fewer are the first of more.
     """
     return mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+
+
+def shapes_of_mixed(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:
+    """Shape numbers (count, coefficients) of the bodies of mixed clips, where each has its own: those of the
+    recipe's share from its U(-r, r), the others zero.
+    """
+    random = np.random.default_rng([seed, SHAPES])
+    drawn = recipe.shape_range * random.uniform(-1.0, 1.0, (count, coefficients))
+    drawn[random.random(count) >= recipe.shape_share] = 0.0
+    return drawn
 
 
 def mixed_motions(

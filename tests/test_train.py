@@ -9,15 +9,17 @@ import pytest
 import torch
 from dressing import leaning, swaying, tube_dress
 
+from reference_sim.energies import StretchStVK
 from snug import trained_model
 from snug.baselines.supervised import TargetError, vertex_loss
 from snug.motion import Motion, arm_clearance
 from snug.motion_augmentation import hung_arms, lap_clearance, mirrored, mixed_for, mixed_motions
 from snug.motion_library import TRAIN, make_motion
-from snug.recipe import DEFAULT, Recipe
+from snug.recipe import DEFAULT, Recipe, RecipeError
 from snug.recipes import PAPER, SUPERVISED
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions
+from snug.skinning import skin
 from snug.trained_model import ModelFileError, TrainedModel
 from snug.trainer import Trainer
 from snug.training import train, untrained_model
@@ -174,6 +176,61 @@ def test_paper_recipe_varies_the_body(monkeypatch):
     assert (
         betas.shape == (8 * 16, 10) and betas.max() > 2.5 and betas.min() < -2.5 and np.abs(betas).max() <= 3
     )
+
+
+SHAPED = replace(DEFAULT, shape_range=3.0, shape_of="clip")
+
+
+def test_each_mixed_clip_has_a_body_of_its_own_and_given_motions_the_mean_one():
+    def data(seed):
+        return Trainer("snug", tube_dress(), [swaying(30)], steps=1, seed=seed, recipe=SHAPED).data
+
+    mine, dressed = data(0), tube_dress()
+    drawn = mine.shapes[1:]
+    assert not mine.shapes[0].any() and len(drawn) == 6 and len(np.unique(drawn)) == drawn.size
+    assert 2.5 < np.abs(drawn).max() <= 3.0 and 0.2 < (drawn > 0).mean() < 0.8
+    assert np.array_equal(data(0).shapes, mine.shapes) and not np.isin(data(1).shapes[1:], drawn).any()
+    half = Trainer(
+        "snug",
+        tube_dress(),
+        [swaying(30)],
+        steps=1,
+        seed=0,
+        recipe=replace(SHAPED, mixed=60.0, shape_share=0.5),
+    ).data.shapes
+    assert 8 <= (half == 0.0).all(1)[1:].sum() <= 22 and len(half) == 31
+    clips = mixed_for([swaying(30)], SHAPED, vertices=dressed.vertices, seed=0)
+    windows = np.array([4, np.flatnonzero(mine.starts == mine.first[3] + 7)[0]])
+    batch = mine.batch(windows)
+    for row, (motion, betas, first) in enumerate([(swaying(30), None, 4), (clips[2], drawn[2], 7)]):
+        now = slice(first, first + 3)
+        assert torch.allclose(batch.rest[row, 0], dressed.rest(betas), atol=1e-6)
+        assert torch.allclose(batch.transforms[row], dressed.transforms(motion.poses, betas)[now])
+        assert torch.equal(batch.features[row], dressed.features(motion, SHAPED, betas)[now])
+
+
+def test_a_shape_on_another_body_is_strained_as_the_simulator_has_it():
+    """The rest state is the garment's own, whatever body it is on."""
+    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=1, seed=0, recipe=SHAPED)
+    dressed = trainer.dressed
+    betas = trainer.data.shapes[2]
+    batch = trainer.data.at(trainer.data.first[2] + np.arange(3)[None])
+    x = skin(batch.rest, trainer.weights, batch.transforms)
+    strain = trainer.loss(x, batch.ahead, None)["strain"][0]
+    expected = [
+        StretchStVK(dressed.garment.cloth()).value_and_gradient(own.double().numpy())[0] for own in x[0]
+    ]
+    assert strain.numpy() == pytest.approx(expected, rel=1e-3)
+    unposed = dressed.garment.rest_for(dressed.body, betas)
+    assert (
+        StretchStVK(dressed.garment.cloth()).value_and_gradient(unposed)[0] > 0.01
+    )  # [J]: not at rest there
+
+
+def test_shapes_of_clips_want_clips():
+    with pytest.raises(RecipeError, match="mixed above zero"):
+        replace(SHAPED, mixed=0.0)
+    assert Trainer("pbns", tube_dress(), [swaying(30)], steps=1, seed=0, recipe=SHAPED).data.shapes is None
 
 
 def test_other_skeletons_pose_as_the_body_does():
