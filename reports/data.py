@@ -12,7 +12,7 @@ from benchmarks.results import COLUMNS, ROLES, Row, as_right
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
 USABLE = ("ok", "stalled")
-SUITES = ("garments", "speed", "validation", "extremes", "performance")
+SUITES = ("garments", "speed", "validation", "extremes", "shapes", "performance")
 
 
 @dataclass(frozen=True)
