@@ -78,6 +78,7 @@ OTHER_SOLVERS = (
 )  # fmt: skip
 EXTERNAL = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
 FAST = ("skinning", "snug", "supervised", "pbns")
+OTHER_SPRINGS = ("simulation-springs", "simulation-pbns-springs")
 CHEAP = ("snug+fast-lbfgs-1", "fast-lbfgs-10")  # solvers of some milliseconds, where others are not asked
 
 
@@ -153,7 +154,9 @@ SUITES = (
             *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
             "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
-        named_methods=tuple(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
+        named_methods=(
+            *OTHER_SPRINGS, *(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
+        ),
     ),
     Suite(
         name="speed",
@@ -174,6 +177,7 @@ SUITES = (
         scenes=_dependence,
         methods=lambda extent: ["simulation", "skinning", "newton-1"],
         more_methods=("simulation-printed-bending",),
+        named_methods=OTHER_SPRINGS,
     ),
     Suite(
         name="extremes",

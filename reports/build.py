@@ -1,8 +1,8 @@
 """python -m reports.build RUN_DIR: the tables, figures and PDF of a finished run.
 
-Reads run.json, results.csv, trajectories and histories of trainings in RUN_DIR, and nothing else; writes
-tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same bytes
-twice.
+Reads run.json, results.csv, frame_energies.csv, trajectories and histories of trainings in RUN_DIR, and
+nothing else; writes tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it
+writes the same bytes twice.
 """
 
 from __future__ import annotations
@@ -73,9 +73,11 @@ def read_run(folder: RunFolder) -> Run:
     config, rows = folder.read_config(), folder.read_rows()
     if not rows:
         raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
+    from reports.by_frame import read_frames
     from reports.data import run_data
 
-    return run_data(config, rows, folder.changed(config))
+    run = run_data(config, rows, folder.changed(config))
+    return replace(run, frames=read_frames(folder.frame_energies_path))
 
 
 def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: list[str]) -> list[Picture]:
