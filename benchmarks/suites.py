@@ -154,7 +154,9 @@ SUITES = (
             *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
             "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
-        named_methods=(*OTHER_SPRINGS, *(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA))),
+        named_methods=(
+            *OTHER_SPRINGS, *(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
+        ),
     ),
     Suite(
         name="speed",
