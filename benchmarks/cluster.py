@@ -31,7 +31,7 @@ from .source import digest
 from .tasks.task import Outcome, RunStopped, Task, TaskId, failure, one_line
 
 ATTEMPTS = 3  # workers that may die of a task
-LOOK = 1.0  # [s] between looks at which workers there are and how far they are
+LOOK = 2.0  # [s] between looks at which workers there are and how far they are
 FIRST = 10.0  # [s] in which a scheduler answers at first
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
 ANSWER = 60.0  # [s] for an outcome to come once the task has ended
