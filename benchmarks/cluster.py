@@ -32,7 +32,7 @@ from .tasks.task import Outcome, RunStopped, Task, TaskId, failure, one_line
 
 ATTEMPTS = 3  # workers that may die of a task
 LOOK = 2.0  # [s] between looks at which workers there are and how far they are
-FIRST = 10.0  # [s] in which a scheduler answers at first
+FIRST = 5.0  # [s] in which a scheduler answers at first
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
 ANSWER = 60.0  # [s] for an outcome to come once the task has ended
 
@@ -98,6 +98,7 @@ class ClusterExecutor(LocalExecutor):
         self._died: dict[TaskId, list[str]] = {}  # addresses of the workers that died of a task
         self._waiting: deque[tuple[deque[Task], Needed]] = deque()
         self._finished: deque[Done] = deque()
+        self._opened = False  # whether any worker has begun with the run
         self._looked = 0.0
         self._said_alone = False
 
@@ -129,12 +130,11 @@ class ClusterExecutor(LocalExecutor):
         super()._dismiss()
         for _, lane in self._busy():
             lane.future.release()
-        if self._workers and self._client.status == "running":
-            with suppress(OSError):  # no scheduler: its workers end by themselves
-                self._client.run(
-                    cluster_worker.close_run, self._run, workers=list(self._workers), on_error="ignore"
-                )
         self._workers.clear()
+        if self._opened and self._client.status == "running":
+            with suppress(OSError):  # no scheduler: its workers end by themselves
+                self._client.run(cluster_worker.close_run, self._run, on_error="ignore")
+        self._opened = False
         self._run = uuid.uuid4().hex
 
     # --- workers -------------------------------------------------------------------------------------------
@@ -175,6 +175,7 @@ class ClusterExecutor(LocalExecutor):
         """Let these workers begin with the run."""
         if not threads:
             return
+        self._opened = True
         begin, addresses = cluster_worker.open_run, list(threads)
         answers = self._client.run(begin, self._run, workers=addresses, on_error="return")
         for address, answer in answers.items():

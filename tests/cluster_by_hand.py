@@ -10,11 +10,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.cache import Cache
+from benchmarks.cluster import ClusterExecutor
+from benchmarks.executor import Executor
+from benchmarks.results import RunFolder
+from benchmarks.runner import Runner
 from benchmarks.tasks.task import Outcome, Task
 
 TESTS = Path(__file__).resolve().parent
@@ -39,6 +44,14 @@ class Cluster:
             time.sleep(0.05)
         self.address = json.loads(file.read_text())["address"]
 
+    def restart_scheduler(self) -> None:
+        """Kill it and start another at its address; the workers end by themselves."""
+        self.scheduler.kill()
+        self.scheduler.wait()
+        for worker in self.workers:
+            worker.wait(30)
+        self.start_scheduler(int(self.address.rpartition(":")[2]))
+
     def add(self, *words: str, **environment: str) -> subprocess.Popen:
         """Start a worker of one thread."""
         words = (self.address, "--nthreads", "1", "--local-directory", str(self.folder), *words)
@@ -47,12 +60,12 @@ class Cluster:
         return self.workers[-1]
 
     def _start(self, what: str, *words: str, **environment: str) -> subprocess.Popen:
-        return subprocess.Popen(
-            [sys.executable, "-m", f"distributed.cli.dask_{what}", *words, "--no-dashboard"],
-            env=os.environ | {"PYTHONPATH": PATH} | environment, cwd=self.folder,
-            stdout=subprocess.DEVNULL, stderr=(self.folder / f"{what}.log").open("ab"),
-            start_new_session=True,
-        )  # fmt: skip
+        with (self.folder / f"{what}.log").open("ab") as log:
+            return subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.dask_{what}", *words, "--no-dashboard"],
+                env=os.environ | {"PYTHONPATH": PATH} | environment, cwd=self.folder,
+                stdout=subprocess.DEVNULL, stderr=log, start_new_session=True,
+            )  # fmt: skip
 
     def close(self) -> None:
         for process in (*self.workers, self.scheduler):
@@ -115,3 +128,36 @@ class Write(Task):
 
 def write(name: str, **fields) -> Write:
     return Write(name=name, label=name, inputs={}, modules=("benchmarks.results",), **fields)
+
+
+def chain(**fields) -> list[Write]:
+    """Twelve tasks in three rounds, the later ones made from the earlier ones, the last two one batch."""
+
+    def number(n: int, *needs: int, **more) -> Write:
+        ids = tuple(("numbers", str(need)) for need in needs)
+        return write(str(n), seed=n, needs=ids, **fields | more)
+
+    first = [number(n) for n in range(6)]
+    return [
+        *first,
+        *(number(n, n - 6, 0) for n in range(6, 10)),
+        *(number(n, 6, batch="b") for n in (10, 11)),
+    ]
+
+
+class NoLog:
+    def stage(self, name):
+        return nullcontext()
+
+
+def finish(folder: Path, executor: Executor, **fields) -> Runner:
+    """The chain, run or reused."""
+    runner = Runner(chain(**fields), Cache(RunFolder(folder), origin={"commit": "c", "hardware": "h"}))
+    runner.run(executor, NoLog())
+    return runner
+
+
+def main(folder: str, address: str, seconds: str, mark: str) -> None:
+    """The chain on a cluster."""
+    executor = ClusterExecutor(RunFolder(folder), None, 1, address)
+    finish(Path(folder), executor, seconds=float(seconds), mark=mark)
