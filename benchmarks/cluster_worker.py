@@ -1,7 +1,8 @@
 """What a worker of a cluster does for a run: keeps its files, and does its tasks in processes of their own.
 
-Loads little: what computes is in the tasks' processes. Everything here is called by benchmarks.cluster, in the process of a worker of
-dask.distributed; `dask_worker` is that worker. A run that asks for nothing any more is forgotten.
+Loads little: what computes is in the tasks' processes. Everything here is called by benchmarks.cluster, in
+the process of a worker of dask.distributed; `dask_worker` is that worker. A run that asks for nothing any
+more is forgotten.
 """
 
 from __future__ import annotations

@@ -229,7 +229,8 @@ def test_workers_behind_a_nanny_need_a_setting_and_then_come_back(folder, tmp_pa
         none.add("--nanny")
         with pytest.raises(RunStopped, match="DASK_DISTRIBUTED__WORKER__DAEMON=False"):
             together(folder, none.address, [write("one")])
-        none.workers.pop().kill()
+        none.workers[0].terminate()
+        none.workers[0].wait(30)
         none.add("--nanny", DASK_DISTRIBUTED__WORKER__DAEMON="False")
         found = together(folder, none.address, [write("deadly", how="die with the worker"), write("after")])
     assert found["deadly"].failed and found["after"].status == "ok"
