@@ -147,6 +147,7 @@ class NoLog:
 
 def finish(folder: Path, executor: Executor, **fields) -> Runner:
     """The chain, run or reused."""
+    RunFolder(folder).remove_parts()
     runner = Runner(chain(**fields), Cache(RunFolder(folder), origin={"commit": "c", "hardware": "h"}))
     runner.run(executor, NoLog())
     return runner
