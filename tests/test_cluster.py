@@ -106,8 +106,10 @@ def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path
 def test_failures_are_values_and_a_batch_stays_together(two, folder):
     large = 2 * runner_side.PIECE // 8 + 5  # numbers: more than two pieces
     batch = [write("one"), write("bad", how="raise"), write("large", count=large)]
-    found = together(folder, two.address, batch, [write("dies", how="die")], [write("after")])
-    assert found["large"].result["memo"] == ["one", "large"] and found["after"].result["memo"] == ["after"]
+    others = [[write("dies", how="die")], *([write(name)] for name in "abc")]  # two of these in one process
+    found = together(folder, two.address, batch, *others)
+    assert found["large"].result["memo"] == ["one", "large"]
+    assert all(found[name].result["memo"] == [name] for name in "abc")
     assert found["bad"].reason == "ValueError: broken on purpose"
     assert found["dies"].status == "out-of-memory" and "SIGKILL" in found["dies"].reason
     expected = np.random.default_rng(0).random(large)
