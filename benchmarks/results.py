@@ -184,6 +184,11 @@ class RunFolder:
         return self.path / "results.csv"
 
     @property
+    def frame_energies_path(self) -> Path:
+        """See benchmarks.frame_energies."""
+        return self.path / "frame_energies.csv"
+
+    @property
     def report_path(self) -> Path:
         return self.path / "report.pdf"
 
@@ -231,6 +236,10 @@ class RunFolder:
     def curves_path(self, scene: str, method: str, seed: int = 0) -> Path:
         """What was measured of each frame of a trajectory, beside it: name -> (T,) or (T,V)."""
         return self.trajectory_path(scene, method, seed).with_suffix(".npz")
+
+    def clips_path(self, clips: str, method: str, part: int) -> Path:
+        """Simulated mixed clips: name -> vertices (T,V,3) [m]."""
+        return self.trajectory_path(clips, f"{method}-{part}").with_suffix(".npz")
 
     def start_path(self, scene: str) -> Path:
         """The settled start (V,3) [m] of a dressed scene."""

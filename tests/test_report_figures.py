@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from report_folder import FRAMES, mesh, row, run_of, sheet, write_model
 
 from benchmarks.results import RunFolder
@@ -13,6 +14,7 @@ from reports import (
     pictures,
     render,
     roll_outs,
+    shapes,
     stability,
     styles,
     training,
@@ -183,7 +185,7 @@ def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
     write_model(folder.models / ".pbns-seed0.checkpoint.safetensors", "pbns", strain=0.1)
     run, read = run_of([row(), row(method="pbns")]), []
     monkeypatch.setattr(training, "read_history", lambda path, method: read.append(path))
-    assert training.training_curves(folder, run, []) == []
+    assert training.read_histories(folder, run, []) == []
     assert [path.name for path in read] == ["snug-seed0.safetensors"]
 
 
@@ -192,7 +194,9 @@ def test_every_garment_has_its_training_curves(tmp_path):
     for garment in ("tshirt", "tunic"):
         write_model(folder.models_of(garment) / "snug-seed0.safetensors", "snug", strain=0.1)
     run = run_of([row(), row("tunic/stop")])
-    pictures = training.training_curves(folder, run, [])
+    histories = training.read_histories(folder, run, [])
+    assert training.training_curves(folder.figures, run, []) == []
+    pictures = training.training_curves(folder.figures, run, histories)
     assert [picture.path.name for picture in pictures] == ["training.svg", "training_tunic.svg"]
     assert [picture.caption.partition(":")[0] for picture in pictures] == ["tshirt", "tunic"]
 
@@ -255,6 +259,37 @@ def test_errors_are_drawn_against_the_vertices_that_scenes_declare(tmp_path, mon
     (line,) = figure.axes[0].get_lines()
     assert list(line.get_xdata()) == [500.0, 2000.0] and list(line.get_ydata()) == [5.0, 20.0]
     assert figures.against_vertices(tmp_path, run_of(rows[2:])) == []
+
+
+def shaped(method, metric, values, **more):
+    rows = [row(f"shapes/{place}", method, metric, value, suite="shapes", garment="tshirt", **more)
+            for place, value in enumerate(values)]  # fmt: skip
+    return rows
+
+
+def test_energies_are_drawn_and_listed_against_the_shape(tmp_path, monkeypatch):
+    rows = shaped("simulation", "body/shape", (0.0, 6.0, 4.0), unit="1")
+    rows += shaped("simulation", "energy/total", (0.3, 0.5, 0.4))
+    rows += shaped("snug", "energy/total", (0.35, 0.8, 0.6)) + shaped(
+        "snug", "energy/strain", (0.1, 0.4, 0.2)
+    )
+    (figure,) = drawn_by(monkeypatch, shapes.against_shape, tmp_path, run_of(rows))
+    lines = {tuple(line.get_ydata()) for line in figure.axes[0].get_lines()}
+    assert lines == {(0.3, 0.4, 0.5), (0.35, 0.6, 0.8)} and len(figure.axes) == 2
+    assert all(list(line.get_xdata()) == [0.0, 4.0, 6.0] for line in figure.axes[0].get_lines())
+
+    (made,) = shapes.shapes(run_of(rows))
+    names = [column.name for column in made.columns]
+    assert names == ["scene", "shape", "method", "above", "energy/total", "energy/strain"]
+    found = {(line[0], line[2]): line for line in made.rows}
+    assert list(found)[:4] == [(s, m) for s in ("other shapes", "shapes/0") for m in ("simulation", "snug")]
+    together = found["other shapes", "snug"]
+    assert together[3] == pytest.approx(0.7 - 0.45) and together[4].value == pytest.approx(0.7)
+    assert found["shapes/2", "snug"][1] == 4.0 and found["shapes/2", "snug"][3] == pytest.approx(0.2)
+    assert found["shapes/2", "simulation"][3] is None and found["shapes/2", "simulation"][5] is None
+
+    one = [r for r in rows if r.scene == "shapes/0"]
+    assert shapes.shapes(run_of(one)) == shapes.against_shape(tmp_path, run_of(one)) == []
 
 
 def test_histograms_hold_every_vertex_once(tmp_path, monkeypatch):
