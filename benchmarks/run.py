@@ -140,6 +140,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         only=only,
         fresh=options.fresh,
         workers=workers,
+        scheduler=choose_scheduler(options),
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
 
@@ -229,6 +230,22 @@ def check_device(device: str) -> None:
         from snug.device import find_device
 
         find_device(device)
+
+
+def choose_scheduler(options: argparse.Namespace) -> str:
+    """The address of a scheduler that answers; empty without one. Raises ClusterError, PlanError."""
+    if options.scheduler is None:
+        return ""
+    if options.device != "cpu":
+        raise PlanError(
+            f"--device {options.device}: on a cluster networks train on cpu; leave out --scheduler"
+        )
+    if options.rollout:
+        raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
+    from .cluster import check_scheduler
+
+    check_scheduler(options.scheduler)
+    return options.scheduler
 
 
 def choose_folder(out: str | None) -> Path:
