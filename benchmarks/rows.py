@@ -146,16 +146,13 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
 
 def model_costs(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str, float]:
     """cost/data, cost/setup, cost/train and cost/memory of the cell's network, where it has one."""
-    network, plan = network_of(cell), schedule.plan
+    network = network_of(cell)
     trained = outcomes.get(schedule.network(network).id) if network else None
     if network is None or trained is None or not trained.result:
         return {}
     names = {"cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes"}
     costs = {metric: trained.result[name] for metric, name in names.items()}
-    if not network.learns_from_simulation:
-        return {"cost/data": 0.0} | costs
-    motions = plan.motions.train_of(network.garment)
-    data = [outcomes.get(schedule.data(motion, network.garment).id, Outcome()) for motion in motions]
+    data = [outcomes.get(task.id, Outcome()) for task in schedule.ground_truth(network)]
     return {"cost/data": sum(outcome.seconds for outcome in data)} | costs
 
 

@@ -13,7 +13,12 @@ from ..source import digest
 from .task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from snug.motion import Motion
     from snug.recipes import Training
+
+    from ..assets import Assets
 
 LOG_EVERY = 20  # training steps between two reports of progress
 CHECKPOINT_MINUTES = 5.0  # between two checkpoints: a training of preset quick is over before the first
@@ -25,7 +30,8 @@ class TrainNetwork(Task):
 
     training: its name; chosen: how it is trained, None: not at all; home: what has to be loaded before, as
     the file that declares an energy of its recipe. motions: what it learns from; simulated: motion -> the
-    task that simulates it, where it learns from simulations. device: cpu or cuda, for every part of a step.
+    task that simulates it, where it learns from simulations; clips: those that simulate mixed clips.
+    device: cpu or cuda, for every part of a step.
     key: with equal simulations, a training of the same key that was killed goes on from its last checkpoint,
     and ends as it would have.
     """
@@ -42,6 +48,7 @@ class TrainNetwork(Task):
     steps: int
     motions: tuple[str, ...]
     simulated: Mapping[str, TaskId]
+    clips: tuple[TaskId, ...] = ()
     device: str
     key: str = ""
 
@@ -67,10 +74,13 @@ class TrainNetwork(Task):
         path = self.path(run)
         dressed = DressedBody(assets.body, assets.garments[self.garment])
         motions, targets = self.motions, None
+        mixed: list[Motion] = []
         if self.simulated:
             whole = {m: needed[id] for m, id in self.simulated.items() if self._is_whole(needed.get(id))}
             motions = tuple(whole)
             targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
+            mixed, simulated = self._mixed(assets, run, needed)
+            targets |= simulated
         saving = Saving(
             path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
             resume=True, key=digest([self.key, targets]),
@@ -86,9 +96,9 @@ class TrainNetwork(Task):
             model = untrained_model("snug", dressed, assets.named(motions), seed=self.seed)
         else:
             model = train(
-                self.chosen.kind, dressed, assets.named(motions), steps=self.steps, seed=self.seed,
-                trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False, every=LOG_EVERY,
-                device=self.device, saving=saving,
+                self.chosen.kind, dressed, [*assets.named(motions), *mixed], steps=self.steps,
+                seed=self.seed, trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False,
+                every=LOG_EVERY, device=self.device, saving=saving,
             )  # fmt: skip
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
@@ -96,6 +106,9 @@ class TrainNetwork(Task):
         result = {
             "recipe": model.recipe.name,
             "left_out": [motion for motion in self.motions if motion not in motions],
+            "clips_left_out": sum(len(needed[id].result["left_out"]) for id in self.clips if id in needed),
+            "frames": model.summary.get("training_frames", 0),
+            "simulated_frames": sum(len(vertices) for vertices in (targets or {}).values()),
             "seconds": model.seconds,
             "setup_seconds": model.setup_seconds,
             "megabytes": model.megabytes,
@@ -103,6 +116,23 @@ class TrainNetwork(Task):
             "last": dict(model.history[-1]) if model.history else {},
         }
         return Outcome(result=result, files=(run.relative(path),))
+
+    def _mixed(
+        self, assets: Assets, folder: RunFolder, needed: Mapping[TaskId, Outcome]
+    ) -> tuple[list[Motion], dict[str, np.ndarray]]:
+        """The mixed clips that were simulated, and their vertices by name."""
+        from reference_sim.array_file import read_arrays
+        from snug.motion_augmentation import shared_clips
+
+        found: dict[str, np.ndarray] = {}
+        for id in self.clips:
+            if id in needed:
+                found |= read_arrays(folder.path / needed[id].files[0])
+        if twice := sorted(found.keys() & set(self.motions)):
+            raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
+        vertices = len(assets.garments[self.garment].rest_positions)
+        clips = shared_clips(assets.named(self.motions), len(self.clips), vertices=vertices)
+        return [clip for clip in clips if clip.name in found], found
 
     @staticmethod
     def _is_whole(outcome: Outcome | None) -> bool:
