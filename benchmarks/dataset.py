@@ -59,8 +59,13 @@ def make_parser() -> argparse.ArgumentParser:
 def add_build_options(parser: argparse.ArgumentParser) -> None:
     """What is simulated, and where."""
     add = parser.add_argument
-    add("--motions", action="append", default=[], metavar="PATH",
-        help="motion file (.npz, .bvh, .amc with .asf), folder, or library (default); repeatable")  # fmt: skip
+    add(
+        "--motions",
+        action="append",
+        default=[],
+        metavar="PATH",
+        help="motion file (.npz, .bvh, .amc with .asf), folder, or library (default); repeatable",
+    )
     add_motion_options(add)
     add("--sequences", type=int, metavar="N", help="how many: the first motions, or all and mixed clips "
         "beside them (default: the motions)")  # fmt: skip

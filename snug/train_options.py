@@ -24,8 +24,8 @@ EXAMPLES = """examples:
   torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
 
 supervised, santesteban2019 and tailornet are taught by simulated motions, which python -m benchmarks.dataset
-makes; python -m benchmarks.run makes its own. With --dataset, --garment, --vertices and --body are those that it
-was built with."""
+makes; python -m benchmarks.run makes its own. With --dataset, --garment, --vertices and --body are those that
+it was built with."""
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
