@@ -164,6 +164,9 @@ class StoredPositions:
             return read(file)
 
 
+Positions = np.ndarray | StoredPositions
+
+
 def _size(file: h5py.File) -> tuple[int, int]:
     """Vertices and whole frames, once the file holds as many points as they are."""
     count, frames = int(_whole(file["VTKHDF/NumberOfPoints"])[0]), int(file["benchmark"].attrs["frames"])

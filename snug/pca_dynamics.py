@@ -31,6 +31,7 @@ import torch
 from torch import Tensor
 from torch.nn.utils.rnn import pad_sequence
 
+from reference_sim.trajectory import Positions
 from snug.baselines.supervised import TargetError, all_relative, matched_targets
 from snug.recipe import Recipe
 from snug.regressor import HIDDEN
@@ -55,7 +56,7 @@ class DynamicsSupervision:
         self,
         data: TrainingSet,
         motions: Sequence[Any],
-        trajectories: Mapping[str, np.ndarray] | None,
+        trajectories: Mapping[str, Positions] | None,
         weights: Tensor,
         recipe: Recipe,
     ) -> None:

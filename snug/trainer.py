@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from reference_sim.trajectory import Positions
 from snug.baselines.supervised import VertexTargets
 from snug.device import CPU
 from snug.divergence_guard import SETTLING, DivergenceGuard, live_tensors
@@ -50,7 +51,7 @@ class Trainer:
         steps: int,
         seed: int,
         recipe: Recipe,
-        trajectories: Mapping[str, np.ndarray] | None = None,
+        trajectories: Mapping[str, Positions] | None = None,
         device: torch.device = CPU,
         kernels: bool | None = None,
         group: Group = ALONE,
@@ -100,7 +101,7 @@ class Trainer:
         self._callable = group.wrapped(self.network)
 
     def _set_up_supervision(
-        self, motions: Sequence[Any], trajectories: Mapping[str, np.ndarray] | None
+        self, motions: Sequence[Any], trajectories: Mapping[str, Positions] | None
     ) -> None:
         """By simulated vertices, or by the energies, and then perhaps by simulated dynamics too."""
         how, recipe, data = self.how, self.recipe, self.data

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.trajectory import StoredPositions
+from reference_sim.trajectory import Positions, StoredPositions
 from snug.device import CPU
 from snug.skinning import skin
 
@@ -47,7 +47,7 @@ class VertexTargets:
         self,
         dressed: Any,
         motions: Sequence[Any],
-        trajectories: Mapping[str, np.ndarray | StoredPositions] | None,
+        trajectories: Mapping[str, Positions] | None,
         weights: Tensor,
         transforms: Tensor,
     ) -> None:
@@ -125,7 +125,7 @@ def relative(positions: np.ndarray, pelvis: np.ndarray, motion: str, first: int 
 
 
 def matched_targets(
-    motions: Sequence[Any], trajectories: Mapping[str, np.ndarray | StoredPositions] | None, vertices: int
+    motions: Sequence[Any], trajectories: Mapping[str, Positions] | None, vertices: int
 ) -> list[Any]:
     """(T, V, 3) [m, world] for each motion: an array, or what is still in its file.
 
