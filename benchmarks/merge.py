@@ -1,8 +1,8 @@
 """python -m benchmarks.merge: runs of several machines in one folder, for one report.
 
 Everything but times is compared first, and refused by name where it differs: what the runs were asked for,
-the inputs and the code of every task, and each number that two of them have. Times are those of one machine
-for each metric, the first named that measured it; what others measured is told and not put beside them.
+the inputs and the code of every task, and each number that two of them have. Times are those of one machine,
+the first named that measured any; what others measured is told and not put beside them.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from .cache import read_entry
+from .execution import OF_TRAINING
 from .metrics.cost import METRICS as COSTS
 from .performance.microbenchmark import SUITE
 from .results import ResultsError, Row, RunFolder, digest_of_file
@@ -188,24 +189,25 @@ def joined_rows(runs: Mapping[str, Sequence[Row]]) -> list[Row]:
     runs: folder -> its rows, in the order in which machines are preferred.
     """
     kept: dict[tuple[Any, ...], tuple[Row, str]] = {}
-    machine: dict[str, str] = {}
+    machine: dict[bool, str] = {}  # of trainings, which may have an accelerator, and of all else
     for where, rows in runs.items():
         for row in rows:
             key = (row.suite, row.scene, row.method, row.seed, row.metric)
             there = kept.get(key)
-            if there and there[0].status != row.status and "skipped" not in (there[0].status, row.status):
-                _compare(there, (row, where))  # a cell that came to its end on one machine alone
-            if of_a_machine(row):
-                preferred = row.value is None or machine.setdefault(row.metric, row.hardware) == row.hardware
-                if there is None or (there[0].value is None and preferred and row.value is not None):
-                    kept[key] = (row if preferred else _told(row, machine[row.metric]), where)
-            elif there is None:
-                kept[key] = (row, where)
-            else:
+            if there:
                 _compare(there, (row, where))
-                if there[0].uncertainty is None:
-                    kept[key] = (row, where)
+            kind = row.metric in OF_TRAINING
+            if of_a_machine(row) and row.value is not None:
+                if machine.setdefault(kind, row.hardware) != row.hardware:
+                    row = _told(row, machine[kind])
+            if there is None or _known(row) > _known(there[0]):
+                kept[key] = (row, where)
     return [row for row, _ in kept.values()]
+
+
+def _known(row: Row) -> tuple[bool, bool]:
+    """More of a row that says more."""
+    return row.status != "skipped", row.uncertainty is not None
 
 
 def _told(row: Row, hardware: str) -> Row:
@@ -215,9 +217,12 @@ def _told(row: Row, hardware: str) -> Row:
 
 
 def _compare(one: tuple[Row, str], other: tuple[Row, str]) -> None:
-    for column in (field.name for field in fields(Row)):
-        a, b = getattr(one[0], column), getattr(other[0], column)
-        if a != b and column not in OF_ONE_RUN:
+    """Raises MergeError for other numbers in one cell; of times, where it ended well on one machine alone."""
+    if "skipped" in (one[0].status, other[0].status):
+        return
+    names = [field.name for field in fields(Row) if field.name not in OF_ONE_RUN]
+    for column in ("status", *(() if of_a_machine(one[0]) else names)):
+        if (a := getattr(one[0], column)) != (b := getattr(other[0], column)):
             row = one[0]
             cell = f"{row.scene} x {row.method} seed {row.seed} / {row.metric}"
             raise MergeError(f"{cell}: {column} {a} in {one[1]}, {b} in {other[1]}")
