@@ -197,9 +197,9 @@ def joined_rows(runs: Mapping[str, Sequence[Row]]) -> list[Row]:
             if there:
                 _compare(there, (row, where))
             kind = row.metric in OF_TRAINING
-            if of_a_machine(row) and row.value is not None:
-                if machine.setdefault(kind, row.hardware) != row.hardware:
-                    row = _told(row, machine[kind])
+            timed = of_a_machine(row) and row.value is not None
+            if timed and machine.setdefault(kind, row.hardware) != row.hardware:
+                row = _told(row, machine[kind])
             if there is None or _known(row) > _known(there[0]):
                 kept[key] = (row, where)
     return [row for row, _ in kept.values()]
