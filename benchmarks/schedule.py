@@ -90,8 +90,9 @@ class Schedule:
         if said is None:
             return []
         entry, garment = find_method(said.method), network.garment
-        motions = [self.data(motion, garment, entry) for motion in self._train(garment)]
-        return [*motions, *(self.clips(garment, entry, part) for part in range(said.mixed))]
+        motions, held_out = self._learned(network)
+        given = [self.data(motion, garment, entry) for motion in (*motions, *held_out)]
+        return [*given, *(self.clips(garment, entry, motions, part) for part in range(said.mixed))]
 
     def data(self, motion: str, garment: str, entry: MethodEntry) -> SimulateMotion:
         scene = of_garment(garment, self.plan.motions.worn).scene(motion).at(self.preset)
@@ -101,15 +102,16 @@ class Schedule:
             **self._simulated_by(entry, self._of_scene(scene, f"{TASKS}.ground_truth")),
         )  # fmt: skip
 
-    def clips(self, garment: str, entry: MethodEntry, part: int) -> SimulateClips:
-        motions = self._train(garment)
+    def clips(self, garment: str, entry: MethodEntry, motions: tuple[str, ...], part: int) -> SimulateClips:
+        clips = f"{garment}/mixed-{len(motions)}"
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
         of_scene = self._simulated_by(entry, self._of_scene(scene, f"{TASKS}.ground_truth"))
         mixed = {"part": part, "motions": {name: self._motion(name) for name in motions}}
         return SimulateClips(
-            name=f"{garment}-mixed/{flat(entry.name)}-{part}",
-            label=_beside(f"{garment}, mixed clips, part {part}", entry), scene=scene, entry=entry,
-            motions=motions, part=part, units=len(motions) * self.preset.frames,
+            name=f"{flat(clips)}/{flat(entry.name)}-{part}",
+            label=_beside(f"{garment}, clips mixed of {len(motions)} motions, part {part}", entry),
+            scene=scene, entry=entry, motions=motions, clips=clips, part=part,
+            units=len(motions) * self.preset.frames,
             **of_scene | {"inputs": of_scene["inputs"] | mixed},
         )  # fmt: skip
 
@@ -121,13 +123,15 @@ class Schedule:
         }
 
     def network(self, network: Network) -> TrainNetwork:
-        chosen, motions = network.training, self._train(network.garment)
-        steps = self.preset.steps_of(network.name, chosen.kind if chosen else network.name)
+        chosen, (motions, held_out) = network.training, self._learned(network)
+        kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
+        steps = self.preset.steps_of(steps_of or network.name, kind)
         inputs = self._inputs(self.plan.device) | self._of_body(network.garment) | {
             "training": [network.name, chosen],
             "seed": network.seed,
             "steps": steps,
             "motions": {name: self._motion(name) for name in motions},
+            "held out": {name: self._motion(name) for name in held_out},
         }  # fmt: skip
         truth = self.ground_truth(network)
         simulated = {task.scene.motion: task.id for task in truth if isinstance(task, SimulateMotion)}
@@ -139,7 +143,7 @@ class Schedule:
             inputs=inputs, modules=(f"{TASKS}.training", ASSETS, *further),
             reads=(*simulated.values(), *clips), units=max(steps, 1), training=network.name, chosen=chosen,
             home=network.declared_in, seed=network.seed, garment=network.garment, steps=steps,
-            motions=motions, simulated=simulated, clips=clips, device=self.plan.device,
+            motions=motions, held_out=held_out, simulated=simulated, clips=clips, device=self.plan.device,
         ))  # fmt: skip
 
     # --- cells ---------------------------------------------------------------------------------------------
@@ -312,8 +316,12 @@ class Schedule:
         files = self.plan.motions.files
         return f"{name} {digest(files[name])}" if name in files else name
 
-    def _train(self, garment: str) -> tuple[str, ...]:
-        return self.plan.motions.train_of(garment)
+    def _learned(self, network: Network) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The motions that a network trains on, and those that stop its training."""
+        motions, training = self.plan.motions.train_of(network.garment), network.training
+        count = training.held_out if training and training.held_out < len(motions) else 0
+        last = len(motions) - count
+        return motions[:last], motions[last:] if training and training.converged else ()
 
     def _settled_in(self, scene: Scene) -> Scene:
         planned = next((s for s in self.plan.scenes if s.name == scene.start_of), None)

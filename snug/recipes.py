@@ -116,11 +116,18 @@ class Simulated:
 class Training:
     """How a named model comes to be. kind: one of snug.trained_model.KINDS. simulated: what it needs
     trajectories of; None: of nothing.
+
+    steps_of: the training that has as many steps; empty: its own number. held_out: so many of the training
+    motions, the last, are not trained on, unless there are no more. converged: it goes on for several times
+    these steps, until the held-out motions get no better, and the weights that did best on them are kept.
     """
 
     kind: str
     recipe: Recipe
     simulated: Simulated | None = None
+    steps_of: str = ""
+    held_out: int = 0
+    converged: bool = False
 
 
 TRAININGS = {

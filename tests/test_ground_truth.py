@@ -10,12 +10,13 @@ from dressing import swaying, tube_dress
 from tasks_by_hand import assets_of, context, dressed_scene, training
 from test_cell_tasks import plan_of
 
-from benchmarks.methods import find_method
+from benchmarks.methods import METHODS, find_method
 from benchmarks.plan import Motions, Network
 from benchmarks.schedule import Schedule, tasks_of
 from benchmarks.tasks import ground_truth
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.ground_truth import SimulateClips
+from benchmarks.tasks.training import TrainNetwork
 from reference_sim import Trajectory, simulate
 from reference_sim.array_file import read_arrays
 from snug.motion_augmentation import FRAMES, mixed_for, shared_clips
@@ -28,7 +29,7 @@ MOTION = swaying(90)
 def clips_of(part: int, method: str = "simulation") -> SimulateClips:
     return SimulateClips(
         name=str(part), label="", inputs={}, modules=(), scene=dressed_scene(MOTION.name),
-        entry=find_method(method), motions=(MOTION.name,), part=part,
+        entry=find_method(method), motions=(MOTION.name,), clips="tshirt/mixed", part=part,
     )  # fmt: skip
 
 
@@ -112,7 +113,7 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
     done = ground_truth.Outcome(result={"whole": True}, files=(path.name,))
     task = dataclasses.replace(training("supervised", MOTION.name, steps=1), clips=tuple(clips))
     result = task.run(context(tmp_path, assets), {("data", MOTION.name): done, **clips}).result
-    assert result["frames"] == result["simulated_frames"] == 90 + 2 * FRAMES
+    assert result["frames"] == 90 + 2 * FRAMES
     assert result["clips_left_out"] == 1 and result["left_out"] == []
     lost = task.run(context(tmp_path, assets), {("data", MOTION.name): done}).result
     assert lost["frames"] == 90
@@ -139,6 +140,58 @@ def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatc
     def read(name):
         return {id[0]: id[1] for id in Schedule(plan).network(Network(name, 0, "tshirt")).reads}
 
-    assert read("tailornet")["clips"] == "tshirt-mixed/fast-lbfgs-10-1"
-    assert read("supervised")["clips"] == "tshirt-mixed/simulation-2" and read("snug") == {}
+    assert read("tailornet")["clips"] == "tshirt-mixed-2/fast-lbfgs-10-1"
+    assert read("supervised")["clips"] == "tshirt-mixed-2/simulation-2" and read("snug") == {}
     assert "clips" not in read("santesteban2019")
+
+
+BLOCK = [entry for entry in METHODS if entry.training is not None]
+
+
+def test_the_block_of_equal_data_gives_all_networks_the_same_frames_and_steps(tmp_path):
+    """Motions, mixed frames and steps of each training are what it declares; clean-up trains nothing anew."""
+    scene = dressed_scene("kick")
+    cells = tuple(Cell(scene, entry, 0, ("garments",)) for entry in BLOCK)
+    plan = plan_of(tmp_path, motions=Motions(train=("walk", "run", "bow"), test=("kick",)), cells=cells)
+    tasks = {task.training: task for task in tasks_of(plan) if isinstance(task, TrainNetwork)}
+    assert len(BLOCK) == 44 and len(tasks) == 24
+    for entry in BLOCK:
+        task, training = tasks[entry.trained], entry.training
+        mixed = training.simulated.mixed if training.simulated else training.recipe.mixed
+        assert mixed == entry.level and len(task.clips) == (mixed if training.simulated else 0)
+        assert task.motions == ("walk", "run") and task.steps == plan.preset.steps["snug"]
+        assert task.held_out == (("bow",) if training.converged else ())
+        assert (training.simulated is None) == (TRAININGS[training.kind].simulated is None)
+        usual = TRAININGS[training.kind].recipe
+        assert dataclasses.replace(training.recipe, mixed=usual.mixed, name=usual.name) == usual
+    families = {entry.family for entry in BLOCK}
+    assert len({(entry.family, entry.level) for entry in BLOCK}) == len(BLOCK) and len(families) == 20
+    alone = dataclasses.replace(plan, motions=Motions(train=("walk",), test=("kick",)))
+    network = Network("snug-data-converged-0", 0, "tshirt", BLOCK[2].training)
+    task = Schedule(alone).network(network)  # a single motion cannot be held out
+    assert task.motions == ("walk",) and task.held_out == () and task.chosen.converged
+
+
+@pytest.mark.parametrize("kind", ["snug", "tailornet"])
+def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monkeypatch, kind):
+    entry = find_method(f"{kind}-data-converged-0")
+    held = dataclasses.replace(swaying(20, degrees=30.0), name="held")
+    motion = dataclasses.replace(swaying(30), name="given")
+    assets = assets_of(tube_dress(), motion)
+    assets = dataclasses.replace(assets, motions={"given": motion, "held": held})
+    needed = {}
+    for clip in (motion, held):
+        path = tmp_path / f"{clip.name}.vtkhdf"
+        still(dataclasses.replace(clip, name="still_1"), None).save(path)
+        needed["data", clip.name] = ground_truth.Outcome(result={"whole": True}, files=(path.name,))
+    task = dataclasses.replace(
+        training("supervised", "given", steps=50), chosen=entry.training, training=entry.trained,
+        held_out=("held",), simulated={id[1]: id for id in needed} if kind == "tailornet" else {},
+    )  # fmt: skip
+    values = iter([5.0, 3.0, *[4.0] * 200])
+    monkeypatch.setattr("snug.validation.Validator.value", lambda self: next(values))
+    result = task.run(context(tmp_path, assets), needed).result
+    # Of 200 steps: a validation after each second, no better than the second one 25 times.
+    assert result["steps"] == 2 * (2 + 25) and result["validation"]["best_step"] == 4
+    assert result["validation"]["motions"] == ["held"] and result["frames"] == 30
+    assert result["left_out"] == []

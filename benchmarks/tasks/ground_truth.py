@@ -113,8 +113,8 @@ class SimulateClips(Task):
     """Some of the mixed clips of a garment's training motions, each settled and simulated like a motion.
 
     scene: that of any motion in the garment; entry: the method that simulates; motions: those that are mixed.
-    part: number of these clips: those that `part` + 1 mixed frames for each given one have, and `part` have
-    not. Only clips that are whole and converged are kept, and taught.
+    clips: a name of all of them; part: number of these: those that `part` + 1 mixed frames for each given one
+    have, and `part` have not. Only clips that are whole and converged are kept, and taught.
     """
 
     kind = "clips"
@@ -124,6 +124,7 @@ class SimulateClips(Task):
     scene: Scene
     entry: MethodEntry
     motions: tuple[str, ...]
+    clips: str
     part: int
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
@@ -147,7 +148,7 @@ class SimulateClips(Task):
                 kept[clip.name] = trajectory.positions.astype(np.float32)  # as networks see it
             else:
                 left_out[clip.name] = f"{trajectory.status}: {trajectory.reason}"
-        path = run.clips_path(garment, self.entry.name, self.part)
+        path = run.clips_path(self.clips, self.entry.name, self.part)
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as temporary:
             np.savez(temporary, **kept)
