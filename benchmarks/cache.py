@@ -43,10 +43,14 @@ class Found:
 
 def dependencies(task: Task) -> dict[str, str]:
     """Name -> digest or version of each input, file of source, package and data file, to say what changed."""
-    code = code_of(*task.modules)
-    parts = {name: digest(value) for name, value in task.inputs.items()} | code
-    parts |= {f"package {name}": version for name, version in packages_of(code).items()}
-    return parts | data_of(code)
+    return {name: digest(value) for name, value in task.inputs.items()} | software(*task.modules)
+
+
+def software(*modules: str) -> dict[str, str]:
+    """The same of source, packages and data files of these modules."""
+    code = code_of(*modules)
+    packages = {f"package {name}": version for name, version in packages_of(code).items()}
+    return code | packages | data_of(code)
 
 
 class Cache:
@@ -72,14 +76,14 @@ class Cache:
     def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Found]) -> Found:
         """Write the entry, after the files; gives what find() would."""
         files = {name: digest_of_file(self.folder.path / name) for name in outcome.files}
-        outcome = dataclasses.replace(outcome, digests=files)
+        outcome = dataclasses.replace(outcome, digests=files, origin={**self.origin, **outcome.origin})
         entry = {
             "task": task.title,
             "inputs": sorted(task.inputs),
             "parts": dependencies(task),
             "needs": _needs(task, others),
             "written": datetime.now().astimezone().isoformat(timespec="seconds"),
-            "origin": self.origin,
+            "origin": outcome.origin,
             "files": files,
             "outcome": {name: getattr(outcome, name) for name in _KEPT},
         }

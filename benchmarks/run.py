@@ -140,6 +140,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         only=only,
         fresh=options.fresh,
         workers=workers,
+        scheduler=choose_scheduler(options.scheduler, options.device),
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
 
@@ -229,6 +230,18 @@ def check_device(device: str) -> None:
         from snug.device import find_device
 
         find_device(device)
+
+
+def choose_scheduler(address: str | None, device: str) -> str:
+    """The address of a scheduler that answers; empty without one. Raises ClusterError, PlanError."""
+    if address is None:
+        return ""
+    if device != "cpu":
+        raise PlanError(f"--device {device}: with --scheduler networks train on the processor; leave out one")
+    from .cluster import check_scheduler
+
+    check_scheduler(address)
+    return address
 
 
 def choose_folder(out: str | None) -> Path:
