@@ -19,7 +19,7 @@ from snug.recipe import DEFAULT
 from . import provenance
 from .assets import embedded_motions, open_assets
 from .cache import Cache
-from .executor import LocalExecutor
+from .execution import executor_of
 from .lock import held
 from .methods import METHODS
 from .plan import Motions, Plan, PlanError
@@ -27,7 +27,7 @@ from .presets import find_preset
 from .registry import by_name
 from .results import RunFolder
 from .roles import FEWEST
-from .run import WORKERS, choose_body, choose_garment, choose_states, split
+from .run import WORKERS, choose_body, choose_garment, choose_scheduler, choose_states, split
 from .runner import Runner
 from .scenes import of_garment
 from .schedule import Schedule
@@ -64,11 +64,11 @@ def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
         origin = {"commit": provenance.commit(), "hardware": hardware}
         runner = Runner(tasks, Cache(folder, only=plan.only, origin=origin))
         kept = before.sequences if before else ()
-        DataSet(plan.folder, settings, _lines(tasks, {}, kept, {}), commands).write()
+        DataSet(plan.folder, settings, _lines(tasks, {}, kept), commands).write()
         try:
-            runner.run(LocalExecutor(folder, assets, plan.workers), _Stages())
+            runner.run(executor_of(plan, folder, assets), _Stages())
         finally:
-            found = DataSet(plan.folder, settings, _lines(tasks, runner.known(), kept, origin), commands)
+            found = DataSet(plan.folder, settings, _lines(tasks, runner.known(), kept), commands)
             found.write()
     if runner.reused:
         print(f"{len(runner.reused)} sequences were there", file=sys.stderr)
@@ -109,6 +109,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
         preset=preset, suites=(), cells=(), cases=(), seeds=(), device="cpu", folder=Path(options.out),
         motions=Motions(train=tuple(motions), files=motions, worn=worn), body=choose_body(options.body),
         garment=own, only=choose_states(split(options.only), fresh=False),
+        scheduler=choose_scheduler(options.scheduler, "cpu"),
         workers=options.workers or min(WORKERS, provenance.usable_cores()),
         command=shlex.join(["python", "-m", "benchmarks.dataset", *rest.parse_known_args(words)[1]]),
     )  # fmt: skip
@@ -172,18 +173,19 @@ def _rate(motions: Any) -> float:
 
 
 def _lines(
-    tasks: Sequence[SimulateSequence], outcomes: Any, kept: Sequence[SimulatedSequence], origin: Any
+    tasks: Sequence[SimulateSequence], outcomes: Any, kept: Sequence[SimulatedSequence]
 ) -> tuple[SimulatedSequence, ...]:
     """The index: what was there, and of each task what came of it; in the order of the first asking."""
     lines = {line.name: line for line in kept}
     for task in tasks:
         name, outcome = task.scene.motion, outcomes.get(task.id)
-        lines[name] = _line(name, outcome, origin) if outcome else lines.get(name, SimulatedSequence(name))
+        lines[name] = _line(name, outcome) if outcome else lines.get(name, SimulatedSequence(name))
     return tuple(lines.values())
 
 
-def _line(name: str, outcome: Outcome, origin: Any) -> SimulatedSequence:
-    told = {"reason": outcome.reason, "seconds": round(outcome.seconds, 3), **(outcome.origin or origin)}
+def _line(name: str, outcome: Outcome) -> SimulatedSequence:
+    told = {name: outcome.origin[name] for name in ("hardware", "commit")}
+    told |= {"reason": outcome.reason, "seconds": round(outcome.seconds, 3)}
     if outcome.failed or not outcome.files:
         return SimulatedSequence(name, status=outcome.status, **told)
     trajectory, motion = outcome.files

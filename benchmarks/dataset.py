@@ -83,6 +83,7 @@ def add_build_options(parser: argparse.ArgumentParser) -> None:
     add("--only", action="append", default=[], metavar="STATE,...",
         help="do again what is failed, stale or missing (default stale,missing)")  # fmt: skip
     add("--workers", type=int, metavar="N", help="processes side by side (default 2, or the cores there are)")
+    add("--scheduler", metavar="ADDRESS", help="a cluster that simulates instead, see docs/scale.md")
     add_garment_options(parser)
 
 

@@ -36,6 +36,7 @@ exit status: 0 written; 2 the runs differ in what has to be the same, or a file 
   which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
 TIMES = {metric.name for metric in COSTS} - {"cost/memory"}  # the size of a network is the same everywhere
+BEFORE = ("cost/data", *OF_TRAINING)  # each may be of its own machine; all other times are of one
 SAME = ("format", "preset", "preset_values", "split", "body", "garment")  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
 JOINED = (*STRICT, "tasks", "outdated")  # which hold times and remarks
@@ -189,14 +190,14 @@ def joined_rows(runs: Mapping[str, Sequence[Row]]) -> list[Row]:
     runs: folder -> its rows, in the order in which machines are preferred.
     """
     kept: dict[tuple[Any, ...], tuple[Row, str]] = {}
-    machine: dict[bool, str] = {}  # of trainings, which may have an accelerator, and of all else
+    machine: dict[str, str] = {}
     for where, rows in runs.items():
         for row in rows:
             key = (row.suite, row.scene, row.method, row.seed, row.metric)
             there = kept.get(key)
             if there:
                 _compare(there, (row, where))
-            kind = row.metric in OF_TRAINING
+            kind = row.metric if row.metric in BEFORE else ""
             timed = of_a_machine(row) and row.value is not None
             if timed and machine.setdefault(kind, row.hardware) != row.hardware:
                 row = _told(row, machine[kind])

@@ -47,7 +47,7 @@ class Here(InProcess):
 
     most, done = 1_000_000, 0
 
-    def __init__(self, folder, assets, workers) -> None:
+    def __init__(self, plan, folder, assets) -> None:
         super().__init__(folder, assets)
 
     def together(self, batches, bar):
@@ -70,7 +70,7 @@ def draped(scene, entry, folder) -> Trajectory:
 @pytest.fixture
 def here(monkeypatch):
     """No processes and no simulation."""
-    monkeypatch.setattr(build_dataset, "LocalExecutor", Here)
+    monkeypatch.setattr(build_dataset, "executor_of", Here)
     monkeypatch.setattr(ground_truth, "simulated", draped)
     monkeypatch.setattr(Here, "done", 0)
     return Here
@@ -85,7 +85,7 @@ def words(tube: Path, out: Path, *more: str) -> list[str]:
 def built(tube, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("data") / "three"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(build_dataset, "LocalExecutor", Here)
+        patch.setattr(build_dataset, "executor_of", Here)
         patch.setattr(ground_truth, "simulated", draped)
         assert dataset.main(words(tube, out)) == 0
     return out
