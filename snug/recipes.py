@@ -68,17 +68,11 @@ TAILORNET = replace(
 )
 PBNS_SPRINGS = replace(DEFAULT, name="pbns-springs", material="pbns", contact_samples="vertices")
 
-# Mixed motions cost it dynamics. The energy of the components begins at joules, which are no divergence.
+# Inertia about a simulation's past begins at joules, which are no divergence.
 DYNAMIC = replace(
     DEFAULT,
     name="dynamic",
-    learning_rate=1e-3,
-    weight_decay=0.0,
-    h0_sigma=0.3,
-    remembered=False,
     mixed=0.0,
-    detached=True,
-    pca_dynamics=0.3,
     spike=20.0,
 )
 

@@ -51,7 +51,7 @@ class TrainingRun:
     """One trainer taken through all its steps by `go`.
 
     log gets each row of the history, every `every` steps; progress: a bar on standard error; stop: asked
-    after each step. setup_seconds: what making the trainer took; of that, the pretraining counts as training.
+    after each step. setup_seconds: what making the trainer took.
     """
 
     def __init__(
@@ -71,8 +71,8 @@ class TrainingRun:
         self.patience = validation.patience if validation else 0
         self.validator = Validator(trainer, validation) if validation else None
         self.validated_every = validation.every if validation else 0
-        self.setup_seconds = setup_seconds - trainer.pretraining_seconds
-        self.done, self.seconds = 0, trainer.pretraining_seconds
+        self.setup_seconds = setup_seconds
+        self.done, self.seconds = 0, 0.0
         self.history: list[dict[str, float]] = []
         self.recent: list[dict[str, float]] = []
         self.best: dict[str, Tensor] = {}
@@ -172,14 +172,11 @@ class TrainingRun:
         """What must be the same for a run to be the same run."""
         trainer, digest = self.trainer, hashlib.sha256()
         taught = trainer.targets.vertices if trainer.targets else trainer.data.ahead
-        # Coordinates that were predicted are round-off's too, and in the checkpoint.
-        features = trainer.data.features[:, : len(trainer.network.input_mean)]
+        past = [trainer.past.x_hat] if trainer.past else []
         weights = trainer.dressed.weights(trainer.recipe.smoothing)
-        for tensor in (features, trainer.data.rest, taught, weights):
+        for tensor in (trainer.data.features, trainer.data.rest, taught, weights, *past):
             digest.update(tensor.cpu().numpy().tobytes())
         digest.update(trainer.dressed.cloth.Dm_inverse.tobytes())
-        if trainer.supervision:
-            digest.update(np.round(trainer.supervision.mean.cpu().numpy(), 4).tobytes())
         return {
             "kind": trainer.kind,
             "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},
