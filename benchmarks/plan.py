@@ -50,7 +50,7 @@ class Network:
     @property
     def learns_from_simulation(self) -> bool:
         """Whether it needs simulated motions to be trained."""
-        return self.training is not None and self.training.simulated
+        return self.training is not None and self.training.simulated is not None
 
 
 @dataclass(frozen=True)

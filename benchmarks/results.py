@@ -232,6 +232,10 @@ class RunFolder:
         """What was measured of each frame of a trajectory, beside it: name -> (T,) or (T,V)."""
         return self.trajectory_path(scene, method, seed).with_suffix(".npz")
 
+    def clips_path(self, clips: str, method: str, part: int) -> Path:
+        """Simulated mixed clips: name -> vertices (T,V,3) [m]."""
+        return self.trajectory_path(clips, f"{method}-{part}").with_suffix(".npz")
+
     def start_path(self, scene: str) -> Path:
         """The settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")

@@ -57,10 +57,12 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
             metrics = dict(measured.result)
             if cell.timed:
                 costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
-                metrics |= {**costs, **model_costs(cell, schedule, outcomes)}
+                metrics |= costs
                 reason = reason or remark
             elif (declared_ms := cell.entry.declared_ms or outcome.result.get("declared_ms")) is not None:
                 metrics["cost/frame"] = declared_ms
+            if cell.scene.timed:
+                metrics |= model_costs(cell, schedule, outcomes)
             reason = reason or not_learned(cell, schedule, outcomes)
     batch = outcomes.get(("batch", cell.name), Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
@@ -145,17 +147,17 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
 
 
 def model_costs(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str, float]:
-    """cost/data, cost/setup, cost/train and cost/memory of the cell's network, where it has one."""
-    network, plan = network_of(cell), schedule.plan
+    """cost/data, cost/setup, cost/memory and cost/train* of the cell's network, where it has one."""
+    network = network_of(cell)
     trained = outcomes.get(schedule.network(network).id) if network else None
     if network is None or trained is None or not trained.result:
         return {}
-    names = {"cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes"}
+    names = {
+        "cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes",
+        "cost/train_steps": "steps", "cost/train_frames": "frames",
+    }  # fmt: skip
     costs = {metric: trained.result[name] for metric, name in names.items()}
-    if not network.learns_from_simulation:
-        return {"cost/data": 0.0} | costs
-    motions = plan.motions.train_of(network.garment)
-    data = [outcomes.get(schedule.data(motion, network.garment).id, Outcome()) for motion in motions]
+    data = [outcomes.get(task.id, Outcome()) for task in schedule.ground_truth(network)]
     return {"cost/data": sum(outcome.seconds for outcome in data)} | costs
 
 

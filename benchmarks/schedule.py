@@ -29,10 +29,10 @@ from .scenes import find_scene, of_garment
 from .source import digest, find_module
 from .tasks.case import RunCase
 from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
-from .tasks.ground_truth import SettleStart, SimulateMotion, SimulateQuasiStatic
+from .tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
 from .tasks.metrics import MeasureCell
 from .tasks.microbenchmark import RunMicrobenchmark
-from .tasks.task import Task, TaskId
+from .tasks.task import Task
 from .tasks.training import TrainNetwork
 from .tasks.training_windows import SUITE, CompareWindows
 
@@ -59,7 +59,8 @@ class Schedule:
         settled = {scene.name: scene for scene in plan.scenes if scene.simulated}
         others = (self._settled_in(scene) for scene in settled.values() if scene.start_of)
         yield from map(self.start, ({scene.name: scene for scene in others} | settled).values())
-        yield from (self.data(m, garment) for garment in plan.simulated for m in self._train(garment))
+        learned = (task for network in plan.networks for task in self.ground_truth(network))
+        yield from {task.id: task for task in learned}.values()
         yield from map(self.network, plan.networks)
         for _, cells in groupby(plan.cells, key=lambda cell: cell.scene):
             own = [cell for cell in cells if cell.timed]
@@ -83,35 +84,66 @@ class Schedule:
             needs=needs, **self._of_scene(scene, f"{TASKS}.ground_truth"),
         )  # fmt: skip
 
-    def data(self, motion: str, garment: str) -> SimulateMotion:
+    def ground_truth(self, network: Network) -> list[SimulateMotion | SimulateClips]:
+        """What is simulated for a network to learn from."""
+        said = network.training.simulated if network.training else None
+        if said is None:
+            return []
+        entry, garment = find_method(said.method), network.garment
+        motions, held_out = self._learned(network)
+        given = [self.data(motion, garment, entry) for motion in (*motions, *held_out)]
+        return [*given, *(self.clips(garment, entry, motions, part) for part in range(said.mixed))]
+
+    def data(self, motion: str, garment: str, entry: MethodEntry) -> SimulateMotion:
         scene = of_garment(garment, self.plan.motions.worn).scene(motion).at(self.preset)
         return SimulateMotion(
-            name=flat(scene.name), label=scene.name, scene=scene,
-            units=self.preset.settle_frames + self.preset.frames,
-            **self._of_scene(scene, f"{TASKS}.ground_truth"),
+            name=f"{flat(scene.name)}/{flat(entry.name)}", label=_beside(scene.name, entry), scene=scene,
+            entry=entry, units=self.preset.settle_frames + self.preset.frames,
+            **self._simulated_by(entry, self._of_scene(scene, f"{TASKS}.ground_truth")),
         )  # fmt: skip
 
+    def clips(self, garment: str, entry: MethodEntry, motions: tuple[str, ...], part: int) -> SimulateClips:
+        clips = f"{garment}/mixed-{len(motions)}"
+        scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
+        of_scene = self._simulated_by(entry, self._of_scene(scene, f"{TASKS}.ground_truth"))
+        mixed = {"part": part, "motions": {name: self._motion(name) for name in motions}}
+        return SimulateClips(
+            name=f"{flat(clips)}/{flat(entry.name)}-{part}",
+            label=_beside(f"{garment}, clips mixed of {len(motions)} motions, part {part}", entry),
+            scene=scene, entry=entry, motions=motions, clips=clips, part=part,
+            units=len(motions) * self.preset.frames,
+            **of_scene | {"inputs": of_scene["inputs"] | mixed},
+        )  # fmt: skip
+
+    def _simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:
+        """inputs and modules of a task that builds the scene, with those of the method."""
+        return {
+            "inputs": of_scene["inputs"] | {"method": _declared(entry)},
+            "modules": (*of_scene["modules"], *_modules_behind(entry)),
+        }
+
     def network(self, network: Network) -> TrainNetwork:
-        chosen, motions = network.training, self._train(network.garment)
-        steps = self.preset.steps_of(network.name, chosen.kind if chosen else network.name)
+        chosen, (motions, held_out) = network.training, self._learned(network)
+        kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
+        steps = self.preset.steps_of(steps_of or network.name, kind)
         inputs = self._inputs(self.plan.device) | self._of_body(network.garment) | {
             "training": [network.name, chosen],
             "seed": network.seed,
             "steps": steps,
             "motions": {name: self._motion(name) for name in motions},
+            "held out": {name: self._motion(name) for name in held_out},
         }  # fmt: skip
-        simulated: dict[str, TaskId] = {}
-        if chosen and chosen.simulated:
-            simulated = {motion: self.data(motion, network.garment).id for motion in motions}
+        truth = self.ground_truth(network)
+        simulated = {task.scene.motion: task.id for task in truth if isinstance(task, SimulateMotion)}
+        clips = tuple(task.id for task in truth if isinstance(task, SimulateClips))
         further = _modules_of(chosen.recipe.terms) if chosen else ()
         further = (*further, network.declared_in) if network.declared_in else further
         return _keyed(TrainNetwork(
             name=f"{network.garment}/{network.name}-seed{network.seed}", label=network.label,
-            inputs=inputs, modules=(f"{TASKS}.training", ASSETS, *further), reads=tuple(simulated.values()),
-            units=max(steps, 1), training=network.name, chosen=chosen, home=network.declared_in,
-            seed=network.seed,
-            garment=network.garment, steps=steps, motions=motions, simulated=simulated,
-            device=self.plan.device,
+            inputs=inputs, modules=(f"{TASKS}.training", ASSETS, *further),
+            reads=(*simulated.values(), *clips), units=max(steps, 1), training=network.name, chosen=chosen,
+            home=network.declared_in, seed=network.seed, garment=network.garment, steps=steps,
+            motions=motions, held_out=held_out, simulated=simulated, clips=clips, device=self.plan.device,
         ))  # fmt: skip
 
     # --- cells ---------------------------------------------------------------------------------------------
@@ -284,8 +316,12 @@ class Schedule:
         files = self.plan.motions.files
         return f"{name} {digest(files[name])}" if name in files else name
 
-    def _train(self, garment: str) -> tuple[str, ...]:
-        return self.plan.motions.train_of(garment)
+    def _learned(self, network: Network) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The motions that a network trains on, and those that stop its training."""
+        motions, training = self.plan.motions.train_of(network.garment), network.training
+        count = training.held_out if training and training.held_out < len(motions) else 0
+        last = len(motions) - count
+        return motions[:last], motions[last:] if training and training.converged else ()
 
     def _settled_in(self, scene: Scene) -> Scene:
         planned = next((s for s in self.plan.scenes if s.name == scene.start_of), None)
@@ -304,6 +340,11 @@ def _declared(entry: Any) -> dict[str, Any]:
     if isinstance(entry, MethodEntry):
         said["files"] = {path: digest_of_file(Path(path)) for path in said["files"]}
     return said
+
+
+def _beside(what: str, entry: MethodEntry) -> str:
+    """A label: the reference goes without saying."""
+    return what if entry.role == "reference" else f"{what} by {entry.name}"
 
 
 def _modules_behind(entry: Any) -> tuple[str, ...]:

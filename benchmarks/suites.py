@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .methods import METHODS
+from .methods.equal_data import EQUAL_DATA
 from .methods.learned import LEARNED, RECIPE_DEVIATIONS
 from .plan import Motions
 from .presets import Preset
@@ -141,7 +142,7 @@ SUITES = (
             *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
             "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
-        named_methods=tuple(entry.name for entry in RECIPE_DEVIATIONS),
+        named_methods=tuple(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
     ),
     Suite(
         name="speed",

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from snug.motion import Motion, arm_clearance, spread_arms
-from snug.recipe import Recipe
+from snug.recipe import DEFAULT, Recipe
 from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
 
 PARTS: tuple[tuple[str, ...], ...] = (
@@ -42,6 +42,7 @@ TURNED = {
 RATE = (0.2, 1.0)  # Hz, of the slow turns and lifts
 FRAMES = 60  # of a mixed clip
 MOST_MIXED = 20_000  # frames: each keeps its body and its anchors
+SHARED_SEED = 0  # of clips that are simulated: once, whatever the seed of the training
 MOST_ANCHORS = 2e9  # bytes, of those of mixed frames
 ANCHORS = 24  # bytes of a frame's for each vertex: six samples, four bytes each
 HIPS, SIDEWAYS = (JOINT["left_hip"], JOINT["right_hip"]), np.array([1.0, 0.0, 0.0])
@@ -53,6 +54,13 @@ def mixed_for(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed:
     given = sum(motion.frames for motion in motions)
     frames = min(round(recipe.mixed * given), MOST_MIXED, int(MOST_ANCHORS / (ANCHORS * vertices)))
     return mixed_motions(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
+
+
+def shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> list[Motion]:
+    """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
+    recipe does. Fewer are the first of more.
+    """
+    return mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
 
 
 def mixed_motions(

@@ -95,22 +95,43 @@ RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER, PBNS_SPRINGS, *ABL
 
 
 @dataclass(frozen=True)
+class Simulated:
+    """What is simulated for a training: the given motions, and mixed clips beside them.
+
+    mixed: frames of mixed clips for each given one, up to 20,000: the same clips for every training and seed,
+    see snug.motion_augmentation.shared_clips. method: which method of the benchmark simulates.
+    """
+
+    mixed: int = 0
+    method: str = "simulation"
+
+
+@dataclass(frozen=True)
 class Training:
-    """How a named model comes to be. kind: one of snug.trained_model.KINDS. simulated: needs trajectories."""
+    """How a named model comes to be. kind: one of snug.trained_model.KINDS. simulated: what it needs
+    trajectories of; None: of nothing.
+
+    steps_of: the training that has as many steps; empty: its own number. held_out: so many of the training
+    motions, the last, are not trained on, unless there are no more. converged: it goes on for several times
+    these steps, until the held-out motions get no better, and the weights that did best on them are kept.
+    """
 
     kind: str
     recipe: Recipe
-    simulated: bool = False
+    simulated: Simulated | None = None
+    steps_of: str = ""
+    held_out: int = 0
+    converged: bool = False
 
 
 TRAININGS = {
     "snug": Training("snug", DEFAULT),
     "pbns": Training("pbns", DEFAULT),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    "supervised": Training("supervised", SUPERVISED, simulated=True),
-    "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, simulated=True),
-    "tailornet": Training("tailornet", TAILORNET, simulated=True),
-    "snug-dynamic": Training("dynamic", DYNAMIC, simulated=True),
+    "supervised": Training("supervised", SUPERVISED, Simulated()),
+    "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
+    "tailornet": Training("tailornet", TAILORNET, Simulated()),
+    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated()),
     **{
         f"snug-{recipe.name}": Training("snug", recipe)
         for recipe in (PAPER, *ABLATIONS, *with_and_without(DEFAULT, PAPER))

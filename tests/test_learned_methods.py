@@ -44,7 +44,7 @@ def test_they_run_when_named_and_not_otherwise(tmp_path):
 
 @pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])
 def test_every_trained_method_has_a_training_and_steps_in_each_preset(entry):
-    kind = TRAININGS[entry.trained].kind
+    kind = (entry.training or TRAININGS[entry.trained]).kind
     assert entry.seeded and entry.pairing_group
     assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
 

@@ -220,18 +220,22 @@ def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_
     motions = Motions(train=("walk", "run"), test=("kick",))
     plan = dataclasses.replace(plan_of(None), cells=(cell,), motions=motions)
     schedule = Schedule(plan)
-    trained = Outcome(result={"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0})
+    trained = Outcome(
+        result={"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0, "steps": 60, "frames": 90}
+    )
     outcomes = {
         ("cell", cell.name): RAN, ("metrics", cell.name): Outcome(result={"energy/strain": 1.0}),
         schedule.network(plan.networks[0]).id: trained,
-        schedule.data("walk", "tshirt").id: Outcome(seconds=3.0),
-        schedule.data("run", "tshirt").id: Outcome(seconds=4.0),
+        ("data", "tshirt-walk/simulation"): Outcome(seconds=3.0),
+        ("data", "tshirt-run/simulation"): Outcome(seconds=4.0),
+        ("data", "tshirt-run/fast-lbfgs-10"): Outcome(seconds=5.0),
     }  # fmt: skip
     rows = rows_of(plan, (), outcomes)
     assert {row.reason for row in rows} == {""}
     costs = {row.metric: row.value for row in rows}
     assert costs["cost/data"] == data and costs["cost/train"] == 120.0
     assert costs["cost/setup"] == 20.0 and costs["cost/memory"] == 9.0
+    assert costs["cost/train_steps"] == 60 and costs["cost/train_frames"] == 90
     lacking = dataclasses.replace(trained, result={**trained.result, "left_out": ["run"]})
     rows = rows_of(plan, (), outcomes | {schedule.network(plan.networks[0]).id: lacking})
     assert all("learned without run" in row.reason for row in rows)

@@ -77,7 +77,7 @@ def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path):
         garment = OwnGarment(GarmentFile(path=mesh), (digest_of_file(mesh),))
         motions = dataclasses.replace(MOTIONS, worn=(garment.scenes,))
         plan = dataclasses.replace(plan_of(tmp_path, motions=motions), garment=garment)
-        seen.append(dict(Schedule(plan).data("walk", "cape").inputs))
+        seen.append(dict(Schedule(plan).data("walk", "cape", find_method("simulation")).inputs))
     assert seen[0] != seen[1] and seen[0].keys() == seen[1].keys()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..method import MethodEntry
 from ..registry import by_name
+from .equal_data import EQUAL_DATA
 from .learned import LEARNED, RECIPE_DEVIATIONS, network
 from .solvers import SOLVERS
 
@@ -34,6 +35,7 @@ METHODS = (
     network("pbns", "PBNS", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
     *LEARNED,
     *RECIPE_DEVIATIONS,
+    *EQUAL_DATA,
     *SOLVERS,
 )  # fmt: skip
 

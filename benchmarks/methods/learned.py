@@ -33,12 +33,13 @@ def network(name: str, label: str, description: str, **changes: Any) -> MethodEn
     return MethodEntry(**fields)
 
 
-def _cleaned(kind: str, label: str) -> MethodEntry:
-    """The entry of that network with the collision clean-up behind it."""
-    words = f"{kind}, then vertices within 2 mm of the skin pushed out; both are timed"
+def cleaned(entry: MethodEntry) -> MethodEntry:
+    """That network with the collision clean-up behind it."""
     return replace(
-        network(kind, f"{label}, cleaned up", words), name=f"{kind}+cleanup",
-        module="benchmarks.methods.clean_up", batched=False, base=kind, pairing_group=kind,
+        entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, cleaned up",
+        description=f"{entry.name}, then vertices within 2 mm of the skin pushed out; both are timed",
+        module="benchmarks.methods.clean_up", batched=False, base=entry.name,
+        family=f"{entry.family}+cleanup" if entry.family else "",
     )  # fmt: skip
 
 
@@ -91,7 +92,7 @@ LEARNED = (
     *(_ablation(recipe.name) for recipe in ABLATIONS),
     *(_stored(precision) for precision in ("bf16", "int8")),
     *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
-    *(_cleaned(kind, label) for kind, label in (("snug", "SNUG"), ("pbns", "PBNS"),
+    *(cleaned(network(kind, label, "")) for kind, label in (("snug", "SNUG"), ("pbns", "PBNS"),
                                                 ("supervised", "Supervised"),
                                                 ("santesteban2019", "Santesteban 2019"),
                                                 ("tailornet", "TailorNet"))),

@@ -20,6 +20,9 @@ METRICS = (
     _cost("data", "s", "Data generation", "simulation of the training motions, settling included"),
     _cost("setup", "s", "Making ready", "what a training does before its first step"),
     _cost("train", "s", "Training", "wall time of the steps of the training"),
+    Metric(name="cost/train_steps", unit="1", title="Steps", definition="updates of the training"),
+    Metric(name="cost/train_frames", unit="1", title="Training frames",
+           definition="frames that it learned from, mixed ones included"),
     _cost("frame", "ms", "Frame", "the method's own work: time of the whole run over the frames computed, "
           "one frame at a time on one thread; the median of repeated runs"),
     _cost("whole", "ms", "From the pose", "the same and what the method takes as ready: features and joint "

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from ..method import MethodEntry
 from ..results import RunFolder, replacing
 from ..scene import BuiltScene, Scene
 from .cell import built
 from .task import Context, Outcome, Task, TaskId
+
+if TYPE_CHECKING:
+    from reference_sim import Trajectory
+    from snug.motion import Motion
+
+    from ..assets import Assets
 
 # With this time step [s] and no velocities inertia weighs a thousandth of what it weighs in a frame: a hem
 # that swings once in a second comes within 3 % of its static place, and there is still one minimum to go to.
@@ -71,23 +79,22 @@ def write_body(run: RunFolder, scene: BuiltScene) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimulateMotion(Task):
-    """The simulation of a training motion, settling included; networks learn from a whole one."""
+    """The simulation of a training motion, settling included; networks learn from a whole one.
+
+    entry: the method that simulates.
+    """
 
     kind = "data"
     silent = True
     stage = "ground truth"
     unit = "frame"
     scene: Scene
+    entry: MethodEntry
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        from reference_sim import simulate
-
         scene = self.scene.build(context.assets)
-        trajectory = simulate(
-            scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
-            start=scene.start, velocity=scene.start_velocity, pin_positions=scene.pin_positions,
-        )  # fmt: skip
-        path = context.folder.trajectory_path(scene.name, "simulation")
+        trajectory = simulated(scene, self.entry, context.folder)
+        path = context.folder.trajectory_path(scene.name, self.entry.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         trajectory.save(path)
         context.tell(self.units)
@@ -98,6 +105,70 @@ class SimulateMotion(Task):
             "converged": trajectory.status == "converged",
         }
         return Outcome(result=result, files=(context.folder.relative(path),))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulateClips(Task):
+    """Some of the mixed clips of a garment's training motions, each settled and simulated like a motion.
+
+    scene: that of any motion in the garment; entry: the method that simulates; motions: those that are mixed.
+    clips: a name of all of them; part: number of these: those that `part` + 1 mixed frames for each given one
+    have, and `part` have not. Only clips that are whole and converged are kept, and taught.
+    """
+
+    kind = "clips"
+    silent = True
+    stage = "ground truth"
+    unit = "frame"
+    scene: Scene
+    entry: MethodEntry
+    motions: tuple[str, ...]
+    clips: str
+    part: int
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        import numpy as np
+
+        assets, run, garment = context.assets, context.folder, self.scene.garment
+        assert assets is not None
+        kept: dict[str, Any] = {}
+        left_out: dict[str, str] = {}
+        clips = shared_clips_of(assets, garment, self.motions, self.part + 1)
+        for clip in clips[len(shared_clips_of(assets, garment, self.motions, self.part)) :]:
+            own = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
+            scene = replace(self.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(own)
+            try:
+                trajectory = simulated(scene, self.entry, run)
+            except RuntimeError as error:  # a pose that leaves the cloth no room
+                left_out[clip.name] = str(error)
+                continue
+            done = trajectory.status == "converged" or self.entry.truncated
+            if done and trajectory.frames == clip.frames and np.isfinite(trajectory.positions).all():
+                kept[clip.name] = trajectory.positions.astype(np.float32)  # as networks see it
+            else:
+                left_out[clip.name] = f"{trajectory.status}: {trajectory.reason}"
+        path = run.clips_path(self.clips, self.entry.name, self.part)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as temporary:
+            np.savez(temporary, **kept)
+        context.tell(self.units)
+        result = {"clips": list(kept), "left_out": left_out}
+        return Outcome(result=result, files=(run.relative(path),))
+
+
+def shared_clips_of(assets: Assets, garment: str, motions: tuple[str, ...], share: int) -> list[Motion]:
+    """`share` frames of mixed clips for each frame of these motions, for the networks of a garment."""
+    from snug.motion_augmentation import shared_clips
+
+    vertices = len(assets.garments[garment].rest_positions)
+    return shared_clips(assets.named(motions), share, vertices=vertices)
+
+
+def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Trajectory:
+    """The scene by that method, which needs no network."""
+    method = entry.make(models=folder.models, seed=0)
+    method.prepare(replace(scene, dressed=None))  # so that it shows no bar beside that of all tasks
+    return method.run()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

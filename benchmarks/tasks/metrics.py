@@ -136,7 +136,7 @@ def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> N
 
 def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | None:
     """(N,24,3) [rad], mixed ones included; None of a network that was not trained. Kept within a batch."""
-    from snug.motion_augmentation import mixed_for
+    from snug.motion_augmentation import mixed_for, shared_clips
 
     assets, how = context.assets, training.chosen
     if how is None or assets is None:
@@ -145,6 +145,7 @@ def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | No
         given = assets.named(training.motions)
         vertices = len(assets.garments[training.garment].rest_positions)
         mixed = mixed_for(given, how.recipe, vertices=vertices, seed=training.seed)
+        mixed += shared_clips(given, how.simulated.mixed if how.simulated else 0, vertices=vertices)
         context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
     return context.memo[training.id]
 

@@ -13,8 +13,15 @@ from ..source import digest
 from .task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from snug.motion import Motion
     from snug.recipes import Training
 
+    from ..assets import Assets
+
+LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
+VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
 LOG_EVERY = 20  # training steps between two reports of progress
 CHECKPOINT_MINUTES = 5.0  # between two checkpoints: a training of preset quick is over before the first
 
@@ -24,10 +31,11 @@ class TrainNetwork(Task):
     """A network, or an untrained one, in the folder of its garment's networks.
 
     training: its name; chosen: how it is trained, None: not at all; home: what has to be loaded before, as
-    the file that declares an energy of its recipe. motions: what it learns from; simulated: motion -> the
-    task that simulates it, where it learns from simulations. device: cpu or cuda, for every part of a step.
-    key: with equal simulations, a training of the same key that was killed goes on from its last checkpoint,
-    and ends as it would have.
+    the file that declares an energy of its recipe. motions: what it learns from; held_out: motions that
+    stop it, where it goes on until it has converged; simulated: motion -> the task that simulates it, where
+    it learns from simulations; clips: those that simulate mixed clips. device: cpu or cuda, for every part of
+    a step. key: with equal simulations, a training of the same key that was killed goes on from its last
+    checkpoint, and ends as it would have.
     """
 
     kind = "network"
@@ -41,7 +49,9 @@ class TrainNetwork(Task):
     garment: str
     steps: int
     motions: tuple[str, ...]
+    held_out: tuple[str, ...] = ()
     simulated: Mapping[str, TaskId]
+    clips: tuple[TaskId, ...] = ()
     device: str
     key: str = ""
 
@@ -58,6 +68,7 @@ class TrainNetwork(Task):
         from snug.dressed_body import DressedBody
         from snug.training import train, untrained_model
         from snug.training_run import Saving
+        from snug.validation import Validation
 
         torch.set_num_threads(1)
         if self.home:
@@ -67,10 +78,21 @@ class TrainNetwork(Task):
         path = self.path(run)
         dressed = DressedBody(assets.body, assets.garments[self.garment])
         motions, targets = self.motions, None
+        mixed: list[Motion] = []
         if self.simulated:
             whole = {m: needed[id] for m, id in self.simulated.items() if self._is_whole(needed.get(id))}
-            motions = tuple(whole)
+            motions = tuple(motion for motion in self.motions if motion in whole)
             targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
+            mixed, simulated = self._mixed(assets, run, needed)
+            targets |= simulated
+        steps, validation = self.steps, None
+        if self.chosen and self.chosen.converged:
+            steps *= LONGEST
+        if self.held_out:
+            validation = Validation(
+                motions=assets.named(self.held_out), every=max(1, self.steps // VALIDATIONS),
+                patience=VALIDATIONS, trajectories=targets,
+            )  # fmt: skip
         saving = Saving(
             path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
             resume=True, key=digest([self.key, targets]),
@@ -86,9 +108,9 @@ class TrainNetwork(Task):
             model = untrained_model("snug", dressed, assets.named(motions), seed=self.seed)
         else:
             model = train(
-                self.chosen.kind, dressed, assets.named(motions), steps=self.steps, seed=self.seed,
-                trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False, every=LOG_EVERY,
-                device=self.device, saving=saving,
+                self.chosen.kind, dressed, [*assets.named(motions), *mixed], steps=steps,
+                seed=self.seed, trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False,
+                every=LOG_EVERY, device=self.device, saving=saving, validation=validation,
             )  # fmt: skip
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
@@ -96,13 +118,33 @@ class TrainNetwork(Task):
         result = {
             "recipe": model.recipe.name,
             "left_out": [motion for motion in self.motions if motion not in motions],
+            "clips_left_out": sum(len(needed[id].result["left_out"]) for id in self.clips if id in needed),
+            "frames": model.summary.get("training_frames", 0),
             "seconds": model.seconds,
             "setup_seconds": model.setup_seconds,
             "megabytes": model.megabytes,
             "steps": model.steps,
+            "validation": model.summary.get("validation", {}),
             "last": dict(model.history[-1]) if model.history else {},
         }
         return Outcome(result=result, files=(run.relative(path),))
+
+    def _mixed(
+        self, assets: Assets, folder: RunFolder, needed: Mapping[TaskId, Outcome]
+    ) -> tuple[list[Motion], dict[str, np.ndarray]]:
+        """The mixed clips that were simulated, and their vertices by name."""
+        from reference_sim.array_file import read_arrays
+        from snug.motion_augmentation import shared_clips
+
+        found: dict[str, np.ndarray] = {}
+        for id in self.clips:
+            if id in needed:
+                found |= read_arrays(folder.path / needed[id].files[0])
+        if twice := sorted(found.keys() & set(self.motions)):
+            raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
+        vertices = len(assets.garments[self.garment].rest_positions)
+        clips = shared_clips(assets.named(self.motions), len(self.clips), vertices=vertices)
+        return [clip for clip in clips if clip.name in found], found
 
     @staticmethod
     def _is_whole(outcome: Outcome | None) -> bool:
