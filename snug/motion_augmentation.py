@@ -56,11 +56,22 @@ def mixed_for(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed:
     return mixed_motions(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
 
 
-def shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> list[Motion]:
+def shared_clips(
+    motions: Sequence[Motion], share: int, *, vertices: int, swinging: bool = False
+) -> list[Motion]:
     """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
-    recipe does. Fewer are the first of more.
+    recipe does. Fewer are the first of more. swinging: those of each share as one snug.swinging_motions.
     """
-    return mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    from snug.swinging_motions import swinging_motion
+
+    clips = mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    if not swinging:
+        return clips
+    parts = np.array_split(np.arange(len(clips)), share)
+    return [
+        swinging_motion([clips[n] for n in part], f"swinging_{number}", seed=number)
+        for number, part in enumerate(parts) if len(part)
+    ]  # fmt: skip
 
 
 def mixed_motions(

@@ -99,11 +99,13 @@ class Simulated:
     """What is simulated for a training: the given motions, and mixed clips beside them.
 
     mixed: frames of mixed clips for each given one, up to 20,000: the same clips for every training and seed,
-    see snug.motion_augmentation.shared_clips. method: which method of the benchmark simulates.
+    see snug.motion_augmentation.shared_clips. swinging: they turn to and fro and stop, see
+    snug.swinging_motions. method: which method of the benchmark simulates.
     """
 
     mixed: int = 0
     method: str = "simulation"
+    swinging: bool = False
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,7 @@ TRAININGS = {
     "supervised": Training("supervised", SUPERVISED, Simulated()),
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
     "tailornet": Training("tailornet", TAILORNET, Simulated()),
-    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated()),
+    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=8, method="fast-lbfgs-40", swinging=True)),
     **{
         f"snug-{recipe.name}": Training("snug", recipe)
         for recipe in (PAPER, *ABLATIONS, *with_and_without(DEFAULT, PAPER))
