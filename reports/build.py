@@ -21,13 +21,14 @@ if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
     from reports.data import Run
     from reports.plotting import Picture
+    from reports.training import History
 
 TEMPLATE = Path(__file__).parent / "report.typ"
 # Names of what draw() makes.
 FIGURES = (
-    "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "energy_series_*", "error_against_time*",
-    "failures.*", "frames_*", "hem_*", "histograms.*", "known_answers.*", "lead.*", "map_*",
-    "stability_maps.*", "strip_*", "training_*", "training.*",
+    "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "equal_data.*", "energy_series_*",
+    "error_against_time*", "failures.*", "frames_*", "held_out.*", "hem_*", "histograms.*",
+    "known_answers.*", "lead.*", "map_*", "stability_maps.*", "strip_*", "training_*", "training.*",
 )  # fmt: skip
 
 
@@ -44,6 +45,7 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     from reports.latex import write_latex
     from reports.page.write import write_page
     from reports.tables import make_tables
+    from reports.training import curves_table, read_histories
 
     tables = make_tables(run)
     # Of other suites, asked for in this folder before. What --axes drew stays.
@@ -54,7 +56,10 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
         table.write_csv(folder.tables)
     write_latex(run, tables, folder.tables)
     problems: list[str] = []
-    pictures = draw(folder, run, problems)
+    histories = read_histories(folder, run, problems)
+    for table in curves_table(histories):
+        table.write_csv(folder.tables)
+    pictures = draw(folder, run, histories, problems)
     write_page(folder, run, tables, problems, lambda path: read_trajectory(folder, path, problems))
     problems = list(dict.fromkeys(problems))  # the page reads again what was drawn
     typeset(folder, document(run, tables, pictures, problems))
@@ -73,22 +78,25 @@ def read_run(folder: RunFolder) -> Run:
     return run_data(config, rows, folder.changed(config))
 
 
-def draw(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
+def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: list[str]) -> list[Picture]:
     """Every figure that the run holds something for."""
-    from reports import figures, training
+    from reports import figures
     from reports.break_even import break_even
     from reports.convergence import convergence_curve
+    from reports.equal_data import error_against_frames, held_out_curves
     from reports.roll_outs import draw_roll_outs
     from reports.stability import stability_maps
+    from reports.training import training_curves
     from reports.work_precision import error_against_time
 
     pictures = draw_roll_outs(folder, run, lambda path: read_trajectory(folder, path, problems))
     for make in (
         error_against_time, break_even, figures.dots, figures.against_vertices,
-        figures.known_answers, stability_maps,
+        figures.known_answers, stability_maps, error_against_frames,
     ):  # fmt: skip
         pictures += make(folder.figures, run)
-    pictures += training.training_curves(folder, run, problems)
+    for trained in (held_out_curves, training_curves):
+        pictures += trained(folder.figures, run, histories)
     return pictures + convergence_curve(folder, problems)
 
 

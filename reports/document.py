@@ -28,6 +28,7 @@ from reports.tables import BY_SCENE, merged
 from reports.verdict import endings, failures, verdict
 
 PAPER = ("energies", "curvature", "cost")  # tables 1 to 3
+EQUAL = "equal_data"
 ROWS = 12  # of a table; the CSV has all
 LETTERS = 90  # of a sentence on a failure
 FILES = 12  # that could not be read
@@ -54,6 +55,7 @@ def document(
         "The paper's tables": printed(*PAPER),
         "Findings": [pairs_block(found) for found in [summary(run)] if found]
             + printed("findings", most=40) + printed("ablation_effects"),
+        "Equal data": printed(EQUAL, most=60) + drawn("equal data"),
         "Error against run time": drawn("speed", "scenes") + beside("break_even", "sizes"),
         "Garments in motion": drawn("frames", "strip", "colours", "failures"),
         "Behind the means": drawn("dots", "histograms"),

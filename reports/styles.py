@@ -63,6 +63,12 @@ KNOWN = {
     "snug+newton": Style("SNUG + Newton", "", "P", "-."),
     "snug-dynamic+lbfgs": Style("SNUG, dynamic + L-BFGS", "", "X", "-."),
     "skinning+lbfgs": Style("Skinning + L-BFGS", "", "X", "-."),
+    # So have networks that learn from more or fewer frames.
+    "snug-data": Style("SNUG", "", "o"),
+    "pbns-data": Style("PBNS", "", "^", "-."),
+    "supervised-data": Style("Supervised", "", "s", (0.0, (6.0, 1.5))),
+    "santesteban2019-data": Style("Santesteban 2019", "", "d", (0.0, (1.0, 1.0))),
+    "tailornet-data": Style("TailorNet", "", "H", ":"),
 }
 LEADING = ("reference", "baseline", "network")  # roles that a figure shows when it has no room for all
 ROOM = 8  # methods that a figure shows whatever they are
@@ -75,7 +81,8 @@ _SPARE_MARKERS = ("h", "8", "d", "v", "p")
 def family_style(run: Run, method: Method) -> Style:
     """The style of a method's family: what is not known gets a spare colour that depends on its name alone.
 
-    What starts from another method has the colour of that one; an ablation has the marker of its base.
+    What starts from another method has the colour of that one, whether it ran or not; an ablation has the
+    marker of its base.
     """
     name = method.family
     label = name if method.level is not None else method.label
@@ -85,10 +92,12 @@ def family_style(run: Run, method: Method) -> Style:
     if known and known.colour:
         return replace(known, label=known.label or label)
     base = run.methods.get(method.base)
-    if base is None or base is method:
+    if base is method:
         return spare
-    above = family_style(run, base)
-    if method.role == "ablation":
+    above = family_style(run, base) if base else KNOWN.get(method.base)
+    if above is None:
+        return spare
+    if method.role == "ablation" and known is None:
         return replace(spare, marker=above.marker, line=":")
     drawn = known or replace(spare, line=":")
     return replace(drawn, colour=above.colour, label=drawn.label or label)

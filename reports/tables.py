@@ -18,6 +18,7 @@ from reports.ablations import ablation_effects, ablations
 from reports.break_even import crossings
 from reports.claims import findings
 from reports.data import SUITES, Run
+from reports.equal_data import equal_data
 from reports.means import means
 from reports.overview import overview
 from reports.pareto import ERRORS, TIME, WHOLE
@@ -34,7 +35,7 @@ def make_tables(run: Run) -> dict[str, Table]:
     names = list(dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table))
     found = [made for name in names for made in (*by_garment(run, name), *by_scene(run, name))]
     for make in (
-        overview, findings, ablations, ablation_effects, crossings, speed, validation, extremes,
+        overview, findings, equal_data, ablations, ablation_effects, crossings, speed, validation, extremes,
         unfinished, metrics,
     ):  # fmt: skip
         found += make(run)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ from benchmarks.results import RunFolder, model_path
 from reports.data import Run
 from reports.plotting import PAGE_WIDTH, Picture, file_name, grid, legend_above, log_axis, new_figure, save
 from reports.styles import leading, style
+from reports.table import Cell, Column, Table, table
 
+CURVES = "training_curves"
 PHYSICS = "physics loss [J per frame]"
 # By the kind of a network; any other is trained on the energies.
 PANELS = {
@@ -31,12 +33,14 @@ class ModelHeaderError(ValueError):
 @dataclass(frozen=True)
 class History:
     """How one model's loss fell: its method, the panel of its kind of loss and, for every few steps, step,
-    seconds, loss and terms.
+    seconds, loss and terms, and at some the value on held-out motions.
     """
 
     method: str
     panel: str
     rows: list[dict[str, float]]
+    garment: str = ""
+    seed: int = 0
 
     def column(self, name: str) -> np.ndarray:
         return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
@@ -55,13 +59,12 @@ def read_history(path: Path, method: str) -> History | None:
     return History(method, PANELS.get(data.get("kind", ""), PHYSICS), rows) if len(rows) > 1 else None
 
 
-def training_curves(folder: RunFolder, run: Run, problems: list[str]) -> list[Picture]:
-    """A figure for each garment: loss against training time, a panel for each kind of loss."""
-    pictures: list[Picture] = []
-    worn = run.frame[run.frame["garment"] != ""]
+def read_histories(folder: RunFolder, run: Run, problems: list[str]) -> list[History]:
+    """Those of every network in the run's folder, garment by garment."""
+    found: list[History] = []
+    worn = run.frame[run.frame["garment"] != ""][["garment", "method", "seed"]].drop_duplicates()
     for garment, rows in worn.groupby("garment", sort=False):
-        histories = []
-        for method, seed in rows[["method", "seed"]].drop_duplicates().itertuples(index=False):
+        for _, method, seed in rows.itertuples(index=False):
             path = model_path(folder.models_of(str(garment)), method, seed)
             if not path.is_file():
                 continue
@@ -70,9 +73,30 @@ def training_curves(folder: RunFolder, run: Run, problems: list[str]) -> list[Pi
             except ModelHeaderError as error:
                 problems.append(str(error).replace(f"{folder.path}/", ""))
             else:
-                histories += [history] if history else []
-        name = f"training_{file_name(str(garment))}" if pictures else "training"
-        pictures += _curves(folder.figures, run, name, f"{garment}: training loss", histories)
+                found += [replace(history, garment=str(garment), seed=int(seed))] if history else []
+    return found
+
+
+def curves_table(histories: Sequence[History]) -> list[Table]:
+    """Every point of the curves: they are too many for a page."""
+    words = [Column(name, name, text=True) for name in ("garment", "method")]
+    numbers = [Column(name, name, unit) for name, unit in (("seed", ""), ("step", ""), ("seconds", "s"))]
+    columns = (*words, *numbers, Column("loss", "loss"), Column("validation", "validation"))
+    lines: list[tuple[Cell, ...]] = [
+        (h.garment, h.method, h.seed, int(row["step"]), row["seconds"], row["loss"], row.get("validation"))
+        for h in histories
+        for row in h.rows
+    ]
+    return table(CURVES, columns, lines)
+
+
+def training_curves(folder: Path, run: Run, histories: Sequence[History]) -> list[Picture]:
+    """A figure for each garment: loss against training time, a panel for each kind of loss."""
+    pictures: list[Picture] = []
+    for garment in dict.fromkeys(history.garment for history in histories):
+        name = f"training_{file_name(garment)}" if pictures else "training"
+        own = [history for history in histories if history.garment == garment]
+        pictures += _curves(folder, run, name, f"{garment}: training loss", own)
     return pictures
 
 
@@ -93,5 +117,5 @@ def _curves(folder: Path, run: Run, name: str, what: str, histories: Sequence[Hi
         log_axis(axes, "y")
         grid(axes)
     legend_above(figure, [style(run, method) for method in shown], lines=True)
-    caption = f"{what} against wall time; one curve per model and seed."
+    caption = f"{what} against wall time; one curve per model and seed. Numbers: tables/{CURVES}.csv."
     return [save(figure, folder, name, caption=caption, kind="curves")]

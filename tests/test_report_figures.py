@@ -183,7 +183,7 @@ def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
     write_model(folder.models / ".pbns-seed0.checkpoint.safetensors", "pbns", strain=0.1)
     run, read = run_of([row(), row(method="pbns")]), []
     monkeypatch.setattr(training, "read_history", lambda path, method: read.append(path))
-    assert training.training_curves(folder, run, []) == []
+    assert training.read_histories(folder, run, []) == []
     assert [path.name for path in read] == ["snug-seed0.safetensors"]
 
 
@@ -192,7 +192,9 @@ def test_every_garment_has_its_training_curves(tmp_path):
     for garment in ("tshirt", "tunic"):
         write_model(folder.models_of(garment) / "snug-seed0.safetensors", "snug", strain=0.1)
     run = run_of([row(), row("tunic/stop")])
-    pictures = training.training_curves(folder, run, [])
+    histories = training.read_histories(folder, run, [])
+    assert training.training_curves(folder.figures, run, []) == []
+    pictures = training.training_curves(folder.figures, run, histories)
     assert [picture.path.name for picture in pictures] == ["training.svg", "training_tunic.svg"]
     assert [picture.caption.partition(":")[0] for picture in pictures] == ["tshirt", "tunic"]
 

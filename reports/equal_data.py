@@ -1,0 +1,123 @@
+"""What each network makes of how many frames: the equal-data block of a run.
+
+Its methods are trained variants that a number of mixed frames for each given one tells apart, their level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from reports.data import Run
+from reports.means import mean_of, value_of
+from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
+from reports.styles import Style, family_style, style
+from reports.table import Cell, Column, Table, metric_column, table
+from reports.training import History
+
+FRAMES, STEPS = "cost/train_frames", "cost/train_steps"
+SPENT = ("cost/data", "cost/setup", "cost/train")
+JUDGED = ("energy/total", "energy/strain", "penetration/vertices", "curvature/error")
+DRAWN = ("energy/total", "curvature/error")
+
+
+def members(run: Run) -> list[str]:
+    """The methods of the block, in order."""
+    trained = set(run.worn[run.worn["usable"] & (run.worn["metric"] == FRAMES)]["method"])
+    return [
+        name for name in run.ordered(trained)
+        if run.methods[name].role == "ablation" and run.methods[name].level is not None
+    ]  # fmt: skip
+
+
+def equal_data(run: Run) -> list[Table]:
+    """Frames, steps and seconds of each method of the block, and how good it is; the reference first."""
+    metrics = [run.metrics[name] for name in (FRAMES, STEPS, *SPENT, *JUDGED) if name in run.metrics]
+    lines: list[tuple[Cell, ...]] = []
+    block = members(run)
+    for garment in run.garments(run.worn) if block else ():
+        rows = run.worn[run.worn["garment"] == garment]
+        for method in filter(None, (run.reference, *block)):
+            found = {metric.name: mean_of(rows, method, metric.name) for metric in metrics}
+            spent = [found[name] for name in SPENT if found.get(name)]
+            total = sum(mean.value for mean in spent if mean) if spent else None
+            mixed = run.methods[method].level
+            head = (garment, method, None if mixed is None else int(mixed), total)
+            lines.append((*head, *found.values()))
+    columns = (
+        Column("garment", "Garment", text=True),
+        Column("method", "Method", text=True, method=True),
+        Column("mixed", "Mixed frames for each given one"),
+        Column("seconds", "Data and training", "s"),
+        *map(metric_column, metrics),
+    )
+    caption = "Networks that learn from the same motions: what they had, what it cost, what came of it."
+    return table("equal_data", columns, lines, caption, grouped_by=("garment",))
+
+
+def error_against_frames(folder: Path, run: Run) -> list[Picture]:
+    """Energy and curvature error against training frames, a line for each network at equal steps."""
+    block = members(run)
+    shown = [name for name in block if run.methods[name].base not in block]  # others are variants of these
+    metrics = [name for name in DRAWN if name in run.metrics]
+    garment = next(iter(run.garments(run.worn)), "")
+    rows = run.worn[run.worn["garment"] == garment]
+    families = list(dict.fromkeys(run.methods[name].family for name in shown))
+    if len(shown) == len(families) or not metrics:  # no line has two ends
+        return []
+    figure = new_figure(PAGE_WIDTH, 2.6)
+    looks = {family: family_style(run, run.methods[_first(run, shown, family)]) for family in families}
+    for axes, metric in zip(np.atleast_1d(figure.subplots(1, len(metrics))), metrics):
+        for family, look in looks.items():
+            means = [
+                (value_of(rows, name, FRAMES), mean_of(rows, name, metric))
+                for name in shown
+                if run.methods[name].family == family
+            ]
+            points = [(x, mean.value, mean.spread or 0.0) for x, mean in means if x and mean]
+            if points:
+                x, y, spread = zip(*points)
+                axes.errorbar(x, y, spread, color=look.colour, marker=look.marker, linestyle=look.line,
+                    markersize=4, capsize=2)  # fmt: skip
+        if (level := value_of(rows, run.reference, metric)) is not None:
+            axes.axhline(level, color=style(run, run.reference).colour, linewidth=0.9, linestyle="--")
+        axes.set(xlabel="training frames", ylabel=run.metrics[metric].heading)
+        log_axis(axes, "x")
+        if metric == DRAWN[0]:
+            log_axis(axes, "y")
+        grid(axes)
+    legend_above(figure, list(looks.values()), lines=False)
+    caption = f"{garment}: error against training frames, given ones and mixed ones beside them, at equal "
+    caption += "steps; bars: spread over seeds; dashed: the simulation."
+    return [save(figure, folder, "equal_data", caption=caption, kind="equal data")]
+
+
+def held_out_curves(folder: Path, run: Run, histories: Sequence[History]) -> list[Picture]:
+    """The value on held-out motions over the steps of each training that they stop, by the kind of value."""
+    watched = [h for h in histories if h.method in run.methods and np.isfinite(h.column("validation")).any()]
+    panels = list(dict.fromkeys(history.panel for history in watched))
+    if not panels:
+        return []
+    looks: dict[str, Style] = {}
+    for history in watched:  # in the colour of the same network at equal steps
+        own, base = style(run, history.method), run.methods[history.method].base
+        looks[history.method] = replace(own, colour=style(run, base).colour) if base in run.methods else own
+    figure = new_figure(PAGE_WIDTH, 2.4)
+    for axes, panel in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels):
+        for history in (history for history in watched if history.panel == panel):
+            value, look = history.column("validation"), looks[history.method]
+            there = np.isfinite(value)
+            axes.plot(history.column("step")[there], value[there], color=look.colour, linestyle=look.line)
+        axes.set(xlabel="steps", title=panel)
+        log_axis(axes, "y")
+        grid(axes)
+    legend_above(figure, [looks[method] for method in run.ordered(looks)], lines=True)
+    caption = "Trainings that end when held-out motions get no better: the value on these. A line per seed."
+    return [save(figure, folder, "held_out", caption=caption, kind="equal data")]
+
+
+def _first(run: Run, methods: Sequence[str], family: str) -> str:
+    return next(name for name in methods if run.methods[name].family == family)
