@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -67,11 +68,12 @@ def shared_clips(
     clips = mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
     if not swinging:
         return clips
-    parts = np.array_split(np.arange(len(clips)), share)
+    given = sum(motion.frames for motion in motions)
+    ends = [round(part * given / FRAMES) for part in range(share + 1)]
+    parts = [clips[first:end] for first, end in pairwise(ends)]
     return [
-        swinging_motion([clips[n] for n in part], f"swinging_{number}", seed=number)
-        for number, part in enumerate(parts) if len(part)
-    ]  # fmt: skip
+        swinging_motion(part, f"swinging_{number}", seed=number) for number, part in enumerate(parts) if part
+    ]
 
 
 def mixed_motions(

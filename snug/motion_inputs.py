@@ -48,7 +48,7 @@ def motion_rates(motion: Any) -> np.ndarray:
 
 
 def motion_history(motion: Any) -> np.ndarray:
-    """(T, 48 x 11): means of the rates over SPANS, this frame's first; before its first frame a body rests."""
+    """(T, 48 x 11): means of the rates over SPANS, this frame's first; a motion begins at rest."""
     rates = motion_rates(motion)
     padded = np.concatenate([np.zeros((HISTORY - 1, rates.shape[1])), rates])
     ago = [padded[HISTORY - 1 - frames :][: len(rates)] for frames in range(HISTORY)]  # so many frames

@@ -1,6 +1,7 @@
 """Recipe: every choice of a training run in one frozen place. The named ones are in snug.recipes.
 
-No recipe holds a balancing weight between the energies: there is none. Imports nothing heavy, so that a command can list recipes without loading torch.
+No recipe holds a balancing weight between the energies: there is none. Imports
+nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ minimised in that frame,
 
     E(x) = strain + bending + gravity + collision + 1/(2 dt^2) (x - x_hat)^T M (x - x_hat)         [J]
 
-with x the network's frame. Its minimum is the next frame of the simulation, yet nothing is fitted to vertices:
-a network that knows only how the body moved cannot tell every wrinkle, and the mean of many wrinkles is
-stretched cloth, for which the strain charges.
+with x the network's frame. Its minimum is the next frame of the simulation. That is not the same as to fit
+vertices: a network that knows only how the body moved cannot tell every wrinkle, and the mean of many
+wrinkles is stretched cloth, for which the strain charges.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Training motions that set a garment swinging: mixed clips, hurried or slowed, turned to and fro, stopped, joined.
+"""Training motions that set a garment swinging: mixed clips that turn to and fro and stop, in one row.
 
-What cloth does by itself shows after a turn and a stop, and few motions have either. Each mixed clip is played
-at another speed; its trunk turns to and fro about the vertical, a random share of it from the pelvis; at a
-random frame the body stops dead and holds still for up to a second. Joined into one long motion they need one
-settled start, and the ways between them are motions too.
+What cloth does by itself shows after a turn and a stop, and few motions have either. Each mixed clip is
+played at another speed; its trunk turns to and fro about the vertical, a random share of it from the pelvis;
+at a random frame the body stops dead and holds still for up to a second. Joined into one long motion they
+need one settled start, and the ways between them are motions too.
 """
 
 from __future__ import annotations

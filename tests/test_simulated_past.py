@@ -10,12 +10,14 @@ import torch
 from dressing import swaying, tube_dress
 
 from snug.baselines.supervised import TargetError
-from snug.motion import Motion
+from snug.motion import Motion, joint_speeds
+from snug.motion_augmentation import mixed_motions, shared_clips
 from snug.motion_inputs import HISTORY, RATED, motion_history, motion_rates
 from snug.recipes import DYNAMIC, TRAININGS
 from snug.rollout import roll_out
 from snug.simulated_past import SimulatedPast
 from snug.skeleton import axis_angles, rotation_matrices
+from snug.swinging_motions import BETWEEN, HELD, SPEEDS, swinging_motion
 from snug.trained_model import TrainedModel
 from snug.trainer import Trainer
 from snug.training import train
@@ -136,3 +138,32 @@ def test_without_inertia_no_past_is_asked_for():
     bare = replace(SMALL, terms=("strain", "gravity"))
     trainer = Trainer("dynamic", tube_dress(), [swaying(9)], steps=2, seed=1, recipe=bare)
     assert "inertia" not in trainer.step(0)
+
+
+def test_swinging_motions_turn_stop_and_go_on_without_a_jump():
+    given = [swaying(80), swaying(70, name="other", degrees=15.0)]
+    clips = mixed_motions(given, 600, turn=0.1, lifted=0.5, seed=0)
+    motion = swinging_motion(clips, "swing", seed=3)
+    again = swinging_motion(clips, "swing", seed=3)
+    np.testing.assert_array_equal(motion.poses, again.poses)
+    assert not np.array_equal(motion.poses[:20], swinging_motion(clips, "swing", seed=4).poses[:20])
+    speeds = joint_speeds(motion)
+    held = (speeds == 0.0).all(1)
+    lengths = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], held, [0]]))))[::2]
+    assert len(lengths) >= len(clips) // 2 and 10 < lengths.max() <= HELD
+    # A stop is one; the way on from it is a motion of half a second, however far the next pose is.
+    assert np.rad2deg(speeds.max()) < 2 * 180 * 30 / BETWEEN
+    steps = np.linalg.norm(np.diff(motion.translations, axis=0), axis=1)
+    fastest = max(np.linalg.norm(np.diff(c.translations, axis=0), axis=1).max() for c in clips)
+    assert steps.max() < SPEEDS[1] * fastest + 0.02
+    assert motion_rates(motion)[:, 7].std() > 0.3  # the pelvis turns [rad/s]
+
+
+def test_swinging_clips_of_a_share_are_those_of_mixed_clips_and_the_first_of_more():
+    given = [swaying(80), swaying(70, name="other")]
+    three, one = (shared_clips(given, share, vertices=150, swinging=True) for share in (3, 1))
+    assert [m.name for m in three] == ["swinging_0", "swinging_1", "swinging_2"]
+    np.testing.assert_array_equal(one[0].poses, three[0].poses)
+    assert 1.0 < sum(m.frames for m in three) / (3 * 150) < 2.0
+    assert shared_clips(given[:1], 0, vertices=150, swinging=True) == []
+    assert len(shared_clips([swaying(10)], 8, vertices=150, swinging=True)) >= 1  # of few frames some parts
