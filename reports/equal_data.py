@@ -50,9 +50,14 @@ def equal_data(run: Run) -> list[Table]:
     columns = (
         Column("garment", "Garment", text=True),
         Column("method", "Method", text=True, method=True),
-        Column("mixed", "Mixed frames for each given one"),
+        Column("mixed", "Mixed for each given frame"),
         Column("seconds", "Data and training", "s"),
-        *map(metric_column, metrics),
+        *(
+            replace(metric_column(metric), digits=6, trim=True)
+            if metric.name in (FRAMES, STEPS)
+            else metric_column(metric)
+            for metric in metrics
+        ),
     )
     caption = "Networks that learn from the same motions: what they had, what it cost, what came of it."
     return table("equal_data", columns, lines, caption, grouped_by=("garment",))
