@@ -18,3 +18,4 @@ class MotionPerceptron(PoseSpaceDeformation):
 
     widths = (256,) * 4
     activation = nn.SiLU
+    constant = True

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.fast_network import FastLinear, run_gru, run_linear
+from snug.fast_network import run_gru, run_linear
 
 if TYPE_CHECKING:
     from snug.frame_plan import FramePlan
@@ -61,10 +61,9 @@ class Regressor(nn.Module):
         normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
         if self.closed_form and torch.is_grad_enabled():
             hidden, state = run_gru(self.gru, normalised, state)
-            flat = FastLinear.apply(hidden, self.offsets.weight, self.offsets.bias) * self.output_scale
         else:
             hidden, state = self.gru(normalised, state)  # (N, T, 256), (4, N, 256)
-            flat = run_linear(self.offsets, hidden) * self.output_scale  # (N, T, 3V)
+        flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), state
 
     def lay_out(self, plan: FramePlan) -> None:

@@ -1,15 +1,17 @@
-"""What a simulation teaches a network that learns from the energies: where the cloth was before.
+"""What a simulation teaches a network that learns from the energies: where the cloth was, and where it went.
 
 Inertia asks where the cloth would be if nothing but its own velocity moved it, x_hat = 2 x_{t-1} - x_{t-2}. A
 network that gives the frames t-1 and t-2 itself makes them agree with a still present: what costs no energy
-is to hang still. So the two frames are a simulation's, and the loss of frame t is what the simulator
-minimised in that frame,
+is to hang still. So the two frames are those of a simulation, s, and the loss of frame t is what the
+simulator minimised in that frame, and a distance that weighs NEARNESS times as much as inertia,
 
-    E(x) = strain + bending + gravity + collision + 1/(2 dt^2) (x - x_hat)^T M (x - x_hat)         [J]
+    E(x) = strain + bending + gravity + collision + |x - x_hat|^2 + NEARNESS |x - s_t|^2,
+    |y|^2 = 1/(2 dt^2) y^T M y                                                                      [J]
 
-with x the network's frame. Its minimum is the next frame of the simulation. That is not the same as to fit
-vertices: a network that knows only how the body moved cannot tell every wrinkle, and the mean of many
-wrinkles is stretched cloth, for which the strain charges.
+with x the network's frame. Both parts have their minimum at s_t. That is not the same as to fit vertices: a
+network that knows only how the body moved cannot tell every wrinkle, and the mean of many wrinkles is
+stretched cloth, for which the strain charges. Nor is it the same without the distance: where x_hat cannot be
+told either, least strain is where the cloth swings less, for its paths are curved.
 """
 
 from __future__ import annotations
@@ -17,39 +19,41 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from snug.baselines.supervised import matched_targets
 from snug.training_set import Batch, TrainingSet
 
+NEARNESS = 2.0
+
 
 class SimulatedPast:
-    """x_hat of the training frames; those after the simulated motions' (F', V, 3) are asked for no inertia.
+    """The simulated frames (F', V, 3) [m] of a training set's first motions, relative to the pelvis.
 
-    A simulation begins at rest. Raises TargetError for a motion without a fitting trajectory.
+    Of frames that were not simulated nothing is asked. Raises TargetError for a motion without a fitting
+    trajectory.
     """
 
     def __init__(
-        self, data: TrainingSet, motions: Sequence[Any], trajectories: Mapping[str, np.ndarray] | None
+        self, data: TrainingSet, motions: Sequence[Any], trajectories: Mapping[str, Any] | None
     ) -> None:
         dressed = data.dressed
         targets = matched_targets(motions, trajectories, dressed.vertices)
-        rows = [_ahead_of(x) - dressed.pelvis(m)[:, None] for x, m in zip(targets, motions)]
-        self.x_hat = torch.as_tensor(np.concatenate(rows), dtype=torch.float32, device=data.device)
+        pelvis = [dressed.pelvis(motion) for motion in motions]
+        rows = [torch.as_tensor(x - p[:, None]).float() for x, p in zip(targets, pelvis)]
+        self.frames = torch.cat(rows).to(data.device)
+        third = [torch.arange(len(x)) >= 2 for x in rows]  # with two before it in its motion
+        self.third = torch.cat(third).to(data.device)
         masses = torch.as_tensor(dressed.cloth.masses, dtype=torch.float32, device=data.device)
         self.stiffness = masses[:, None] / data.dt**2  # (V, 1) [N/m]
 
-    def inertia(self, x: Tensor, batch: Batch) -> Tensor:
-        """Joules (N, T) of vertices x (N, T, V, 3) [m] relative to the pelvis."""
+    def terms(self, x: Tensor, batch: Batch) -> dict[str, Tensor]:
+        """Joules (N, T) of vertices x (N, T, V, 3) [m] relative to the pelvis: inertia and the distance."""
         rows = torch.as_tensor(batch.frames, device=x.device)
-        known = rows < len(self.x_hat)
-        away = x - self.x_hat[rows.clamp(max=len(self.x_hat) - 1)]
-        return 0.5 * (self.stiffness * away.square()).sum((-1, -2)) * known
-
-
-def _ahead_of(x: np.ndarray) -> np.ndarray:
-    """x_hat of each frame of a trajectory (T, V, 3) that rests before it begins."""
-    before = np.concatenate([x[:1], x[:1], x])
-    return 2 * before[1:-1] - before[:-2]
+        known = rows < len(self.frames)
+        rows = rows.clamp(max=len(self.frames) - 1)
+        now, before, earlier = (self.frames[(rows - ago).clamp(min=0)] for ago in range(3))
+        x_hat = 2 * before - earlier + batch.ahead[..., None, :]
+        inertia, distance = (0.5 * (self.stiffness * (x - y).square()).sum((-1, -2)) for y in (x_hat, now))
+        return {"inertia": inertia * (known & self.third[rows]), "distance": NEARNESS * distance * known}

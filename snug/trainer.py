@@ -21,6 +21,7 @@ from snug.fast_skinning import FastSkin
 from snug.hidden_state_cache import HiddenStateCache
 from snug.loss import PhysicsLoss
 from snug.motion_augmentation import mixed_for
+from snug.motion_perceptron import MotionPerceptron
 from snug.parallel import ALONE, Group, GroupError
 from snug.recipe import Recipe
 from snug.regressor import Regressor
@@ -75,7 +76,7 @@ class Trainer:
         )
         network.normalise_by(*self.data.input_statistics())
         self.network = network.to(device)
-        if isinstance(network, Regressor):
+        if isinstance(network, Regressor | MotionPerceptron):
             network.closed_form = self.kernels
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay, fused=True
@@ -191,7 +192,7 @@ class Trainer:
             if self.contact and posed and self._searched_for_high(number, frames, posed, x, terms):
                 terms = self.loss(x, batch.ahead, self.contact.planes(batch, posed))
             if self.past:
-                terms["inertia"] = self.past.inertia(x, batch)
+                terms |= self.past.terms(x, batch)
         means, trusted = self._update(number, windows, terms)
         if trusted and self.hidden_states:
             self.hidden_states.keep(batch.frames[:, -1], after, self.group)

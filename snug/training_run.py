@@ -172,7 +172,7 @@ class TrainingRun:
         """What must be the same for a run to be the same run."""
         trainer, digest = self.trainer, hashlib.sha256()
         taught = trainer.targets.vertices if trainer.targets else trainer.data.ahead
-        past = [trainer.past.x_hat] if trainer.past else []
+        past = [trainer.past.frames] if trainer.past else []
         weights = trainer.dressed.weights(trainer.recipe.smoothing)
         for tensor in (trainer.data.features, trainer.data.rest, taught, weights, *past):
             digest.update(tensor.cpu().numpy().tobytes())

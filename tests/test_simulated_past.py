@@ -15,7 +15,7 @@ from snug.motion_augmentation import mixed_motions, shared_clips
 from snug.motion_inputs import HISTORY, RATED, motion_history, motion_rates
 from snug.recipes import DYNAMIC, TRAININGS
 from snug.rollout import roll_out
-from snug.simulated_past import SimulatedPast
+from snug.simulated_past import NEARNESS, SimulatedPast
 from snug.skeleton import axis_angles, rotation_matrices
 from snug.swinging_motions import BETWEEN, HELD, SPEEDS, swinging_motion
 from snug.trained_model import TrainedModel
@@ -32,7 +32,7 @@ def thrown(motion, speed=2.0):
     first = tube_dress().skinned(motion)[0]
     ways = np.random.default_rng(0).normal(size=first.shape)
     time = np.arange(motion.frames)[:, None, None] / motion.fps
-    return first + speed * time * ways, ways
+    return first + speed * time * ways
 
 
 def past_of(motions, trajectories):
@@ -40,31 +40,32 @@ def past_of(motions, trajectories):
     return data, SimulatedPast(data, motions, trajectories)
 
 
-def test_cloth_that_flies_on_has_no_inertia_and_from_rest_it_has_its_kinetic_energy():
+def test_cloth_that_flies_on_has_no_inertia_and_what_is_off_has_that_of_its_displacement():
     motion = swaying(12)
-    x, ways = thrown(motion)
+    x = thrown(motion)
     data, past = past_of([motion], {motion.name: x})
     relative = torch.as_tensor(x - tube_dress().pelvis(motion)[:, None]).float()[:, None]
-    joules = past.inertia(relative, data.batch(np.arange(12), None))
-    assert joules.shape == (12, 1) and float(joules[2:].max()) < 1e-7 and float(joules[0, 0]) < 1e-12
-    from_rest = 0.5 * float((MASSES[:, None] * (2.0 * ways) ** 2).sum())
-    assert float(joules[1, 0]) == pytest.approx(from_rest, rel=1e-4)
-    off = 0.01 * torch.ones(3)
-    joules = past.inertia(relative + off, data.batch(np.arange(2, 12), None))
-    expected = 0.5 * MASSES.sum() * 30.0**2 * 3e-4
-    torch.testing.assert_close(joules, torch.full((10, 1), float(expected)), rtol=1e-3, atol=0)
+    batch = data.batch(np.arange(12), None)
+    found = past.terms(relative, batch)
+    assert found["inertia"].shape == (12, 1) and float(found["inertia"].max()) < 1e-6
+    assert not found["distance"].any()
+    off = past.terms(relative + 0.01 * torch.ones(3), batch)
+    expected = torch.full((12, 1), float(0.5 * MASSES.sum() * 30.0**2 * 3e-4))
+    torch.testing.assert_close(off["distance"], NEARNESS * expected, rtol=1e-3, atol=0)
+    expected[:2] = 0.0  # two frames before it are missing
+    torch.testing.assert_close(off["inertia"], expected, rtol=1e-3, atol=0)
 
 
 def test_the_past_of_another_motion_is_not_its_own_and_what_is_not_simulated_has_none():
     motions = [swaying(8), swaying(9, name="other", degrees=15.0), swaying(7, name="alone")]
-    known = {motion.name: thrown(motion)[0] for motion in motions[:2]}
+    known = {motion.name: thrown(motion) for motion in motions[:2]}
     data = TrainingSet(tube_dress(), motions, SMALL, features="history", sequences=False)
     past = SimulatedPast(data, motions[:2], known)
-    first = torch.as_tensor(known["other"][0] - tube_dress().pelvis(motions[1])[0]).float()
-    torch.testing.assert_close(past.x_hat[8], first, atol=1e-6, rtol=0)  # it was at rest
     still = torch.zeros(3, 1, tube_dress().vertices, 3)
-    joules = past.inertia(still, data.batch(np.array([16, 17, 23]), None))
-    assert joules[0] > 0 and not joules[1:].any()
+    batch = data.batch(np.array([9, 16, 17]), None)
+    terms = past.terms(still, batch)
+    assert terms["inertia"].flatten().bool().tolist() == [False, True, False]  # 9: a second frame
+    assert terms["distance"].flatten().bool().tolist() == [True, True, False]  # 17: not simulated
     with pytest.raises(TargetError, match=r"no simulated trajectory.*'other'"):
         SimulatedPast(data, motions, {motions[0].name: known[motions[0].name]})
 
@@ -116,7 +117,7 @@ def test_a_history_is_every_rate_once_and_no_later_one():
 
 def test_training_brings_the_swing_into_the_file(tmp_path):
     motions = [swaying(30), swaying(26, name="other", degrees=15.0)]
-    trajectories = {motion.name: thrown(motion, 0.05)[0] for motion in motions}
+    trajectories = {motion.name: thrown(motion, 0.05) for motion in motions}
     rows: list[dict[str, float]] = []
     assert TRAININGS["snug-dynamic"].simulated
     model = train(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor, nn
 
+from snug.fast_network import run_linear
 from snug.regressor import Regressor
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ class PoseSpaceDeformation(nn.Module):
 
     widths: tuple[int, ...] = (32,) * 4
     activation: type[nn.Module] = nn.ReLU
+    constant = False  # whether there is a deformation in every pose
+    closed_form = False
 
     def __init__(
         self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
@@ -39,15 +42,17 @@ class PoseSpaceDeformation(nn.Module):
         layers = [layer for a, b in sizes for layer in (nn.Linear(a, b), self.activation())]
         self.activations = nn.Sequential(*layers)
         # The deformation matrix, (width, V, 3) flattened.
-        self.offsets = nn.Linear(self.widths[-1], 3 * vertices, bias=False)
+        self.offsets = nn.Linear(self.widths[-1], 3 * vertices, bias=self.constant)
         if zero_last_layer:
-            nn.init.zeros_(self.offsets.weight)
+            for parameter in self.offsets.parameters():
+                nn.init.zeros_(parameter)
 
     normalise_by = Regressor.normalise_by
 
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
         normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
-        flat = self.offsets(self.activations(normalised)) * self.output_scale  # (N, T, 3V)
+        hidden = self.activations(normalised)
+        flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), None
 
     def lay_out(self, plan: FramePlan) -> None:
