@@ -55,6 +55,8 @@ class Recipe:
         stiffness and margin of contact).
     bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints them; of
         no account with material `pbns`.
+    pretraining: updates before those by the energies, for a network that learns from a simulated past, see
+        snug.simulated_past.
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped; what
         else is done about such batches: see snug.divergence_guard.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
@@ -87,6 +89,7 @@ class Recipe:
     terms: tuple[str, ...] = TERMS
     material: str = "stvk"
     bending: str = "length_area"
+    pretraining: int = 0
     spike: float = 2.0
     gradient_limit: float = 1.0
 
@@ -108,7 +111,7 @@ class Recipe:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
-        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh")
+        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pretraining")
         for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")

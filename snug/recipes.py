@@ -72,7 +72,9 @@ PBNS_SPRINGS = replace(DEFAULT, name="pbns-springs", material="pbns", contact_sa
 DYNAMIC = replace(
     DEFAULT,
     name="dynamic",
+    learning_rate=1.5e-3,
     mixed=0.0,
+    pretraining=2000,
     spike=20.0,
 )
 
@@ -133,7 +135,7 @@ TRAININGS = {
     "supervised": Training("supervised", SUPERVISED, Simulated()),
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
     "tailornet": Training("tailornet", TAILORNET, Simulated()),
-    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=8, method="fast-lbfgs-40", swinging=True)),
+    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=6, method="fast-lbfgs-40", swinging=True)),
     **{
         f"snug-{recipe.name}": Training("snug", recipe)
         for recipe in (PAPER, *ABLATIONS, *with_and_without(DEFAULT, PAPER))

@@ -69,8 +69,8 @@ class TrainedModel:
     history: one dict for every few steps: step, seconds, loss and each energy [J per frame], and as
         `seconds/<part>` what the parts of a step took on the mean (snug.stopwatch).
     summary: windows above the spike limit, updates left out, returns to good weights, with names.
-    seconds: wall time of the steps, contact search included; setup_seconds: of making ready the motions and
-        the first anchors.
+    seconds: wall time of the steps, contact search included, and of a pretraining before them;
+        setup_seconds: of making ready the motions and the first anchors.
     precision: of its matrices in roll-outs, one of snug.frame_plan.PRECISIONS; its file does not say it.
     """
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -93,6 +94,7 @@ class Trainer:
         self.contact: TrainingContact | None = None
         self.targets: VertexTargets | None = None
         self.past: SimulatedPast | None = None
+        self.pretraining_seconds = 0.0  # s
         self._set_up_supervision(motions, trajectories)
         self.hidden_states = self._hidden_state_cache()
         self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
@@ -119,6 +121,10 @@ class Trainer:
             self.contact.search_first(self.weights)
         if how.past and "inertia" in recipe.terms:
             self.past = SimulatedPast(data, motions, trajectories)
+            if recipe.pretraining:
+                begun = time.perf_counter()
+                self.past.pretrain(self.network, self.weights, steps=recipe.pretraining, seed=self.seed)
+                self.pretraining_seconds = time.perf_counter() - begun
 
     def _hidden_state_cache(self) -> HiddenStateCache | None:
         start = self.network.random_state(1, 0.0, torch.Generator())

@@ -51,7 +51,7 @@ class TrainingRun:
     """One trainer taken through all its steps by `go`.
 
     log gets each row of the history, every `every` steps; progress: a bar on standard error; stop: asked
-    after each step. setup_seconds: what making the trainer took.
+    after each step. setup_seconds: what making the trainer took; of that, the pretraining counts as training.
     """
 
     def __init__(
@@ -71,8 +71,8 @@ class TrainingRun:
         self.patience = validation.patience if validation else 0
         self.validator = Validator(trainer, validation) if validation else None
         self.validated_every = validation.every if validation else 0
-        self.setup_seconds = setup_seconds
-        self.done, self.seconds = 0, 0.0
+        self.setup_seconds = setup_seconds - trainer.pretraining_seconds
+        self.done, self.seconds = 0, trainer.pretraining_seconds
         self.history: list[dict[str, float]] = []
         self.recent: list[dict[str, float]] = []
         self.best: dict[str, Tensor] = {}

@@ -23,7 +23,7 @@ from snug.trainer import Trainer
 from snug.training import train
 from snug.training_set import TrainingSet
 
-SMALL = replace(DYNAMIC, mixed=0.0)
+SMALL = replace(DYNAMIC, pretraining=0)
 MASSES = tube_dress().cloth.masses
 
 
@@ -168,3 +168,22 @@ def test_swinging_clips_of_a_share_are_those_of_mixed_clips_and_the_first_of_mor
     assert 1.0 < sum(m.frames for m in three) / (3 * 150) < 2.0
     assert shared_clips(given[:1], 0, vertices=150, swinging=True) == []
     assert len(shared_clips([swaying(10)], 8, vertices=150, swinging=True)) >= 1  # of few frames some parts
+
+
+def test_a_pretraining_brings_the_network_to_the_simulated_offsets():
+    motions = [swaying(40), swaying(36, name="other", degrees=15.0)]
+    dressed, random = tube_dress(), np.random.default_rng(0)
+    way, made = 0.03 * random.normal(size=(dressed.vertices, 3)), []
+    for motion in motions:
+        turn = torch.as_tensor(motion_rates(motion)[:, 6 + 3 * RATED.index("spine1") + 2])  # [rad/s]
+        made.append(torch.einsum("t,vi->tvi", turn, torch.as_tensor(way)).float())
+    known = {m.name: dressed.skinned(m, smoothing=SMALL.smoothing, offsets=o) for m, o in zip(motions, made)}
+    apart = []
+    for steps in (0, 150, 150):
+        recipe = replace(SMALL, pretraining=steps)
+        trainer = Trainer("dynamic", dressed, motions, steps=1, seed=1, recipe=recipe, trajectories=known)
+        with torch.no_grad():
+            offsets = trainer.network(trainer.data.features[:, None])[0][:, 0]
+        apart.append(float((offsets - torch.cat(made)).square().mean()))
+    assert apart[1] < 0.1 * apart[0] and apart[2] == apart[1]  # and the same again
+    assert trainer.pretraining_seconds > 0 and all(p.grad is None for p in trainer.network.parameters())
