@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.data import Run
+from reports.data import STEP, Run
 from reports.numbers import number
 from reports.plotting import PAGE_WIDTH, Picture, file_name, new_figure, save, wrapped
 from reports.render import BODY_COLOUR, CLOTH_COLOUR, LIFT, Surface, camera_for, views
@@ -25,7 +25,6 @@ FRONT, BACK = -25.0, 155.0  # turns of the camera [degrees]
 BAR, NAME, SIDE = 0.62, 0.24, 0.2  # inches for a scale, a line of words and words at the side
 FULL = 97.0  # percentile of the values of the worst method: it has the darkest colour
 NOTHING = 1e-6  # of a scale's unit: what is less everywhere is not shown
-STEP = "step/vertices"
 INERTIA = "energy/inertia"
 
 

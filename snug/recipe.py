@@ -35,13 +35,16 @@ class Recipe:
     h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
     remembered: that noise is added to the state which the network last had after the frame before (see
         snug.hidden_state_cache), instead of to nothing. Not for what learns simulated vertices, nor where
-        `shape_range` gives a sub-sequence another body each time; of little use where `window_stride` is no
+        each window gets a shape of its own (`shape_of`); of little use where `window_stride` is no
         divisor of `window`, for then few frames before a window ever end one.
     window, batch: frames of a sub-sequence, sub-sequences of a step.
     window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
     even: parts of an epoch that each pass over all motions, each taking one sub-sequence of so many: by
         chance alone (1) a hard pose may come so late that the network, by then settled, meets it with joules.
-    shape_range: each sub-sequence gets shape numbers from U(-r, r).
+    shape_range: bodies get shape numbers from U(-r, r). shape_of: who gets them, each `window` in each step
+        anew, as the paper has it, or each mixed `clip` once, while given motions stay on the mean body: what
+        is known of a frame (its posed body, its anchors, the state before it) then stays true. shape_share:
+        of these clips that leave the mean body.
     contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
     contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most one
@@ -79,6 +82,8 @@ class Recipe:
     window_stride: int = 1
     even: int = 20
     shape_range: float = 0.0
+    shape_of: str = "window"
+    shape_share: float = 1.0
     contact_samples: str = "all"
     contact_stiffness: float | None = None
     contact_margin: float | None = None
@@ -101,6 +106,7 @@ class Recipe:
             ("contact_samples", ("all", "vertices")),
             ("material", ("stvk", "springs", "pbns")),
             ("bending", ("length_area", "none")),
+            ("shape_of", ("window", "clip")),
         ):
             if getattr(self, option) not in allowed:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
@@ -112,11 +118,16 @@ class Recipe:
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
         sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pretraining")
-        for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", *sizes):
+        for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", "shape_share", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
-        if self.mixed_lift > 1.0:
-            raise RecipeError(f"recipe option mixed_lift={self.mixed_lift}: a share, so at most 1")
+        if self.shape_of == "clip" and self.shape_range and not self.mixed:
+            raise RecipeError(
+                "recipe option shape_of='clip': mixed clips get the shapes, so mixed above zero"
+            )
+        for option in ("mixed_lift", "shape_share"):
+            if getattr(self, option) > 1.0:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)}: a share, so at most 1")
         for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")

@@ -21,7 +21,7 @@ from snug.dressed_body import DressedBody
 from snug.fast_skinning import FastSkin
 from snug.hidden_state_cache import HiddenStateCache
 from snug.loss import PhysicsLoss
-from snug.motion_augmentation import mixed_for
+from snug.motion_augmentation import mixed_for, shapes_of_mixed
 from snug.motion_perceptron import MotionPerceptron
 from snug.parallel import ALONE, Group, GroupError
 from snug.recipe import Recipe
@@ -67,9 +67,17 @@ class Trainer:
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
         mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
+        drawn = recipe.shape_range and dressed.body.shape_count and how.features == "motion" and how.physics
+        self.shaped = bool(drawn) and recipe.shape_of == "window"
+        shapes = None
+        if drawn and recipe.shape_of == "clip":
+            mean = np.zeros((len(motions), dressed.body.shape_count))
+            of_mixed = shapes_of_mixed(len(mixed), dressed.body.shape_count, recipe, seed=seed)
+            shapes = np.concatenate([mean, of_mixed])
         self.data = TrainingSet(
-            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
-        )
+            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences,
+            device=device, shapes=shapes,
+        )  # fmt: skip
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
         pins = dressed.garment.pins
         network = make_network(
@@ -84,9 +92,6 @@ class Trainer:
         )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
-        self.shaped = (
-            bool(recipe.shape_range and dressed.body.shape_count) and how.features == "motion" and how.physics
-        )
         self.windows = recipe.batch if how.sequences else recipe.batch * recipe.window
         self.order = np.empty(0, np.int64)
         self.epoch = 0
@@ -141,7 +146,7 @@ class Trainer:
             data,
             self.loss.contact,
             refresh=self.recipe.contact_refresh,
-            one_shape=not self.shaped,
+            kept=not self.shaped,
             kernels=self.kernels,
             group=self.group if data is self.data else ALONE,
         )

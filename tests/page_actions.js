@@ -66,6 +66,12 @@
     document.querySelector('[data-turn="180"]').click();
     found.turned = await until(() => picture().some((x, k) => x !== before[k]));
     found.colours = [...byId('colour').options].map((option) => option.value);
+    const notes = () => [...document.querySelectorAll('.pane small')].map((note) => note.textContent);
+    await set('colour', 'step');
+    await set('time', 0, 'input');
+    found.unjudged = notes();
+    await set('time', 3, 'input');
+    found.judged = notes();
     await set('colour', 'curvature');
     found.scale = byId('scale-title').textContent;
     const heads = [...document.querySelectorAll('#scroll thead button')];

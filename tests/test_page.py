@@ -55,6 +55,13 @@ def moving(height: float, scene: str = WHOLE) -> tuple[np.ndarray, np.ndarray]:
     return x, faces
 
 
+def steps(cloth: np.ndarray) -> np.ndarray:
+    """One-step errors (T,V) [mm], from 0 to 3 over the vertices; of the first two frames none are known."""
+    known = np.repeat(np.linspace(0.0, 3.0, cloth.shape[1])[None], len(cloth), axis=0)
+    known[:2] = np.nan
+    return known
+
+
 def make_folder(path: Path) -> RunFolder:
     run = RunFolder(path)
     run.write_rows(rows_of_page())
@@ -66,6 +73,8 @@ def make_folder(path: Path) -> RunFolder:
             cloth, faces = moving(height, scene)
             energies = {"energy/total": np.linspace(1.0, 2.0, len(cloth))}
             write_mesh(run.trajectory_path(scene, method), cloth, faces, energies)
+            if scene in CLIPS:
+                np.savez(run.curves_path(scene, method), **{"step/vertices": steps(cloth)})
         np.save(run.rest_areas_path(scene), np.full(len(faces), 0.4 / 3 * 0.5 / 3 / 2))
     return run
 
@@ -193,6 +202,16 @@ def test_the_page_holds_the_roll_outs_of_the_run(folder):
     np.testing.assert_allclose(found["energy/total"], np.linspace(1.0, 2.0, len(cloth)), rtol=1e-6)
     np.testing.assert_allclose(found["distance"], 10.0, rtol=1e-2)
     assert {"curvature", "area", "depth"} <= found.keys()
+
+
+def test_one_step_errors_are_kept_and_frames_that_nobody_judged_are_named(folder):
+    scenes = content_of(folder)["scenes"]
+    entry = scenes[CLIPS[0]]["methods"]["snug"]["arrays"]["step"]
+    assert entry["unknown"] == [0, 1]
+    found = arrays_of(folder, CLIPS[0], "snug")["step"]
+    np.testing.assert_allclose(found[2:], np.nan_to_num(steps(found))[2:], atol=0.03)
+    assert "step" not in scenes[WHOLE]["methods"]["snug"]["arrays"]
+    assert scenes[CLIPS[0]]["methods"]["snug"]["arrays"]["curvature"]["unknown"] == []
 
 
 def test_scenes_of_one_motion_share_the_body(folder):
@@ -344,7 +363,8 @@ def test_a_person_can_use_it(folder, tmp_path):
     assert found["pointed"] == "pbns" and "pbns" in found["withPointed"] and len(found["withPointed"]) == 4
     assert found["focused"] == "pbns"
     assert found["turned"] and found["scale"] == "Mean curvature [1/m]"
-    assert found["colours"] == ["plain", "curvature", "area", "distance", "depth"]
+    assert found["colours"] == ["plain", "curvature", "area", "step", "distance", "depth"]
+    assert found["unjudged"] == ["step not judged"] * 4 and found["judged"] == [""] * 4
     directions, columns = zip(found["up"], found["down"])
     assert directions == ("ascending", "descending")
     numbers = [[float(text) for text in column] for column in columns]

@@ -31,7 +31,7 @@ function readValues(bytes, entry) {
   const [frames, count] = entry.shape;
   const levels = bytes.slice(entry.at, entry.at + frames * count);
   for (let k = count; k < levels.length; k++) levels[k] += levels[k - count];
-  return { frames, count, levels, full: entry.full, signed: entry.signed };
+  return { frames, count, levels, full: entry.full, signed: entry.signed, unknown: new Set(entry.unknown) };
 }
 
 const READERS = {

@@ -42,14 +42,17 @@ class Pack:
         self.entries[name]["shape"] = list(positions.shape)
 
     def values(self, name: str, values: np.ndarray, *, signed: bool = False) -> None:
-        """(T,V) numbers, what is not finite as 0; each byte less that of the frame before."""
+        """(T,V) numbers, what is not finite as 0; each byte less that of the frame before. Frames without any
+        finite number are named, and not coloured.
+        """
+        unknown = np.flatnonzero(~np.isfinite(values).any(axis=1))
         values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
         full = max(float(np.abs(values).max(initial=0.0)), 1e-12)
         root = np.sqrt(np.abs(values) / full)
         levels = 128 + np.rint(np.sign(values) * HALF_LEVELS * root) if signed else np.rint(LEVELS * root)
         levels = levels.astype(np.uint8)
         changes = np.diff(levels, axis=0, prepend=np.zeros_like(levels[:1]))
-        self._add(name, changes, kind="values", full=full, signed=signed)
+        self._add(name, changes, kind="values", full=full, signed=signed, unknown=unknown.tolist())
 
     def numbers(self, name: str, numbers: np.ndarray) -> None:
         """One number per frame (T,), to single precision."""

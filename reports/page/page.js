@@ -8,6 +8,7 @@ const COLOURS = {
   plain: { title: 'None' },
   curvature: { title: 'Mean curvature', unit: '1/m', stops: SEQUENTIAL },
   area: { title: 'Change of area from rest', unit: '%', stops: DIVERGING },
+  step: { title: 'One-step error', unit: 'mm', stops: SEQUENTIAL, missing: 'step not judged' },
   distance: { title: 'Distance to the simulation', unit: 'mm', stops: SEQUENTIAL },
   depth: { title: 'Depth under the skin', unit: 'mm', stops: FROM_ZERO, through: true }, // the skin would hide it
 };
@@ -188,7 +189,9 @@ function goTo(frame) {
     const note = pane.querySelector('small');
     const own = arrays[k].times;
     const over = own[own.length - 1] < time - 1e-6;
-    note.textContent = over ? `ended at ${own[own.length - 1].toFixed(2)} s` : note.dataset.ending;
+    const unknown = arrays[k][state.colour]?.unknown.has(frameAt(own, time));
+    if (over) note.textContent = `ended at ${own[own.length - 1].toFixed(2)} s`;
+    else note.textContent = (unknown && COLOURS[state.colour].missing) || note.dataset.ending;
   });
   view?.draw(time);
 }
@@ -246,6 +249,7 @@ function listen() {
       if (view) view.shown[k].values = pane.values;
     });
     if (view) colourScale();
+    goTo(state.frame);
     redraw();
   };
   on('controls', 'submit', (event) => event.preventDefault());

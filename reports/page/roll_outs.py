@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.results import RunFolder
-from reports.data import Run
+from reports.data import STEP, Run
 from reports.page.choice import groups
 from reports.page.pack import Pack
 from reports.page.vertex_values import area_change, depth, distance, mean_curvature
@@ -131,6 +131,8 @@ def _cloth(
         pack.values("distance", distance(cloth.positions, reference.positions))
     if depths is not None:
         pack.values("depth", depths)
+    if STEP in cloth.frame_fields:
+        pack.values("step", cloth.frame_fields[STEP])
     for name, curve in cloth.frame_fields.items():
         if name in curves:
             pack.numbers(name, curve)

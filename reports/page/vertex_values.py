@@ -1,4 +1,4 @@
-"""What the page colours a cloth by: one number per vertex and frame, from positions alone."""
+"""What the page colours a cloth by: one number per vertex and frame, most of them from positions alone."""
 
 from __future__ import annotations
 

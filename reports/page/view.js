@@ -64,7 +64,8 @@ class View {
       const camera = this.camera(centre, box.width / box.height);
       if (this.skin && this.withBody) this.drawing.draw(this.skin.mesh, camera, SKIN, null, 1);
       if (this.through) this.drawing.forgetDepth();
-      this.drawing.draw(pane.mesh, camera, CLOTH, pane.values, this.limit);
+      const known = pane.values && !pane.values.unknown.has(pane.mesh.frame);
+      this.drawing.draw(pane.mesh, camera, CLOTH, known ? pane.values : null, this.limit);
     }
   }
 
