@@ -30,18 +30,18 @@ def motion_rates(motion: Any) -> np.ndarray:
     angular acceleration [rad/s^2] of each of TRUNK. Backward differences: the first frame is at rest.
     """
     fps = motion.fps
-    rotations = rotation_matrices(motion.poses)
+    rotations = rotation_matrices(motion.poses[:, [JOINT[name] for name in RATED]])
     turns = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:]) * fps  # in the joint's own axes
-    turns = np.concatenate([np.zeros((1, 24, 3)), turns])
+    turns = np.concatenate([np.zeros((1, *turns.shape[1:])), turns])
     velocity = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * fps
     acceleration = np.diff(velocity, axis=0, prepend=velocity[:1]) * fps
     to_root = np.swapaxes(rotations[:, 0], -1, -2)
-    rated, trunk = ([JOINT[name] for name in names] for names in (RATED, TRUNK))
-    spins = np.diff(turns[:, trunk], axis=0, prepend=turns[:1, trunk]) * fps
+    trunk = turns[:, [RATED.index(name) for name in TRUNK]]
+    spins = np.diff(trunk, axis=0, prepend=trunk[:1]) * fps
     parts = (
         (to_root @ velocity[..., None])[..., 0],
         (to_root @ acceleration[..., None])[..., 0],
-        turns[:, rated].reshape(len(turns), -1),
+        turns.reshape(len(turns), -1),
         spins.reshape(len(turns), -1),
     )
     return np.concatenate(parts, axis=1)
