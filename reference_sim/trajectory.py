@@ -7,8 +7,6 @@ top-level group /benchmark.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,24 +88,18 @@ class Trajectory:
         """
         import h5py
 
-        with _readable(path), h5py.File(path, "r") as file:
-            return read_trajectory(file)
+        try:
+            with h5py.File(path, "r") as file:
+                return read_trajectory(file)
+        except FileNotFoundError:
+            raise TrajectoryError(f"{path}: no such trajectory file") from None
+        except UNREADABLE as error:
+            reason = " ".join(str(error).split())
+            raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
 
     def with_status(self, status: str, reason: str) -> Trajectory:
         """The same frames with another status."""
         return replace(self, status=status, reason=reason)
-
-
-@contextmanager
-def _readable(path: str | Path) -> Iterator[None]:
-    """Raises TrajectoryError for what h5py and numpy make of a file that is missing or none of ours."""
-    try:
-        yield
-    except FileNotFoundError:
-        raise TrajectoryError(f"{path}: no such trajectory file") from None
-    except UNREADABLE as error:
-        reason = " ".join(str(error).split())
-        raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
 
 
 def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:
@@ -130,66 +122,15 @@ def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory
     )
 
 
-class StoredPositions:
-    """Positions (T, V, 3) [m] of a trajectory's file, of which nothing stays in memory: a slice of frames is
-    read when it is asked for, and `numpy.asarray` reads all of them.
-
-    content: a digest of the file, for who needs to tell it from another; empty where none is known.
-    Raises TrajectoryError: missing file, not a trajectory, or damaged where it is read.
-    """
-
-    def __init__(self, path: str | Path, content: str = "") -> None:
-        self.path, self.content = Path(path), content
-        count, frames = self._read(_size)
-        self.shape = (frames, count, 3)
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __getitem__(self, frames: slice) -> np.ndarray:
-        first, stop, step = frames.indices(len(self))
-        if step != 1:
-            raise IndexError("frames are read one after another: a slice without a step")
-        count = self.shape[1]
-        found = self._read(lambda file: file["VTKHDF/Points"][first * count : stop * count])
-        return found.reshape(-1, count, 3)
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.asarray(self[:], dtype)
-
-    def _read(self, read: Callable[[h5py.File], Any]) -> Any:
-        import h5py
-
-        with _readable(self.path), h5py.File(self.path, "r") as file:
-            return read(file)
-
-
-Positions = np.ndarray | StoredPositions
-
-
-def _size(file: h5py.File) -> tuple[int, int]:
-    """Vertices and whole frames, once the file holds as many points as they are."""
-    count, frames = int(_whole(file["VTKHDF/NumberOfPoints"])[0]), int(file["benchmark"].attrs["frames"])
-    points = file["VTKHDF/Points"]
-    _check(points, frames * count)
-    if count < 1 or points.shape[1:] != (3,):
-        raise ValueError(f"{count} vertices, and points of shape {points.shape}")
-    return count, frames
-
-
 def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
-    """The first rows of a dataset, all of them by default; raises as `_check`."""
-    rows = len(dataset) if rows is None else rows
-    _check(dataset, rows)
-    return dataset[:rows]
+    """The first rows of a dataset, all of them by default, once their size is that of what is stored.
 
-
-def _check(dataset: h5py.Dataset, rows: int) -> None:
-    """Raises ValueError for a dataset that has fewer rows or no plain numbers, or declares more than it
-    holds.
+    Raises ValueError for one that declares more numbers than it holds, or no plain numbers.
     """
+    rows = len(dataset) if rows is None else rows
     if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":
         raise ValueError(f"{dataset.name} has {dataset.shape} of {dataset.dtype}")
     size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
     if size > MOST_PACKED * dataset.id.get_storage_size() + SMALL:
         raise ValueError(f"{dataset.name} declares {size} bytes, more than it holds")
+    return dataset[:rows]
