@@ -188,9 +188,9 @@ def _line(name: str, outcome: Outcome) -> SimulatedSequence:
     told |= {"reason": outcome.reason, "seconds": round(outcome.seconds, 3)}
     if outcome.failed or not outcome.files:
         return SimulatedSequence(name, status=outcome.status, **told)
-    trajectory, motion = outcome.files
+    trajectory, motion, vertices = outcome.files
     status, _, reason = outcome.result["ending"].partition(": ")
     return SimulatedSequence(
-        name, trajectory, motion, outcome.digests, outcome.result["frames"], status,
+        name, trajectory, motion, vertices, outcome.digests, outcome.result["frames"], status,
         usable=outcome.result["whole"], **told | {"reason": reason},
     )  # fmt: skip

@@ -1,8 +1,9 @@
 """A data set: simulated motions in the files of one folder, and an index of them, dataset.json.
 
-A sequence is two files: the motion (.npz) and its simulation (.vtkhdf), of which training reads a few frames
-at a time. The index says what all sequences share (the settings), and of each its files with their digests,
-its frames and how it ended. `python -m benchmarks.dataset` makes, verifies and merges such folders.
+A sequence is three files: its simulation (.vtkhdf), the motion (.npz), and the simulated vertices as networks
+see them (.npy), of which training reads a few frames at a time. The index says what all sequences share (the
+settings), and of each its files with their digests, its frames and how it ended. `python -m
+benchmarks.dataset` makes, verifies and merges such folders.
 """
 
 from __future__ import annotations
@@ -16,20 +17,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.array_file import read_arrays
-from reference_sim.trajectory import StoredPositions
+from reference_sim.array_file import read_arrays, write_array
 from reference_sim.whole_file import replacing
 from snug.motion import Motion
 
 if TYPE_CHECKING:
+    from snug.baselines.supervised import StoredVertices
     from snug.body import Body
     from snug.garments import Garment
 
 INDEX, FORMAT = "dataset.json", 1
 MISSING = "missing"  # status of a sequence that was asked for and is not there yet
 _TYPES: dict[str, Any] = {
-    "name": str, "trajectory": str, "motion": str, "digests": dict, "frames": int, "status": str,
-    "reason": str, "usable": bool, "seconds": int | float, "hardware": str, "commit": str,
+    "name": str, "trajectory": str, "motion": str, "vertices": str, "digests": dict, "frames": int,
+    "status": str, "reason": str, "usable": bool, "seconds": int | float, "hardware": str, "commit": str,
 }  # fmt: skip
 MICROMETRES = 6  # decimals of positions [m] that count: another processor may tailor the last bits otherwise
 
@@ -40,7 +41,8 @@ class DataSetError(ValueError):
 
 @dataclass(frozen=True)
 class SimulatedSequence:
-    """A line of the index. trajectory, motion: names of its files in the folder; digests: of these, by name.
+    """A line of the index. trajectory, motion, vertices: names of its files in the folder; digests: of these,
+    by name.
 
     status, reason: how the simulation ended, or MISSING. usable: whether it has all frames of the motion.
     seconds: wall time of the simulation, on `hardware`, by the code of `commit`.
@@ -49,6 +51,7 @@ class SimulatedSequence:
     name: str
     trajectory: str = ""
     motion: str = ""
+    vertices: str = ""
     digests: Mapping[str, str] = field(default_factory=dict)
     frames: int = 0
     status: str = MISSING
@@ -111,13 +114,15 @@ class DataSet:
         """The motions of the usable sequences. Raises ValueError for a file that is not as it should be."""
         return [read_motion(self.folder / line.motion, line) for line in self.usable]
 
-    def trajectories(self) -> dict[str, StoredPositions]:
-        """Name -> world vertices (T, V, 3) [m] of the usable sequences; they stay in their files.
+    def targets(self) -> dict[str, StoredVertices]:
+        """Name -> the vertices of each usable sequence; they stay in their files."""
+        from snug.baselines.supervised import StoredVertices
 
-        Raises TrajectoryError.
-        """
+        count = int(self.settings["vertices"])
         return {
-            line.name: StoredPositions(self.folder / line.trajectory, line.digests[line.trajectory])
+            line.name: StoredVertices(
+                self.folder / line.vertices, (line.frames, count, 3), line.digests[line.vertices]
+            )
             for line in self.usable
         }
 
@@ -153,6 +158,13 @@ def write_motion(path: Path, motion: Motion) -> None:
         np.savez(temporary, poses=motion.poses, translations=motion.translations, fps=motion.fps)
 
 
+def write_vertices(path: Path, positions: np.ndarray, motion: Motion, body: Body) -> None:
+    """Simulated world positions (T, V, 3) [m] as networks see them: from the pelvis, in float32."""
+    pelvis = body.joints()[0] + motion.translations[: len(positions)]
+    with replacing(path) as temporary:
+        write_array(temporary, (positions - pelvis[:, None]).astype(np.float32))
+
+
 def read_motion(path: Path, line: SimulatedSequence) -> Motion:
     """The motion of a sequence. Raises ValueError for a file that does not hold it."""
     found = read_arrays(path, ("poses", "translations", "fps"))
@@ -180,9 +192,10 @@ def _line(line: Mapping[str, Any]) -> SimulatedSequence:
     for name, kind in _TYPES.items():
         if not isinstance(value := getattr(found, name), kind):
             raise ValueError(f"sequence {str(found.name)[:60]!r}: {name} is {str(value)[:40]!r}")
-    for name in filter(None, (found.trajectory, found.motion, *found.digests)):
+    files = {found.trajectory, found.motion, found.vertices}
+    for name in filter(None, (*files, *found.digests)):
         if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
             raise ValueError(f"sequence {found.name!r}: its file {name!r} lies outside of the folder")
-    if found.usable and not {found.trajectory, found.motion} <= set(found.digests):
+    if found.usable and not files <= set(found.digests):
         raise ValueError(f"sequence {found.name!r}: no digest of its files")
     return found

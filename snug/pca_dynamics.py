@@ -31,8 +31,7 @@ import torch
 from torch import Tensor
 from torch.nn.utils.rnn import pad_sequence
 
-from reference_sim.trajectory import Positions
-from snug.baselines.supervised import TargetError, all_relative, matched_targets
+from snug.baselines.supervised import TargetError, Targets, all_relative, matched_targets
 from snug.recipe import Recipe
 from snug.regressor import HIDDEN
 from snug.skinning import unposed
@@ -56,7 +55,7 @@ class DynamicsSupervision:
         self,
         data: TrainingSet,
         motions: Sequence[Any],
-        trajectories: Mapping[str, Positions] | None,
+        trajectories: Mapping[str, Targets] | None,
         weights: Tensor,
         recipe: Recipe,
     ) -> None:

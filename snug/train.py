@@ -176,7 +176,7 @@ def _train_one(
     dressed = DressedBody(body, template.tailor(body, vertices=options.vertices))
     if data:
         data.check(settings_of(body, dressed.garment))
-    trajectories = data.trajectories() if data and TRAININGS[options.model].simulated else None
+    trajectories = data.targets() if data and TRAININGS[options.model].simulated else None
     if options.resume and out.is_file() and not saving.path.is_file():
         _check_ended(out, options, dressed.vertices)
         say(f"{out}: is there, and no checkpoint beside it; nothing to resume")

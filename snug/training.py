@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from snug.recipe import DEFAULT, Recipe
 
 if TYPE_CHECKING:
-    from reference_sim.trajectory import Positions
+    from snug.baselines.supervised import Targets
     from snug.dressed_body import DressedBody
     from snug.parallel import Group
     from snug.trained_model import TrainedModel
@@ -24,7 +24,7 @@ def train(
     *,
     steps: int,
     seed: int,
-    trajectories: Mapping[str, Positions] | None = None,
+    trajectories: Mapping[str, Targets] | None = None,
     recipe: Recipe = DEFAULT,
     log: Callable[[dict[str, float]], None] | None = None,
     progress: bool = True,

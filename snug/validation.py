@@ -20,7 +20,7 @@ from snug.skinning import skin
 from snug.training_set import Batch, TrainingError, TrainingSet
 
 if TYPE_CHECKING:
-    from reference_sim.trajectory import Positions
+    from snug.baselines.supervised import Targets
     from snug.trainer import Trainer
 
 
@@ -34,7 +34,7 @@ class Validation:
     motions: Sequence[Any]
     every: int = 200
     patience: int = 10
-    trajectories: Mapping[str, Positions] | None = None
+    trajectories: Mapping[str, Targets] | None = None
 
 
 class Validator:

@@ -114,9 +114,10 @@ def test_the_index_says_what_there_is(built, capsys):
     assert all(line.usable and line.status == "converged" and line.seconds > 0 for line in found.sequences)
     for line, motion in zip(found.sequences, found.motions(), strict=True):
         whole = Trajectory.load(built / line.trajectory)
-        stored = found.trajectories()[line.name]
+        stored = found.targets()[line.name]
         assert stored.shape == whole.positions.shape == (line.frames, 150, 3) and motion.frames == FRAMES
-        assert np.array_equal(stored[3:7], whole.positions[3:7])
+        seen = whole.positions[3:7] - tube_dress().pelvis(motion)[3:7, None]
+        assert np.array_equal(stored.read(slice(3, 7), ""), seen.astype(np.float32))
     assert dataset.main(["verify", str(built)]) == 0 and dataset.main(["list", str(built)]) == 0
     assert "3 of 3 sequences to learn from, 54 frames" in capsys.readouterr().out
     assert not list(built.rglob("*.part*"))
@@ -291,9 +292,11 @@ def taught(built: Path, kind: str, *, stored: bool, steps: int = 3, **options):
     from snug.recipes import TRAININGS
 
     found = DataSet.read(built)
-    trajectories = found.trajectories()
+    trajectories: dict = found.targets()
     if not stored:
-        trajectories = {name: np.asarray(part) for name, part in trajectories.items()}
+        trajectories = {
+            line.name: Trajectory.load(built / line.trajectory).positions for line in found.sequences
+        }
     return train(
         kind, tube_dress(), found.motions(), steps=steps, seed=0, recipe=TRAININGS[kind].recipe,
         trajectories=trajectories, progress=False, every=1, **options,
@@ -314,7 +317,7 @@ def test_a_training_from_files_goes_on_only_with_the_same_files(built, mine, tmp
     with pytest.raises(Interrupted):
         taught(built, "supervised", stored=True, steps=4, saving=saving, stop=lambda: next(count) == 1)
     whole, resumed = taught(built, "supervised", stored=True, steps=4), None
-    _index(mine, lambda i: i["sequences"][0]["digests"].update({i["sequences"][0]["trajectory"]: "0"}))
+    _index(mine, lambda i: i["sequences"][0]["digests"].update({i["sequences"][0]["vertices"]: "0"}))
     with pytest.raises(TensorFileError, match="another data"):
         taught(mine, "supervised", stored=True, steps=4, saving=saving)
     resumed = taught(built, "supervised", stored=True, steps=4, saving=saving)
@@ -322,13 +325,23 @@ def test_a_training_from_files_goes_on_only_with_the_same_files(built, mine, tmp
         assert tensor.equal(resumed.network.state_dict()[name]), name
 
 
-def test_a_number_that_is_not_finite_is_named_when_it_is_read(mine):
-    line = DataSet.read(mine).sequences[1]
-    whole = Trajectory.load(mine / line.trajectory)
-    whole.positions[5, 7, 1] = np.nan
-    whole.save(mine / line.trajectory)
-    with pytest.raises(TargetError, match="'brisk_walk' is not finite at frame 5"):
-        taught(mine, "supervised", stored=True)
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda x: x.__setitem__((5, 7, 1), np.nan) or x, "'brisk_walk' is not finite at frame 5"),
+        (lambda x: x[:-1], "expected \\(18, 150, 3\\) of float32"),
+        (lambda x: x.astype(float), "of float64, expected"),
+        (lambda x: np.array(["a", None], dtype=object), "brisk_walk"),
+        (lambda x: None, "brisk_walk"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["supervised", "tailornet"])
+def test_vertices_that_are_not_as_the_index_says_are_named(mine, kind, damage, said):
+    path = mine / DataSet.read(mine).sequences[1].vertices
+    found = damage(np.load(path))
+    path.write_bytes(path.read_bytes()[:-9]) if found is None else np.save(path, found)
+    with pytest.raises(TargetError, match=said):
+        taught(mine, kind, stored=True)
 
 
 def test_the_command_learns_from_a_data_set(built, tube, tmp_path, capsys):

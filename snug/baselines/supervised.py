@@ -6,13 +6,14 @@ loss = mean over frames and vertices of |x - x_simulated|^2     [cm^2]
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.trajectory import Positions, StoredPositions
 from snug.device import CPU
 from snug.skinning import skin
 
@@ -34,8 +35,8 @@ def vertex_loss(x: Tensor, target: Tensor) -> Tensor:
 class VertexTargets:
     """What a simulation teaches: vertices (F, V, 3) [m] relative to the pelvis, all training frames in a row.
 
-    Where all trajectories are StoredPositions the vertices stay in their files, and each batch reads its own:
-    the numbers are those of trajectories in memory, bit for bit.
+    Where all of them are StoredVertices they stay in their files, and each batch reads its own: the numbers
+    are those of trajectories in memory, bit for bit.
 
     weights (V, J) and transforms (F, J, 3, 4) are those that skin the prediction. Raises TargetError for a
     motion without a fitting trajectory.
@@ -47,21 +48,20 @@ class VertexTargets:
         self,
         dressed: Any,
         motions: Sequence[Any],
-        trajectories: Mapping[str, Positions] | None,
+        trajectories: Mapping[str, Targets] | None,
         weights: Tensor,
         transforms: Tensor,
     ) -> None:
         targets = matched_targets(motions, trajectories, dressed.vertices)
         self.weights, self.transforms = weights, transforms
-        if self.from_files and all(isinstance(target, StoredPositions) for target in targets):
-            self.vertices: Any = StoredVertices(dressed, motions, targets)
-        else:
+        self.vertices: Tensor | StoredFrames = StoredFrames(motions, targets)
+        if not (self.from_files and all(isinstance(target, StoredVertices) for target in targets)):
             self.vertices = all_relative(dressed, motions, targets)
 
     def to(self, device: torch.device) -> VertexTargets:
         """Itself, with every tensor moved to the device."""
         for name, value in vars(self).items():
-            if isinstance(value, Tensor | StoredVertices):
+            if isinstance(value, Tensor | StoredFrames):
                 setattr(self, name, value.to(device))
         return self
 
@@ -78,56 +78,88 @@ class VertexTargets:
         return {"vertices": vertex_loss(x, self.vertices[torch.as_tensor(batch.frames)])}
 
 
+@dataclass(frozen=True)
 class StoredVertices:
-    """Rows of files, read when they are asked for: nothing stays in memory but the pelvis."""
+    """What a simulation teaches, in an .npy file of float32: shape (T, V, 3) [m], seen from the pelvis.
 
-    def __init__(self, dressed: Any, motions: Sequence[Any], parts: Sequence[StoredPositions]) -> None:
+    content: a digest of the file, for who needs to tell it from another. Nothing of it stays in memory.
+    """
+
+    path: Path
+    shape: tuple[int, int, int]
+    content: str = ""
+
+    def read(self, frames: slice, motion: str) -> Tensor:
+        """Those frames. Raises TargetError for a file that does not hold them, or no finite numbers."""
+        try:
+            whole = np.load(self.path, mmap_mode="r", allow_pickle=False)
+            found = np.array(whole[frames])
+        except (OSError, ValueError, EOFError, SyntaxError) as error:
+            raise TargetError(f"{self.path}: {' '.join(str(error).split())[:200]}") from None
+        if whole.shape != self.shape or whole.dtype != np.float32:
+            raise TargetError(
+                f"{self.path}: {whole.shape} of {whole.dtype}, expected {self.shape} of float32"
+            )
+        _check_finite(found, motion, frames.start or 0)
+        return torch.from_numpy(found)
+
+
+Targets = np.ndarray | StoredVertices
+
+
+class StoredFrames:
+    """The frames of several files in a row, read when they are asked for."""
+
+    def __init__(self, motions: Sequence[Any], parts: Sequence[Any]) -> None:
         self.names, self.parts = [motion.name for motion in motions], parts
-        self.pelvis = [dressed.pelvis(motion) for motion in motions]
-        self.first = np.cumsum([0, *map(len, parts)])
+        self.first = np.cumsum([0, *(part.shape[0] for part in parts)])
         self.device = CPU
-        said = [[name, part.content, *part.shape] for name, part in zip(self.names, parts)]
-        self.fingerprint = repr(said).encode()
 
-    def to(self, device: torch.device) -> StoredVertices:
+    @property
+    def fingerprint(self) -> bytes:
+        """Equal for the same files."""
+        return repr([[name, part.content, part.shape] for name, part in zip(self.names, self.parts)]).encode()
+
+    def to(self, device: torch.device) -> StoredFrames:
         """Itself, giving tensors on that device from now on."""
         self.device = device
         return self
 
     def __getitem__(self, frames: Tensor) -> Tensor:
-        """Windows of consecutive frames, row numbers (N, T) -> (N, T, V, 3) [m].
-
-        Raises TargetError for a number that is not finite.
-        """
+        """Windows of consecutive frames of one motion each, row numbers (N, T) -> (N, T, V, 3) [m]."""
         return torch.stack([self._window(int(row[0]), len(row)) for row in frames]).to(self.device)
 
     def _window(self, first: int, count: int) -> Tensor:
         part = int(np.searchsorted(self.first, first, side="right")) - 1
         start = first - int(self.first[part])
-        frames = slice(start, start + count)
-        return relative(self.parts[part][frames], self.pelvis[part][frames], self.names[part], start)
+        return self.parts[part].read(slice(start, start + count), self.names[part])
 
 
 def all_relative(dressed: Any, motions: Sequence[Any], parts: Sequence[Any]) -> Tensor:
-    """`relative` of all frames of all motions, (F, V, 3) [m]; one motion at a time is in float64."""
-    return torch.cat([relative(part[:], dressed.pelvis(m), m.name) for m, part in zip(motions, parts)])
-
-
-def relative(positions: np.ndarray, pelvis: np.ndarray, motion: str, first: int = 0) -> Tensor:
-    """Vertices (T, V, 3) [m] of a motion from its frame `first` on, in float32, seen from the pelvis (T, 3).
+    """Vertices of all frames of all motions, (F, V, 3) [m], seen from the pelvis.
 
     Raises TargetError for a number that is not finite.
     """
+    found = []
+    for motion, part in zip(motions, parts):
+        if isinstance(part, StoredVertices):
+            found.append(part.read(slice(None), motion.name))
+            continue
+        _check_finite(part, motion.name)
+        found.append(torch.as_tensor(part - dressed.pelvis(motion)[:, None]).float())
+    return torch.cat(found)
+
+
+def _check_finite(positions: np.ndarray, motion: str, first: int = 0) -> None:
     if not np.isfinite(positions).all():
         frame = first + int(np.argwhere(~np.isfinite(positions).all(axis=(1, 2)))[0, 0])
         raise TargetError(f"trajectory of motion {motion!r} is not finite at frame {frame}")
-    return torch.as_tensor(positions - pelvis[:, None]).float()
 
 
 def matched_targets(
-    motions: Sequence[Any], trajectories: Mapping[str, Positions] | None, vertices: int
+    motions: Sequence[Any], trajectories: Mapping[str, Targets] | None, vertices: int
 ) -> list[Any]:
-    """(T, V, 3) [m, world] for each motion: an array, or what is still in its file.
+    """For each motion an array (T, V, 3) [m, world], or what is still in its file.
 
     Raises TargetError for a missing or unfit one.
     """
@@ -140,7 +172,7 @@ def matched_targets(
                 f"no simulated trajectory for motion {motion.name!r}: simulate it, or leave it out"
             )
         positions = trajectories[motion.name]
-        if not isinstance(positions, StoredPositions):
+        if not isinstance(positions, StoredVertices):
             positions = np.asarray(positions)
         expected = (motion.frames, vertices, 3)
         if positions.shape != expected:

@@ -170,6 +170,7 @@ class BandTargets(VertexTargets):
 
     def __init__(self, dressed: Any, *arguments: Any) -> None:
         super().__init__(dressed, *arguments)
+        assert isinstance(self.vertices, Tensor)
         offsets = unposed(self.vertices, self.weights, self.transforms) - dressed.rest()
         low = smoothed(offsets.numpy(), np.asarray(dressed.garment.faces))
         self.low = torch.as_tensor(low, dtype=torch.float32)
