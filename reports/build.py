@@ -154,6 +154,7 @@ def typeset(folder: RunFolder, content: dict[str, Any]) -> None:
     import typst
 
     from reports.configuration import moment
+    from reports.plotting import printable
 
     config = folder.read_config()
     finished = moment(config.get("finished")) or moment(config.get("started"))
@@ -161,7 +162,7 @@ def typeset(folder: RunFolder, content: dict[str, Any]) -> None:
         TEMPLATE.read_bytes(),
         root=str(folder.path),
         ignore_system_fonts=True,
-        sys_inputs={"content": json.dumps(content, ensure_ascii=False, allow_nan=False)},
+        sys_inputs={"content": printable(json.dumps(content, ensure_ascii=False, allow_nan=False))},
     )
     with replacing(folder.report_path) as temporary:
         stamp = int(finished.timestamp()) if finished else 0

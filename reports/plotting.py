@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,8 @@ LINE_LETTERS = 115  # of a legend that fit on one line of a figure as wide as th
 MOST_LINES = 13  # of a legend beside a figure
 GRID = "#E3E3E3"
 _LOOK: dict[Any, Any] = {
-    "font.family": ["STIXGeneral", "DejaVu Sans"],  # the second has what the first lacks
+    # Each has what those before it lack; the last draws a box that names the script.
+    "font.family": ["STIXGeneral", "DejaVu Sans", "Last Resort High-Efficiency"],
     "text.parse_math": False,  # a name may hold dollars
     "font.size": 9.0,
     "axes.titlesize": 9.5,
@@ -94,6 +96,20 @@ def wrapped(name: str, width: int = 44) -> str:
             lines.append("")
         lines[-1] += piece
     return "\n".join(line.strip() for line in lines)
+
+
+def printable(text: str) -> str:
+    """The text with letters that the typesetter's fonts do not have as "U+88FE"."""
+    lacking = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
+    return text.translate({ord(c): f"U+{ord(c):04X}" for c in lacking})
+
+
+@cache
+def _letters() -> frozenset[str]:
+    """What DejaVu Sans Mono has: the widest of the typesetter's fonts, and in matplotlib too."""
+    from matplotlib.font_manager import findfont, get_font
+
+    return frozenset(map(chr, get_font(findfont("DejaVu Sans Mono")).get_charmap()))
 
 
 def grid(axes: Axes, which: str = "both") -> None:

@@ -1,0 +1,201 @@
+"""How a study would spread over many workers: the runner's schedule simulated with the seconds of a run.
+
+A stage ends before the next begins, the longest tasks go first, and one runner hands out every task, takes
+every result back and writes it. Timed cells run alone on one machine. Networks between machines, disks that
+are shared and workers that die are left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import heapq
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .json_file import read_json
+from .results import ResultsError, RunFolder, replacing
+
+if TYPE_CHECKING:
+    import numpy as np
+
+WORKERS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
+MEGABYTE = 1e6
+EXAMPLES = """examples:
+  python -m benchmarks.scaling reports/runs/quick --copies 100
+  python -m benchmarks.scaling reports/runs/quick --copies 1000 --kinds data -o data.csv    ground truth alone
+"""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What one task took and left. timed: it ran alone. megabytes: of its files."""
+
+    stage: str
+    seconds: float
+    megabytes: float
+    timed: bool
+
+
+@dataclass(frozen=True)
+class Costs:
+    """start: from the beginning of a worker to its first task [s]; handling: of the runner for one task, to
+    hand it out and to take it back [s]; bandwidth: at which it takes, checks and writes files [MB/s].
+    """
+
+    start: float
+    handling: float
+    bandwidth: float
+
+    def taking(self, task: Measured) -> float:
+        """[s] for which the runner is busy with a result."""
+        return self.handling / 2 + task.megabytes / self.bandwidth
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """One number of workers. efficiency: work over workers times the wall time; held_by: what costs most of
+    the rest.
+    """
+
+    workers: int
+    seconds: float
+    efficiency: float
+    held_by: str
+
+
+def measured(folder: RunFolder, kinds: Sequence[str] = ()) -> list[Measured]:
+    """The finished tasks of a run, all or those of these kinds. Raises ResultsError where there are none."""
+    from .tasks import case, cell, ground_truth, metrics, microbenchmark, task, training, training_windows
+
+    modules = (case, cell, ground_truth, metrics, microbenchmark, training, training_windows)
+    classes = {
+        own.kind: own
+        for module in modules
+        for own in vars(module).values()
+        if isinstance(own, type) and issubclass(own, task.Task) and hasattr(own, "kind")
+    }
+    if unknown := sorted(set(kinds) - classes.keys()):
+        raise ResultsError(f"unknown kind of task '{unknown[0]}': use {', '.join(sorted(classes))}")
+    found = []
+    for kind, own in classes.items():
+        if kinds and kind not in kinds:
+            continue
+        timed = issubclass(own, cell.CellTask | microbenchmark.RunMicrobenchmark)
+        for path in sorted((folder.cache / kind).rglob("*.json")):
+            entry = read_json(path)
+            if not entry["outcome"]["failed"]:
+                files = (folder.path / name for name in entry["files"])
+                size = sum(file.stat().st_size for file in files if file.is_file()) / MEGABYTE
+                found.append(Measured(own.stage, float(entry["outcome"]["seconds"]), size, timed))
+    if not found:
+        raise ResultsError(f"{folder.cache}: holds no finished task; name the folder of a run")
+    return found
+
+
+def study(tasks: Sequence[Measured], copies: int, random: np.random.Generator) -> list[Measured]:
+    """As many tasks as `copies` of the run have, each drawn from those of its stage."""
+    stages: dict[tuple[str, bool], list[Measured]] = {}
+    for task in tasks:
+        stages.setdefault((task.stage, task.timed), []).append(task)
+    return [
+        own[number]
+        for own in stages.values()
+        for number in random.integers(len(own), size=copies * len(own)).tolist()
+    ]
+
+
+def outlook(tasks: Sequence[Measured], workers: int, costs: Costs) -> Outlook:
+    """What that many workers, each of one core, make of the tasks."""
+    alone = sum(task.seconds for task in tasks if task.timed)
+    stages: dict[str, list[Measured]] = {}
+    for task in tasks:
+        if not task.timed:
+            stages.setdefault(task.stage, []).append(task)
+    wall = alone + sum(
+        stage_seconds(own, workers, costs, start=costs.start if number == 0 else 0.0)
+        for number, own in enumerate(stages.values())
+    )
+    work = sum(task.seconds for task in tasks)
+    shared = [task for own in stages.values() for task in own]
+    lost = {
+        "timed cells, alone on one machine": alone * (1 - 1 / workers),
+        "the runner, which takes every result": sum(map(costs.taking, shared)),
+        "the longest task of each stage": sum(max(task.seconds for task in own) for own in stages.values()),
+        "the start of workers": costs.start if stages else 0.0,
+    }
+    return Outlook(workers, wall, work / (workers * wall), max(lost, key=lost.__getitem__))
+
+
+def stage_seconds(tasks: Iterable[Measured], workers: int, costs: Costs, start: float = 0.0) -> float:
+    """[s] until the last result of a stage is written; workers begin at `start`."""
+    free = [start] * workers  # a heap: equal numbers are one
+    runner = 0.0  # the time until which it is busy
+    results: list[tuple[float, float]] = []  # when a task ends, and for how long the runner then has work
+    for task in sorted(tasks, key=lambda task: -task.seconds):
+        begin = heapq.heappop(free)
+        while results and results[0][0] <= max(begin, runner):
+            ended, busy = heapq.heappop(results)
+            runner = max(runner, ended) + busy
+        runner = max(runner, begin) + costs.handling / 2
+        heapq.heappush(free, runner + task.seconds)
+        heapq.heappush(results, (runner + task.seconds, costs.taking(task)))
+    while results:
+        ended, busy = heapq.heappop(results)
+        runner = max(runner, ended) + busy
+    return runner
+
+
+def table(outlooks: Iterable[Outlook]) -> Iterator[str]:
+    yield f"{'workers':>8} {'hours':>10} {'efficiency':>11}  held by"
+    for line in outlooks:
+        held = line.held_by if line.efficiency < 0.95 else ""
+        yield f"{line.workers:8d} {line.seconds / 3600:10.3f} {line.efficiency:11.3f}  {held}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exit status: 0 done; 2 for a folder without finished tasks and options that cannot be met."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.scaling",
+        description="Simulate the runner's schedule on many workers with the task times of a finished run.",
+        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("run_dir", metavar="RUN", help="folder of a finished run")
+    parser.add_argument("--copies", type=int, default=100, help="size of the study, in runs (default 100)")
+    parser.add_argument("--kinds", help="of tasks, say data,network (default: all)")
+    parser.add_argument("--workers", default=",".join(map(str, WORKERS)), help="numbers of cores")
+    parser.add_argument("--start", type=float, default=20.0, help="of a worker [s] (default 20)")
+    parser.add_argument("--handling", type=float, default=0.02, help="of a task [s] (default .02)")
+    parser.add_argument("--bandwidth", type=float, default=200.0, help="of the runner [MB/s] (default 200)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("-o", "--out", type=Path, help="write the table as .csv")
+    options = parser.parse_args(arguments)
+    import numpy as np
+
+    try:
+        workers = [int(text) for text in options.workers.split(",")]
+        if min([options.copies, *workers]) < 1 or min(options.bandwidth, options.handling + 1) <= 0:
+            raise ValueError("--copies, --workers and --bandwidth have to be positive")
+        tasks = measured(RunFolder(options.run_dir), options.kinds.split(",") if options.kinds else ())
+    except (ValueError, ResultsError, OSError) as error:
+        print(f"benchmarks.scaling: {error}", file=sys.stderr)
+        return 2
+    many = study(tasks, options.copies, np.random.default_rng(options.seed))
+    costs = Costs(options.start, options.handling, options.bandwidth)
+    found = [outlook(many, count, costs) for count in workers]
+    work = sum(task.seconds for task in many) / 3600
+    print(f"{len(many):,} tasks, {work:,.1f} core-hours")
+    print("\n".join(table(found)))
+    if options.out:
+        with replacing(options.out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(("workers", "seconds", "efficiency", "held_by"))
+            writer.writerows((f.workers, f.seconds, f.efficiency, f.held_by) for f in found)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
