@@ -33,7 +33,7 @@ from .tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, Simu
 from .tasks.metrics import MeasureCell
 from .tasks.microbenchmark import RunMicrobenchmark
 from .tasks.task import Task
-from .tasks.training import TrainNetwork
+from .tasks.training import LONGEST, TrainNetwork
 from .tasks.training_windows import SUITE, CompareWindows
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
@@ -126,6 +126,7 @@ class Schedule:
         chosen, (motions, held_out) = network.training, self._learned(network)
         kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
         steps = self.preset.steps_of(steps_of or network.name, kind)
+        steps *= LONGEST if chosen and chosen.converged else 1
         inputs = self._inputs(self.plan.device) | self._of_body(network.garment) | {
             "training": [network.name, chosen],
             "seed": network.seed,

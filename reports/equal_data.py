@@ -22,6 +22,7 @@ FRAMES, STEPS = "cost/train_frames", "cost/train_steps"
 SPENT = ("cost/data", "cost/setup", "cost/train")
 JUDGED = ("energy/total", "energy/strain", "penetration/vertices", "curvature/error")
 DRAWN = ("energy/total", "curvature/error")
+WIDE = 2.0  # from the lower to the upper end of an axis that is logarithmic
 
 
 def members(run: Run) -> list[str]:
@@ -50,9 +51,14 @@ def equal_data(run: Run) -> list[Table]:
     columns = (
         Column("garment", "Garment", text=True),
         Column("method", "Method", text=True, method=True),
-        Column("mixed", "Mixed frames for each given one"),
+        Column("mixed", "Mixed for each given frame"),
         Column("seconds", "Data and training", "s"),
-        *map(metric_column, metrics),
+        *(
+            replace(metric_column(metric), digits=6, trim=True)
+            if metric.name in (FRAMES, STEPS)
+            else metric_column(metric)
+            for metric in metrics
+        ),
     )
     caption = "Networks that learn from the same motions: what they had, what it cost, what came of it."
     return table("equal_data", columns, lines, caption, grouped_by=("garment",))
@@ -112,7 +118,9 @@ def held_out_curves(folder: Path, run: Run, histories: Sequence[History]) -> lis
             there = np.isfinite(value)
             axes.plot(history.column("step")[there], value[there], color=look.colour, linestyle=look.line)
         axes.set(xlabel="steps", title=panel)
-        log_axis(axes, "y")
+        low, high = axes.get_ylim()
+        if high > WIDE * low > 0.0:
+            log_axis(axes, "y")
         grid(axes)
     legend_above(figure, [looks[method] for method in run.ordered(looks)], lines=True)
     caption = "Trainings that end when held-out motions get no better: the value on these. A line per seed."

@@ -31,7 +31,8 @@ def block(*names: str, families=("snug-data", "supervised-data")) -> list:
                 for metric, value in {**COSTS, "cost/train_frames": frames}.items():
                     rows.append(row("tshirt/walk", name, metric, value, seed=seed, **own))
             cleaned = own | {"family": f"{family}+cleanup", "base": name}
-            rows.append(row("tshirt/walk", f"{name}+cleanup", "cost/train_frames", frames, **cleaned))
+            for metric, value in (("cost/train_frames", frames), ("energy/total", 0.5)):
+                rows.append(row("tshirt/walk", f"{name}+cleanup", metric, value, **cleaned))
     return rows
 
 

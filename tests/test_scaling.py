@@ -66,7 +66,7 @@ def finished(folder: RunFolder, name: str, seconds: float, *, failed: bool = Fal
     """The entry of a task in the cache, with a file of two megabytes."""
     path = folder.path / f"{name}.bin"
     path.write_bytes(bytes(2_000_000))
-    task = SimulateMotion(name=name, label=name, inputs={}, modules=(), scene=None)  # type: ignore[arg-type]
+    task = SimulateMotion(name=name, label=name, inputs={}, modules=(), scene=None, entry=None)  # type: ignore
     Cache(folder).keep(task, Outcome(seconds=seconds, failed=failed, files=(path.name,)), {})
 
 

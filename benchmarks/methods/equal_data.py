@@ -39,24 +39,22 @@ def _entry(name: str, label: str, mixed: int, *, converged: bool) -> MethodEntry
     """Its run time is that of the network whose data it changes: nobody asks for it again."""
     family = f"{name}-data" + "-converged" * converged
     data = f"given frames and {mixed} mixed for each" if mixed else "given frames"
-    words = f"{data}, to convergence" if converged else data
+    title = f"{label}, with {mixed} mixed" if mixed else f"{label}, given frames"
     return network(
-        f"{family}-{mixed}", f"{label}, {words}", f"{name} that learns from {words}",
+        f"{family}-{mixed}", title + ", converged" * converged,
+        f"{name} that learns from {data}" + ", until a held-out motion gets no better" * converged,
         training=_training(name, mixed, converged=converged), family=family, level=float(mixed),
         base=f"{name}-data-{mixed}" if converged else name, role="ablation", batched=False, timed=False,
         pairing_group=name,
     )  # fmt: skip
 
 
-_AT_ENDS = tuple(
-    _entry(name, label, mixed, converged=converged)
-    for name, label, _ in NETWORKS
-    for converged in (False, True)
-    for mixed in ENDS
-)
-_BETWEEN = tuple(
-    _entry(name, label, mixed, converged=False)
-    for name, label, numbers in NETWORKS
-    for mixed in sorted(set(numbers) - set(ENDS))
-)
-EQUAL_DATA = (*_AT_ENDS, *_BETWEEN, *map(cleaned, _AT_ENDS))
+def _block(name: str, label: str, numbers: tuple[int, ...]) -> tuple[MethodEntry, ...]:
+    """All numbers at equal steps; the ends to convergence too, and each of these cleaned up."""
+    equal = tuple(_entry(name, label, mixed, converged=False) for mixed in numbers)
+    converged = tuple(_entry(name, label, mixed, converged=True) for mixed in ENDS)
+    ends = (entry for entry in (*equal, *converged) if entry.level in ENDS)
+    return (*equal, *converged, *map(cleaned, ends))
+
+
+EQUAL_DATA = tuple(entry for own in NETWORKS for entry in _block(*own))

@@ -85,14 +85,11 @@ class TrainNetwork(Task):
             targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
             mixed, simulated = self._mixed(assets, run, needed)
             targets |= simulated
-        steps, validation = self.steps, None
-        if self.chosen and self.chosen.converged:
-            steps *= LONGEST
+        validation = None
         if self.held_out:
-            validation = Validation(
-                motions=assets.named(self.held_out), every=max(1, self.steps // VALIDATIONS),
-                patience=VALIDATIONS, trajectories=targets,
-            )  # fmt: skip
+            every = max(1, self.steps // (LONGEST * VALIDATIONS))
+            held_out = assets.named(self.held_out)
+            validation = Validation(motions=held_out, every=every, patience=VALIDATIONS, trajectories=targets)
         saving = Saving(
             path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
             resume=True, key=digest([self.key, targets]),
@@ -108,7 +105,7 @@ class TrainNetwork(Task):
             model = untrained_model("snug", dressed, assets.named(motions), seed=self.seed)
         else:
             model = train(
-                self.chosen.kind, dressed, [*assets.named(motions), *mixed], steps=steps,
+                self.chosen.kind, dressed, [*assets.named(motions), *mixed], steps=self.steps,
                 seed=self.seed, trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False,
                 every=LOG_EVERY, device=self.device, saving=saving, validation=validation,
             )  # fmt: skip
