@@ -27,7 +27,7 @@ from .presets import find_preset
 from .registry import by_name
 from .results import RunFolder
 from .roles import FEWEST
-from .run import WORKERS, choose_body, choose_garment, choose_scheduler, choose_states, split
+from .run import WORKERS, choose_body, choose_garment, choose_states, split
 from .runner import Runner
 from .scenes import of_garment
 from .schedule import Schedule
@@ -103,13 +103,17 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
     preset = replace(
         find_preset("quick"), garment_vertices=options.vertices, frames=LONGEST, settle_frames=options.settle
     )
+    if options.scheduler:
+        from .cluster import check_scheduler
+
+        check_scheduler(options.scheduler)
     rest = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     rest.add_argument("-o", "--out")
     plan = Plan(
         preset=preset, suites=(), cells=(), cases=(), seeds=(), device="cpu", folder=Path(options.out),
         motions=Motions(train=tuple(motions), files=motions, worn=worn), body=choose_body(options.body),
         garment=own, only=choose_states(split(options.only), fresh=False),
-        scheduler=choose_scheduler(options.scheduler, "cpu"),
+        scheduler=options.scheduler or "",
         workers=options.workers or min(WORKERS, provenance.usable_cores()),
         command=shlex.join(["python", "-m", "benchmarks.dataset", *rest.parse_known_args(words)[1]]),
     )  # fmt: skip

@@ -1,7 +1,8 @@
 """What a worker of a cluster does for a run: keeps its files, and does its tasks in processes of their own.
 
-Loads nothing heavy. Everything here is called by benchmarks.cluster, in the process of a worker of
-dask.distributed; `dask_worker` is that worker. A run that asks for nothing any more is forgotten.
+Loads little: what computes is in the tasks' processes. Everything here is called by benchmarks.cluster, in
+the process of a worker of dask.distributed; `dask_worker` is that worker. A run that asks for nothing any
+more is forgotten.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from . import provenance
 from .cache import software
 from .executor import TaskProcess, begin_tasks
 from .results import RunFolder, digest_of_file
+from .tasks.cell import CellTask
 from .tasks.task import Context, Outcome, Task, failure, one_line
 from .timing import one_thread
 
@@ -116,8 +118,8 @@ def get_piece(run: str, name: str, offset: int) -> bytes:
 def do_task(run: str, number: int, fresh: bool, work: bytes) -> Outcome:
     """The outcome of a task, with the digests of its files. Raises Gone, Unfit, RunStopped.
 
-    number: of the process that does it; fresh: whether a batch begins with it. work: what is pickled by
-    `packed`.
+    number: of the process that does it; fresh: whether a batch begins with it. work: the pickled task, the
+    outcomes that it needs, and the runner's software_of it.
     """
     from distributed import get_worker
 
@@ -141,8 +143,11 @@ def do_task(run: str, number: int, fresh: bool, work: bytes) -> Outcome:
 
 
 def software_of(task: Task) -> dict[str, str]:
-    """Name -> digest or version of all that computes the task's outcome."""
-    return software("benchmarks.cluster", *task.modules) | {"package Python": platform.python_version()}
+    """Name -> digest or version of all that computes the outcome, files of a user's method included."""
+    files = task.cell.entry.files if isinstance(task, CellTask) else ()
+    digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
+    version = {"package Python": platform.python_version()}
+    return software("benchmarks.cluster", *task.modules) | digests | version
 
 
 def _differences(here: Mapping[str, str], expected: Mapping[str, str]) -> str:

@@ -140,7 +140,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         only=only,
         fresh=options.fresh,
         workers=workers,
-        scheduler=choose_scheduler(options.scheduler, options.device),
+        scheduler=choose_scheduler(options),
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
 
@@ -232,16 +232,20 @@ def check_device(device: str) -> None:
         find_device(device)
 
 
-def choose_scheduler(address: str | None, device: str) -> str:
+def choose_scheduler(options: argparse.Namespace) -> str:
     """The address of a scheduler that answers; empty without one. Raises ClusterError, PlanError."""
-    if address is None:
+    if options.scheduler is None:
         return ""
-    if device != "cpu":
-        raise PlanError(f"--device {device}: with --scheduler networks train on the processor; leave out one")
+    if options.device != "cpu":
+        raise PlanError(
+            f"--device {options.device}: on a cluster networks train on cpu; leave out --scheduler"
+        )
+    if options.rollout:
+        raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
     from .cluster import check_scheduler
 
-    check_scheduler(address)
-    return address
+    check_scheduler(options.scheduler)
+    return options.scheduler
 
 
 def choose_folder(out: str | None) -> Path:

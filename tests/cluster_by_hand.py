@@ -69,13 +69,8 @@ class Cluster:
 
     def close(self) -> None:
         for process in (*self.workers, self.scheduler):
-            process.terminate()
-        for process in (*self.workers, self.scheduler):
-            try:
-                process.wait(20)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            process.kill()
+            process.wait()
 
 
 @contextmanager
@@ -152,6 +147,7 @@ class NoLog:
 
 def finish(folder: Path, executor: Executor, **fields) -> Runner:
     """The chain, run or reused."""
+    RunFolder(folder).remove_parts()
     runner = Runner(chain(**fields), Cache(RunFolder(folder), origin={"commit": "c", "hardware": "h"}))
     runner.run(executor, NoLog())
     return runner
