@@ -19,7 +19,6 @@ from typing import Any
 
 from .cache import read_entry
 from .execution import OF_TRAINING
-from .metrics.cost import METRICS as COSTS
 from .performance.microbenchmark import SUITE
 from .results import ResultsError, Row, RunFolder, digest_of_file
 from .run_options import Parser
@@ -35,7 +34,7 @@ skipped row. Runs go on in their own folders, not in the merged one.
 exit status: 0 written; 2 the runs differ in what has to be the same, or a file is damaged: one line says
   which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
-TIMES = {metric.name for metric in COSTS} - {"cost/memory"}  # the size of a network is the same everywhere
+LIKE_TIMES = ("cost/spread", "cost/peak")  # of repeats, and of a process
 BEFORE = ("cost/data", *OF_TRAINING)  # each may be of its own machine; all other times are of one
 SAME = ("format", "preset", "preset_values", "split", "body", "garment")  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
@@ -181,7 +180,7 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
 
 def of_a_machine(row: Row) -> bool:
     """Whether the number is a time, or hangs on the machine as one does."""
-    return row.metric in TIMES or row.suite == SUITE or row.unit in ("s", "ms")
+    return row.unit in ("s", "ms") or row.metric in LIKE_TIMES or row.suite == SUITE
 
 
 def joined_rows(runs: Mapping[str, Sequence[Row]]) -> list[Row]:
