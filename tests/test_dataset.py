@@ -162,7 +162,9 @@ def test_halves_of_two_machines_are_the_whole(built, tube, here, tmp_path, monke
     assert digests(both) == digests(built) and dataset.main(["verify", str(both)]) == 0
     assert [line.hardware.split()[0] for line in DataSet.read(both).sequences] == ["one", "one", "two"]
     done = here.done
-    assert dataset.main(words(tube, both)) == 0 and here.done == done  # nothing is simulated again
+    for more in ([], ["--from", "2"]):  # nothing is simulated again, and nothing forgotten
+        assert dataset.main(words(tube, both, *more)) == 0 and here.done == done
+        assert digests(both) == digests(built)
     assert dataset.main(["merge", str(one), str(two), "-o", str(both)]) == 2
     assert "name a new folder" in capsys.readouterr().err
 
@@ -303,7 +305,7 @@ def taught(built: Path, kind: str, *, stored: bool, steps: int = 3, **options):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["supervised", "santesteban2019", "tailornet"])
+@pytest.mark.parametrize("kind", ["supervised", "tailornet"])
 def test_files_teach_the_same_as_memory_to_the_last_bit(built, kind):
     there, stored = (taught(built, kind, stored=stored) for stored in (False, True))
     for name, tensor in there.network.state_dict().items():
@@ -418,8 +420,9 @@ def test_many_sequences_survive_a_kill_and_take_no_more_memory(tube, tmp_path):
     assert dataset.main(["verify", str(out)]) == 0
     assert len(DataSet.read(out).usable) == MANY
     for pid, seen in memory.items():
-        late = np.array([pair for pair in seen if pair[0] > seen[-1][0] - MANY // 4], float)
-        if len(late) > 10 and np.ptp(late[:, 0]) > 5:
-            slope = np.polyfit(*late.T, 1)[0]
-            assert slope < 300, f"process {pid}: {slope:.0f} kB a sequence"
+        done, kilobytes = np.array(seen, float).T
+        assert kilobytes.max() < 1.2e6, f"process {pid} takes {kilobytes.max() / 1e3:.0f} MB"
+        if pid == running.pid:  # it knows of all of them; workers still warm up, each by its first hundred
+            late = done > done[0] + 3
+            assert np.polyfit(done[late], kilobytes[late], 1)[0] < 100, "kB a sequence"
     assert not [pid for pid in memory if os.path.exists(f"/proc/{pid}")]
