@@ -79,6 +79,7 @@ class Cache:
         outcome = dataclasses.replace(outcome, digests=files, origin={**self.origin, **outcome.origin})
         entry = {
             "task": task.title,
+            "inputs": sorted(task.inputs),
             "parts": dependencies(task),
             "needs": _needs(task, others),
             "written": datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -106,12 +107,8 @@ class Cache:
         path = self.path(task)
         if not path.is_file():
             return "missing", "", {}
-        try:
-            entry = read_json(path)
-            own = entry.pop("digest", "")
-        except ResultsError:
-            own, entry = "", {}
-        if own != digest(_text(entry).encode()) or entry["task"] != task.title:
+        entry = read_entry(path)
+        if entry is None or entry["task"] != task.title:
             return "missing", "its entry is damaged", {}
         outcome, parts, needs = Outcome(**entry["outcome"]), entry["parts"], entry["needs"]
         if damage := damaged(self.folder, entry["files"]):
@@ -124,6 +121,15 @@ class Cache:
         if changed:
             return "stale", ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""), entry
         return ("failed", _why(outcome), entry) if outcome.failed else ("finished", "", entry)
+
+
+def read_entry(path: Path) -> dict[str, Any] | None:
+    """An entry as it was written, or None where it is damaged."""
+    try:
+        entry = read_json(path)
+    except ResultsError:
+        return None
+    return entry if entry.pop("digest", "") == digest(_text(entry).encode()) else None
 
 
 def damaged(folder: RunFolder, files: Mapping[str, str]) -> str:

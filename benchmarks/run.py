@@ -276,9 +276,11 @@ def choose_folder(out: str | None) -> Path:
 
 def _check_run(folder: Path) -> None:
     try:
-        RunFolder(folder).read_config()
+        config = RunFolder(folder).read_config()
     except ResultsError as error:
         raise PlanError(f"--out {error}; name another folder") from None
+    if "merged" in config:
+        raise PlanError(f"--out {folder}: is merged of several runs, which go on in their own folders")
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ import torch
 from torch import Tensor
 from torch.nn.utils.rnn import pad_sequence
 
-from snug.baselines.supervised import TargetError, matched_targets
+from snug.baselines.supervised import TargetError, Targets, all_relative, matched_targets
 from snug.recipe import Recipe
 from snug.regressor import HIDDEN
 from snug.skinning import unposed
@@ -55,14 +55,12 @@ class DynamicsSupervision:
         self,
         data: TrainingSet,
         motions: Sequence[Any],
-        trajectories: Mapping[str, np.ndarray] | None,
+        trajectories: Mapping[str, Targets] | None,
         weights: Tensor,
         recipe: Recipe,
     ) -> None:
         dressed = data.dressed
-        vertices = matched_targets(motions, trajectories, dressed.vertices)
-        pelvis = [dressed.pelvis(motion) for motion in motions]
-        posed = torch.cat([torch.as_tensor(x - p[:, None]).float() for x, p in zip(vertices, pelvis)])
+        posed = all_relative(dressed, motions, matched_targets(motions, trajectories, dressed.vertices))
         offsets = unposed(posed.to(data.device), weights, data.transforms[: len(posed)]) - data.rest
         flat = offsets.flatten(1)
         if len(flat) <= recipe.pca_components:

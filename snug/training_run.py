@@ -171,12 +171,12 @@ class TrainingRun:
     def _identity(self) -> dict[str, Any]:
         """What must be the same for a run to be the same run."""
         trainer, digest = self.trainer, hashlib.sha256()
-        taught = trainer.targets.vertices if trainer.targets else trainer.data.ahead
+        taught = trainer.targets.fingerprint() if trainer.targets else _bytes(trainer.data.ahead)
         # Coordinates that were predicted are round-off's too, and in the checkpoint.
         features = trainer.data.features[:, : len(trainer.network.input_mean)]
         weights = trainer.dressed.weights(trainer.recipe.smoothing)
-        for tensor in (features, trainer.data.rest, taught, weights):
-            digest.update(tensor.cpu().numpy().tobytes())
+        for part in (_bytes(features), _bytes(trainer.data.rest), taught, _bytes(weights)):
+            digest.update(part)
         digest.update(trainer.dressed.cloth.Dm_inverse.tobytes())
         if trainer.supervision:
             digest.update(np.round(trainer.supervision.mean.cpu().numpy(), 4).tobytes())
@@ -249,6 +249,10 @@ class TrainingRun:
             history=self.history,
             summary=summary,
         )
+
+
+def _bytes(tensor: Tensor) -> bytes:
+    return tensor.cpu().numpy().tobytes()
 
 
 SHORT = ("kind", "seed", "steps", "threads", "processes", "vertices", "every")  # worth naming in one line
