@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from snug.recipe import TERMS
-from snug.recipes import TRAININGS
+from snug.recipes import TRAININGS, Simulated
 
 from . import provenance
 from .cache import dependencies
@@ -92,7 +92,7 @@ class Schedule:
         entry, garment = find_method(said.method), network.garment
         motions, held_out = self._learned(network)
         given = [self.data(motion, garment, entry) for motion in (*motions, *held_out)]
-        return [*given, *(self.clips(garment, entry, motions, part) for part in range(said.mixed))]
+        return [*given, *(self.clips(garment, said, motions, part) for part in range(said.mixed))]
 
     def data(self, motion: str, garment: str, entry: MethodEntry) -> SimulateMotion:
         scene = of_garment(garment, self.plan.motions.worn).scene(motion).at(self.preset)
@@ -102,17 +102,19 @@ class Schedule:
             **self._simulated_by(entry, self._of_scene(scene, f"{TASKS}.ground_truth")),
         )  # fmt: skip
 
-    def clips(self, garment: str, entry: MethodEntry, motions: tuple[str, ...], part: int) -> SimulateClips:
-        clips = f"{garment}/mixed-{len(motions)}"
+    def clips(self, garment: str, said: Simulated, motions: tuple[str, ...], part: int) -> SimulateClips:
+        sort, entry = "swinging" if said.swinging else "mixed", find_method(said.method)
+        clips = f"{garment}/{sort}-{len(motions)}"
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
         of_scene = self._simulated_by(entry, self._of_scene(scene, f"{TASKS}.ground_truth"))
-        mixed = {"part": part, "motions": {name: self._motion(name) for name in motions}}
+        mixed_of = {name: self._motion(name) for name in motions}
+        inputs = of_scene["inputs"] | {"part": part, "swinging": said.swinging, "motions": mixed_of}
         return SimulateClips(
             name=f"{flat(clips)}/{flat(entry.name)}-{part}",
-            label=_beside(f"{garment}, clips mixed of {len(motions)} motions, part {part}", entry),
-            scene=scene, entry=entry, motions=motions, clips=clips, part=part,
+            label=_beside(f"{garment}, {sort} clips of {len(motions)} motions, part {part}", entry),
+            scene=scene, entry=entry, motions=motions, clips=clips, part=part, swinging=said.swinging,
             units=len(motions) * self.preset.frames,
-            **of_scene | {"inputs": of_scene["inputs"] | mixed},
+            **of_scene | {"inputs": inputs},
         )  # fmt: skip
 
     def _simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -62,11 +63,23 @@ def mixed_for(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed:
     return mixed_motions(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
 
 
-def shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> list[Motion]:
+def shared_clips(
+    motions: Sequence[Motion], share: int, *, vertices: int, swinging: bool = False
+) -> list[Motion]:
     """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
-    recipe does. Fewer are the first of more.
+    recipe does. Fewer are the first of more. swinging: those of each share as one snug.swinging_motions.
     """
-    return mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    from snug.swinging_motions import swinging_motion
+
+    clips = mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    if not swinging:
+        return clips
+    given = sum(motion.frames for motion in motions)
+    ends = [round(part * given / FRAMES) for part in range(share + 1)]
+    parts = [clips[first:end] for first, end in pairwise(ends)]
+    return [
+        swinging_motion(part, f"swinging_{number}", seed=number) for number, part in enumerate(parts) if part
+    ]
 
 
 def shapes_of_mixed(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:

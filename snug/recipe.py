@@ -1,7 +1,7 @@
 """Recipe: every choice of a training run in one frozen place. The named ones are in snug.recipes.
 
-No recipe holds a balancing weight between the energies: there is none (`pca_dynamics` of `dynamic` weighs
-what a simulation teaches). Imports nothing heavy, so that a command can list recipes without loading torch.
+No recipe holds a balancing weight between the energies: there is none. Imports
+nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
@@ -11,9 +11,6 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 TERMS = ("strain", "bending", "gravity", "inertia", "collision")
-
-
-MOST_COMPONENTS = 1024
 
 
 class RecipeError(ValueError):
@@ -61,10 +58,8 @@ class Recipe:
         stiffness and margin of contact).
     bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints them; of
         no account with material `pbns`.
-    detached: previous frames are given to inertia, not moved by it: without it a network makes its past agree
-        with a still present instead of learning to move.
-    pca_dynamics, pca_components, pretraining: weight, number of components and updates, see
-        snug.pca_dynamics; of no account where no simulation teaches.
+    pretraining: updates before those by the energies, for a network that learns from a simulated past, see
+        snug.simulated_past.
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped; what
         else is done about such batches: see snug.divergence_guard.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
@@ -99,10 +94,7 @@ class Recipe:
     terms: tuple[str, ...] = TERMS
     material: str = "stvk"
     bending: str = "length_area"
-    detached: bool = False
-    pca_dynamics: float = 0.0
-    pca_components: int = 16
-    pretraining: int = 300
+    pretraining: int = 0
     spike: float = 2.0
     gradient_limit: float = 1.0
 
@@ -125,11 +117,7 @@ class Recipe:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
-        if not 1 <= self.pca_components <= MOST_COMPONENTS:
-            raise RecipeError(
-                f"recipe option pca_components={self.pca_components}: use 1 to {MOST_COMPONENTS}"
-            )
-        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pca_dynamics", "pretraining")
+        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pretraining")
         for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", "shape_share", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")

@@ -68,17 +68,13 @@ TAILORNET = replace(
 )
 PBNS_SPRINGS = replace(DEFAULT, name="pbns-springs", material="pbns", contact_samples="vertices")
 
-# Mixed motions cost it dynamics. The energy of the components begins at joules, which are no divergence.
+# Inertia about a simulation's past begins at joules, which are no divergence.
 DYNAMIC = replace(
     DEFAULT,
     name="dynamic",
-    learning_rate=1e-3,
-    weight_decay=0.0,
-    h0_sigma=0.3,
-    remembered=False,
+    learning_rate=1.5e-3,
     mixed=0.0,
-    detached=True,
-    pca_dynamics=0.3,
+    pretraining=2000,
     spike=20.0,
 )
 
@@ -108,11 +104,13 @@ class Simulated:
     """What is simulated for a training: the given motions, and mixed clips beside them.
 
     mixed: frames of mixed clips for each given one, up to 20,000: the same clips for every training and seed,
-    see snug.motion_augmentation.shared_clips. method: which method of the benchmark simulates.
+    see snug.motion_augmentation.shared_clips. swinging: they turn to and fro and stop, see
+    snug.swinging_motions. method: which method of the benchmark simulates.
     """
 
     mixed: int = 0
     method: str = "simulation"
+    swinging: bool = False
 
 
 @dataclass(frozen=True)
@@ -140,7 +138,7 @@ TRAININGS = {
     "supervised": Training("supervised", SUPERVISED, Simulated()),
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
     "tailornet": Training("tailornet", TAILORNET, Simulated()),
-    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated()),
+    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=6, method="fast-lbfgs-40", swinging=True)),
     **{
         f"snug-{recipe.name}": Training("snug", recipe)
         for recipe in (PAPER, *ABLATIONS, *with_and_without(DEFAULT, PAPER))

@@ -149,7 +149,8 @@ def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | No
         given = assets.named(training.motions)
         vertices = len(assets.garments[training.garment].rest_positions)
         mixed = mixed_for(given, how.recipe, vertices=vertices, seed=training.seed)
-        mixed += shared_clips(given, how.simulated.mixed if how.simulated else 0, vertices=vertices)
+        if said := how.simulated:
+            mixed += shared_clips(given, said.mixed, vertices=vertices, swinging=said.swinging)
         context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
     return context.memo[training.id]
 
