@@ -43,10 +43,14 @@ class Found:
 
 def dependencies(task: Task) -> dict[str, str]:
     """Name -> digest or version of each input, file of source, package and data file, to say what changed."""
-    code = code_of(*task.modules)
-    parts = {name: digest(value) for name, value in task.inputs.items()} | code
-    parts |= {f"package {name}": version for name, version in packages_of(code).items()}
-    return parts | data_of(code)
+    return {name: digest(value) for name, value in task.inputs.items()} | software(*task.modules)
+
+
+def software(*modules: str) -> dict[str, str]:
+    """The same of source, packages and data files of these modules."""
+    code = code_of(*modules)
+    packages = {f"package {name}": version for name, version in packages_of(code).items()}
+    return code | packages | data_of(code)
 
 
 class Cache:
@@ -72,13 +76,14 @@ class Cache:
     def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Found]) -> Found:
         """Write the entry, after the files; gives what find() would."""
         files = {name: digest_of_file(self.folder.path / name) for name in outcome.files}
-        outcome = dataclasses.replace(outcome, digests=files)
+        outcome = dataclasses.replace(outcome, digests=files, origin={**self.origin, **outcome.origin})
         entry = {
             "task": task.title,
+            "inputs": sorted(task.inputs),
             "parts": dependencies(task),
             "needs": _needs(task, others),
             "written": datetime.now().astimezone().isoformat(timespec="seconds"),
-            "origin": self.origin,
+            "origin": outcome.origin,
             "files": files,
             "outcome": {name: getattr(outcome, name) for name in _KEPT},
         }
@@ -102,12 +107,8 @@ class Cache:
         path = self.path(task)
         if not path.is_file():
             return "missing", "", {}
-        try:
-            entry = read_json(path)
-            own = entry.pop("digest", "")
-        except ResultsError:
-            own, entry = "", {}
-        if own != digest(_text(entry).encode()) or entry["task"] != task.title:
+        entry = read_entry(path)
+        if entry is None or entry["task"] != task.title:
             return "missing", "its entry is damaged", {}
         outcome, parts, needs = Outcome(**entry["outcome"]), entry["parts"], entry["needs"]
         if damage := damaged(self.folder, entry["files"]):
@@ -120,6 +121,15 @@ class Cache:
         if changed:
             return "stale", ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""), entry
         return ("failed", _why(outcome), entry) if outcome.failed else ("finished", "", entry)
+
+
+def read_entry(path: Path) -> dict[str, Any] | None:
+    """An entry as it was written, or None where it is damaged."""
+    try:
+        entry = read_json(path)
+    except ResultsError:
+        return None
+    return entry if entry.pop("digest", "") == digest(_text(entry).encode()) else None
 
 
 def damaged(folder: RunFolder, files: Mapping[str, str]) -> str:

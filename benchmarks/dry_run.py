@@ -37,7 +37,7 @@ def _head(plan: Plan) -> list[str]:
         f"preset {plan.preset.name}: {plan.preset.description}",
         f"folder {plan.folder}",
         f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
-        f"{plan.workers} workers, cells alone",
+        f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
         *([f"body {plan.body.path}"] if plan.body else []),
         *map(partial(_size, plan), plan.garments),
     ]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from . import frame_energies, provenance
 from .cache import Cache
 from .console import remarks, summary
-from .executor import LocalExecutor
+from .executor import Executor, LocalExecutor
 from .plan import Plan, runs
 from .results import Row, RunFolder, digest_of_file, with_provenance
 from .roll_out_option import MODULE
@@ -42,7 +42,7 @@ def execute(plan: Plan) -> int:
                 assets = log.open_assets()
             except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
                 runner.refuse(("start", "data", "network"), one_line(error))
-        runner.run(LocalExecutor(log.folder, assets, plan.workers), log)
+        runner.run(executor_of(plan, log.folder, assets), log)
     except (KeyboardInterrupt, RunStopped):
         log.note("interrupted", True)
         rows = rows_of(plan, runner.tasks, runner.known())
@@ -67,6 +67,18 @@ def execute(plan: Plan) -> int:
     if made:
         print(log.folder.report_path.resolve(), flush=True)
     return 0 if made and not (failed or broken) else 1
+
+
+def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:
+    """What executes the plan's tasks. Raises RunStopped where its cluster is gone."""
+    if not plan.scheduler:
+        return LocalExecutor(folder, assets, plan.workers)
+    from .cluster import ClusterError, ClusterExecutor
+
+    try:
+        return ClusterExecutor(folder, assets, plan.workers, plan.scheduler)
+    except ClusterError as error:
+        raise RunStopped(str(error)) from None
 
 
 def assets_of(plan: Plan) -> Assets:
@@ -134,6 +146,7 @@ class RunLog:
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
+            "scheduler": plan.scheduler or None,
             "commit": self.origin["commit"],
             "started": now(),
             "finished": None,
@@ -205,7 +218,9 @@ class RunLog:
         """results.csv, energies of frames, and what run.json says of them."""
         everything = provenance.hardware_line(self.hardware)
         self.rows = [
-            dataclasses.replace(row, hardware=everything) if row.metric in OF_TRAINING else row
+            dataclasses.replace(row, hardware=everything)
+            if row.metric in OF_TRAINING and row.hardware == self.origin["hardware"]
+            else row
             for row in with_provenance(rows, **self.origin)
         ]
         self.count_look()

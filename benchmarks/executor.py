@@ -1,4 +1,4 @@
-"""What executes tasks: processes of this machine. A cluster would stand behind the same four calls.
+"""What executes tasks: processes of this machine. A cluster stands behind the same four calls: cluster.py.
 
 A task that raises, hangs, or whose process dies is an outcome, not an end of the run.
 """
@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from .assets import Assets
 from .cache import damaged
-from .process import IsolatedProcess
+from .process import IsolatedProcess, WorkerDied
 from .results import RunFolder
 from .tasks.task import Context, Outcome, RunStopped, Task, TaskId, failure, tell_nobody
 
@@ -53,13 +53,14 @@ class LocalExecutor:
     def __init__(self, folder: RunFolder, assets: Assets | None, workers: int) -> None:
         self.folder, self.assets, self.workers = folder, assets, workers
         self._named: dict[str, IsolatedProcess] = {}
-        self._crew: list[_Worker] = []
+        self._crew: list[TaskProcess] = []
 
     def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
         count = min(self.workers, len(batches))
-        self._crew += [_Worker(self.folder, self.assets) for _ in range(count - len(self._crew))]
+        context = Context(self.folder, self.assets)
+        self._crew += [TaskProcess(begin_tasks, context) for _ in range(count - len(self._crew))]
         crew = self._crew[:count]
-        idle: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
+        idle: queue.SimpleQueue[TaskProcess] = queue.SimpleQueue()
         for worker in crew:
             idle.put(worker)
 
@@ -68,8 +69,9 @@ class LocalExecutor:
         def do(batch: Sequence[Task], needed: Needed) -> None:
             worker = idle.get()
             try:
-                for done in worker.do(batch, needed):
-                    finished.put(done)
+                worker.forget()
+                for task in batch:
+                    finished.put((task, worker.do(task, dict(needed))))
             finally:
                 idle.put(worker)
 
@@ -79,7 +81,7 @@ class LocalExecutor:
                 while left:
                     ended, left = wait(left, timeout=POLL, return_when=FIRST_COMPLETED)
                     for worker in crew:
-                        worker.report(bar)
+                        bar.update(min(worker.told(), bar.total - bar.n))
                     for future in ended:
                         future.result()
                     while not finished.empty():
@@ -94,7 +96,7 @@ class LocalExecutor:
         process = self._named.get(task.process)
         if process is None:
             context = Context(self.folder, task.assets(self.assets))
-            process = self._named[task.process] = IsolatedProcess(_begin, context)
+            process = self._named[task.process] = IsolatedProcess(begin_tasks, context)
         return _called(process, _perform, task, needed, seconds=task.deadline)
 
     def release(self, process: str) -> None:
@@ -111,30 +113,36 @@ class LocalExecutor:
             self._crew.pop().process.close()
 
 
-class _Worker:
-    """A process that does one batch after another, another process after one that was killed."""
+class TaskProcess:
+    """A process that does one untimed task after another, another process after one that was killed.
 
-    def __init__(self, folder: RunFolder, assets: Assets | None) -> None:
-        self.context = Context(folder, assets)
+    begin(*arguments, progress) is called first in each of them, see begin_tasks.
+    """
+
+    def __init__(self, begin: Callable[..., None], *arguments: Any) -> None:
+        self._begin = (begin, *arguments)
         self._renew()
 
     def _renew(self) -> None:
         # A queue for each process: one that is killed while it reports leaves a lock that nobody opens.
         self.progress = multiprocessing.get_context("spawn").SimpleQueue()
-        self.process = IsolatedProcess(_begin, self.context, self.progress)
+        self.process = IsolatedProcess(*self._begin, self.progress)
         self.warm: set[tuple[str, str]] = set()
 
-    def do(self, batch: Sequence[Task], needed: Needed) -> Iterator[Done]:
-        """The tasks one after another; what one leaves in the memo is there for the next."""
-        if self.process.alive:
-            self.process.call(_forget, seconds=None)
-        for task in batch:
-            outcome = self._warm(task) or _called(
-                self.process, _perform, task, dict(needed), seconds=task.deadline
-            )
-            if not self.process.alive:
-                self._renew()
-            yield task, outcome
+    def forget(self) -> None:
+        """Let nothing of the batch before be there for the next."""
+        try:
+            if self.process.alive:
+                self.process.call(_forget, seconds=None)
+        except WorkerDied:
+            self._renew()
+
+    def do(self, task: Task, needed: Needed) -> Outcome:
+        """The task's outcome; what it leaves in the memo is there for the next."""
+        outcome = self._warm(task) or _called(self.process, _perform, task, needed, seconds=task.deadline)
+        if not self.process.alive:
+            self._renew()
+        return outcome
 
     def _warm(self, task: Task) -> Outcome | None:
         """What went wrong before the process could do its first task of this kind and module."""
@@ -145,11 +153,12 @@ class _Worker:
             self.warm.add((task.kind, task.modules[0]))
         return trouble
 
-    def report(self, bar: Any) -> None:
-        """Hand on what the process has told."""
-        progress = self.progress  # the worker may get another meanwhile
+    def told(self) -> int:
+        """Units of progress since the last call."""
+        progress, units = self.progress, 0  # the worker may get another meanwhile
         while not progress.empty():
-            bar.update(min(progress.get(), bar.total - bar.n))
+            units += progress.get()
+        return units
 
 
 def _called(process: IsolatedProcess, function: Callable[..., Any], *arguments: Any, seconds: Any) -> Any:
@@ -176,7 +185,8 @@ _context: Context
 _verified: set[tuple[str, str]] = set()  # files that this process has compared with their digests
 
 
-def _begin(context: Context, progress: Any = None) -> None:
+def begin_tasks(context: Context, progress: Any = None) -> None:
+    """Keep what a process knows. progress: a queue of units, None where nobody follows them."""
     global _context
     tell: Callable[[int], None] = tell_nobody if progress is None else progress.put
     if progress is not None:

@@ -148,7 +148,8 @@ class Plan:
 
     body, garment: own ones; None: the package's. only: states of what the folder holds in which a task is
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
-    metrics: modules of metrics that are not the project's, see benchmarks.outside.
+    metrics: modules of metrics that are not the project's, see benchmarks.outside. scheduler: address of a
+    cluster that does what is not timed; empty: this machine does.
     """
 
     preset: Preset
@@ -167,6 +168,7 @@ class Plan:
     only: frozenset[str] = frozenset(("stale", "missing"))
     fresh: bool = False
     workers: int = 1
+    scheduler: str = ""
 
     @property
     def scenes(self) -> tuple[Scene, ...]:

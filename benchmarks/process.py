@@ -92,6 +92,13 @@ class IsolatedProcess:
             self._process.join(PATIENCE)
             self._kill()
 
+    def stop(self) -> None:
+        """Kill it and what it has started, from another thread: a call under way raises WorkerDied."""
+        process = self._process
+        if process is not None and process.pid is not None:
+            end_group(process.pid)
+            process.kill()
+
     def _kill(self) -> None:
         if self._process is not None:
             end_group(self._process.pid)

@@ -67,8 +67,11 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
     batch = outcomes.get(("batch", cell.name), Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
+    machines = machines_of(cell, schedule, outcomes)
     for suite in cell.suites:
-        yield from _rows(cell, suite, outcome, status, reason, metrics, schedule.plan.metrics)
+        for row in _rows(cell, suite, outcome, status, reason, metrics, schedule.plan.metrics):
+            machine = machines.get(row.metric)
+            yield row if machine is None else dataclasses.replace(row, hardware=machine)
 
 
 def _rows(
@@ -159,6 +162,20 @@ def model_costs(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str,
     costs = {metric: trained.result[name] for metric, name in names.items()}
     data = [outcomes.get(task.id, Outcome()) for task in schedule.ground_truth(network)]
     return {"cost/data": sum(outcome.seconds for outcome in data)} | costs
+
+
+def machines_of(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str, str]:
+    """Metric -> where its seconds were measured, of those that other tasks than the cell have taken."""
+    if (network := network_of(cell)) is None:
+        return {}
+    data, training = [task.id for task in schedule.ground_truth(network)], [schedule.network(network).id]
+    metrics = {"cost/data": data, "cost/setup": training, "cost/train": training}
+    found = {metric: [outcomes[id].origin for id in ids if id in outcomes] for metric, ids in metrics.items()}
+    return {
+        metric: " and ".join(dict.fromkeys(origin["hardware"] for origin in origins if origin))
+        for metric, origins in found.items()
+        if any(origins)
+    }
 
 
 def not_learned(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> str:

@@ -140,6 +140,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
         only=only,
         fresh=options.fresh,
         workers=workers,
+        scheduler=choose_scheduler(options),
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )
 
@@ -231,6 +232,22 @@ def check_device(device: str) -> None:
         find_device(device)
 
 
+def choose_scheduler(options: argparse.Namespace) -> str:
+    """The address of a scheduler that answers; empty without one. Raises ClusterError, PlanError."""
+    if options.scheduler is None:
+        return ""
+    if options.device != "cpu":
+        raise PlanError(
+            f"--device {options.device}: on a cluster networks train on cpu; leave out --scheduler"
+        )
+    if options.rollout:
+        raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
+    from .cluster import check_scheduler
+
+    check_scheduler(options.scheduler)
+    return options.scheduler
+
+
 def choose_folder(out: str | None) -> Path:
     """The folder of the run, not created yet. Raises PlanError where it cannot be made or holds other things.
 
@@ -259,9 +276,11 @@ def choose_folder(out: str | None) -> Path:
 
 def _check_run(folder: Path) -> None:
     try:
-        RunFolder(folder).read_config()
+        config = RunFolder(folder).read_config()
     except ResultsError as error:
         raise PlanError(f"--out {error}; name another folder") from None
+    if "merged" in config:
+        raise PlanError(f"--out {folder}: is merged of several runs, which go on in their own folders")
 
 
 if __name__ == "__main__":

@@ -31,6 +31,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run --motions mocap.bvh --motion-up z --repair
   python -m benchmarks.run --body mine.npz --suite garments
   python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
+  python -m benchmarks.run --seeds 0,1,2 --scheduler tcp://10.0.0.1:8786
   python -m benchmarks.run --garment shirt.obj --garment-units cm --body mine.npz --suite garments
 
 motions: without --motions the embedded library, whose motions train, validate or test (docs/protocol.md).
@@ -96,6 +97,9 @@ def make_parser() -> argparse.ArgumentParser:
     add("--workers", type=int, metavar="N",
         help="processes side by side for ground truth, training, metrics and cases (default 2, or the "
         "cores there are); cells that are timed run alone")  # fmt: skip
+    add("--scheduler", metavar="ADDRESS",
+        help="a cluster of dask.distributed, as tcp://HOST:8786, for all that is not timed; timed cells run "
+        "here (docs/scale.md)")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
     add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
     return parser

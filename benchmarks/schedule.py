@@ -211,6 +211,8 @@ class Schedule:
         cells = tuple(other for other in plan.cells if other.scene == scene and runs(other))
         compared = (other for other in cells if other.entry.role in COMPARED_WITH)
         reads = tuple(("cell", other.name) for other in compared if other != cell)
+        if scene.simulated:
+            reads = (*reads, self.start(scene).id)  # the scene is built from it
         quasi_static, counterpart = None, None
         if scene.dynamic:
             quasi_static = self.quasi_static(scene).id

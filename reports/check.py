@@ -75,7 +75,8 @@ def hardware(run: Run) -> Iterator[str]:
             yield f"{len(none)} rows have no {column}: {_names(none['scene'])}"
     if len(none := run.frame[run.frame["threads"] < 1]):
         yield f"{len(none)} rows have no number of threads: {_names(none['scene'])}"
-    machines = set(run.frame[run.frame["unit"].isin(("s", "ms"))]["hardware"]) - {""}
+    times = run.frame[run.frame["unit"].isin(("s", "ms")) & run.frame["value"].notna()]
+    machines = set(times["hardware"]) - {""}
     if len(machines) > 1:
         yield f"times are of several machines: {_names(sorted(machines))}"
 

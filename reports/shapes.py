@@ -9,6 +9,7 @@ import pandas as pd
 
 from reports.data import Run
 from reports.means import means
+from reports.numbers import number
 from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
 from reports.styles import style
 from reports.table import Cell, Column, Table, metric_column, table
@@ -59,20 +60,26 @@ def shapes(run: Run) -> list[Table]:
 
 
 def against_shape(folder: Path, run: Run) -> list[Picture]:
-    """A panel for each number, a mark for each method and body."""
+    """A panel for each number, a mark for each method and body, bodies in the order of their norms."""
     rows, sizes = _rows(run)
     shown = [name for name in SHOWN if name in set(rows["metric"])]
     if not shown:
         return []
-    figure = new_figure(PAGE_WIDTH, 2.5)
+    ordered = list(sizes.sort_values(kind="stable").index)  # norms lie too near each other for an axis
+    places = range(len(ordered))
+    figure = new_figure(PAGE_WIDTH, 2.2 * -(-len(shown) // 2) + 0.4)
     drawn: set[str] = set()
-    for axes, name in zip(np.atleast_1d(figure.subplots(1, len(shown))), shown):
-        own = rows[rows["metric"] == name].assign(shape=lambda r: r["scene"].map(sizes))
+    for number_, name in enumerate(shown, start=1):
+        axes = figure.add_subplot(-(-len(shown) // 2), min(2, len(shown)), number_)
+        own = rows[rows["metric"] == name]
         for method, line in own.groupby("method"):
-            curve, look = line.groupby("shape")["value"].mean(), style(run, str(method))
-            values = curve.to_numpy() if name in LINEAR else np.maximum(curve.to_numpy(), LEAST)
-            axes.plot(curve.index, values, color=look.colour, marker=look.marker, markersize=3, linewidth=0.5)
+            values, look = line.groupby("scene")["value"].mean().reindex(ordered), style(run, str(method))
+            least = values if name in LINEAR else values.clip(lower=LEAST)
+            axes.plot(
+                places, least.to_numpy(), color=look.colour, marker=look.marker, markersize=4, linewidth=0.5
+            )
             drawn.add(str(method))
+        axes.set_xticks(places, [number(sizes[scene], 2) for scene in ordered], fontsize=7)
         axes.set(xlabel="norm of the shape")
         axes.set_ylabel(run.metrics[name].heading)
         if name not in LINEAR:

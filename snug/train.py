@@ -12,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 from snug.garment_file import demand_a_file, garment_file, is_file_name
 from snug.motion_options import reading_of
-from snug.recipes import find_recipe
+from snug.recipes import TRAININGS, find_recipe
 from snug.train_options import check, parse
 
 if TYPE_CHECKING:
     from snug.body import Body
+    from snug.dataset import DataSet
     from snug.garment_kinds import GarmentTemplate
     from snug.garments import Garment
     from snug.parallel import Group
+    from snug.recipe import Recipe
     from snug.trained_model import TrainedModel
 
 
@@ -41,6 +43,7 @@ def _run(options: argparse.Namespace) -> int:
     import torch
 
     from snug.body import Body
+    from snug.dataset import DataSet
     from snug.device import find_device
     from snug.garment_kinds import TSHIRT, find_template
     from snug.parallel import join_group, leave_group
@@ -56,7 +59,8 @@ def _run(options: argparse.Namespace) -> int:
     outs = _outs(Path(options.out), templates)
     device = find_device(options.device)
     torch.set_num_threads(options.threads)
-    motions, held_out = _motions(options)
+    data = DataSet.read(options.dataset) if options.dataset else None
+    motions, held_out = _motions(options, data)
     stop = _StopRequest()
     group, device = join_group(device)
     if options.motions and group.writes:
@@ -66,7 +70,7 @@ def _run(options: argparse.Namespace) -> int:
         body = Body.from_file(options.body) if options.body else Body.load()
         for template, out in zip(templates, outs):
             garment = (body, template)
-            _train_one(options, garment, motions, held_out, out, str(device), group, stop)
+            _train_one(options, garment, data, motions, held_out, out, str(device), group, stop)
     except Interrupted as interrupted:
         if group.writes:
             print(f"snug.train: {interrupted}; go on with --resume", file=sys.stderr)
@@ -103,13 +107,13 @@ def _outs(out: Path, templates: Sequence[Any]) -> list[Path]:
     return outs
 
 
-def _motions(options: argparse.Namespace) -> tuple[list[Any], list[Any]]:
+def _motions(options: argparse.Namespace, data: DataSet | None) -> tuple[list[Any], list[Any]]:
     """Motions to train on and to validate with. Raises ValueError for a name that is not there."""
     from snug.motion_files import load_motions
     from snug.motion_library import TRAIN, VALIDATION, make_motion
 
     reading = reading_of(options)
-    motions = [make_motion(name) for name in TRAIN]
+    motions = data.motions() if data else [make_motion(name) for name in TRAIN]
     if options.motions:
         motions = load_motions(options.motions, reading=reading)
     names = [motion.name for motion in motions]
@@ -146,6 +150,7 @@ class _StopRequest:
 def _train_one(
     options: argparse.Namespace,
     garment: tuple[Any, Any],
+    data: DataSet | None,
     motions: list[Any],
     held_out: list[Any],
     out: Path,
@@ -153,6 +158,7 @@ def _train_one(
     group: Group,
     stop: Callable[[], bool],
 ) -> None:
+    from snug.dataset import settings_of
     from snug.dressed_body import DressedBody
     from snug.tensorboard_log import TensorBoardLog
     from snug.training import train
@@ -168,6 +174,9 @@ def _train_one(
         say(f"note: {saving.path} of a stopped run will be replaced; --resume would go on with it")
     body, template = garment
     dressed = DressedBody(body, template.tailor(body, vertices=options.vertices))
+    if data:
+        data.check(settings_of(body, dressed.garment))
+    trajectories = data.targets() if data and TRAININGS[options.model].simulated else None
     if options.resume and out.is_file() and not saving.path.is_file():
         _check_ended(out, options, dressed.vertices)
         say(f"{out}: is there, and no checkpoint beside it; nothing to resume")
@@ -176,18 +185,21 @@ def _train_one(
         say(f"note: {out} will be replaced when this training has ended")
     frames = sum(motion.frames for motion in motions)
     say(f"{template.description}: {dressed.vertices} vertices, {len(motions)} motions, {frames} frames, "
-        f"recipe {options.recipe}")  # fmt: skip
+        f"recipe {_recipe(options).name}")  # fmt: skip
     validation = None
     if held_out:
-        validation = Validation(motions=held_out, every=options.validate_every, patience=options.patience)
+        validation = Validation(
+            motions=held_out, every=options.validate_every, patience=options.patience,
+            trajectories=trajectories,
+        )  # fmt: skip
     curves = None
     if options.tensorboard and group.writes:
         curves = TensorBoardLog(Path(options.tensorboard) / out.stem)
     try:
         model = train(
             options.model, dressed, motions, steps=options.steps, seed=options.seed,
-            recipe=find_recipe(options.recipe), log=curves.write if curves else None, device=device,
-            saving=saving, validation=validation, group=group, stop=stop,
+            recipe=_recipe(options), trajectories=trajectories, log=curves.write if curves else None,
+            device=device, saving=saving, validation=validation, group=group, stop=stop,
         )  # fmt: skip
     finally:
         if curves:
@@ -198,11 +210,16 @@ def _train_one(
         saving.done()
 
 
+def _recipe(options: argparse.Namespace) -> Recipe:
+    """The one named, or the model's own."""
+    return find_recipe(options.recipe) if options.recipe else TRAININGS[options.model].recipe
+
+
 def _check_ended(out: Path, options: argparse.Namespace, vertices: int) -> None:
     """Raises ValueError where the model there is not what this command trains."""
     from snug.trained_model import TrainedModel
 
-    there, asked = TrainedModel.load(out), find_recipe(options.recipe)
+    there, asked = TrainedModel.load(out), _recipe(options)
     pairs = {
         "model": (there.kind, options.model),
         "recipe": (there.recipe, asked),

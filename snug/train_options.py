@@ -8,8 +8,9 @@ from collections.abc import Sequence
 
 from snug.garment_file import add_garment_options
 from snug.motion_options import add_motion_options
-from snug.recipes import RECIPES
+from snug.recipes import RECIPES, TRAININGS
 
+MODELS = ("snug", "pbns", "supervised", "santesteban2019", "tailornet")
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
   python -m snug.train --garment tshirt --garment tunic  one network for each garment
@@ -18,10 +19,13 @@ EXAMPLES = """examples:
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
   python -m snug.train --validation kick --patience 10   stop when a validation motion gets no better
   python -m snug.train --recipe paper --vertices 4400    the paper's text (but see snug.recipes on contact)
+  python -m snug.train --dataset data/walks --model supervised    taught by the simulations of a data set
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
   torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
 
-Models taught by simulated motions are trained by python -m benchmarks.run, which makes those."""
+supervised, santesteban2019 and tailornet are taught by simulated motions, which python -m benchmarks.dataset
+makes; python -m benchmarks.run makes its own. With --dataset, --garment, --vertices and --body are those that
+it was built with."""
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
@@ -32,8 +36,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES,
     )
     add = parser.add_argument_group("what").add_argument
-    add("--model", choices=("snug", "pbns"), default="snug", help="network and loss (default: %(default)s)")
-    add("--recipe", choices=tuple(RECIPES), default="default", help="named options (default: %(default)s)")
+    add("--model", choices=MODELS, default="snug", help="network and loss (default: %(default)s)")
+    add("--recipe", choices=tuple(RECIPES), help="named options (default: the model's own)")
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
     add("--garment", metavar="NAME|FILE", action="append", default=[],
         help="tshirt, tunic, skirt, tank_top, long_sleeves, trousers, shorts, dress, or a mesh made for the "
@@ -41,6 +45,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
     add("--body", metavar="FILE", help="an own body of SMPL's family, .npz or .pkl (default: the package's)")
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
+    add("--dataset", metavar="DIR",
+        help="motions and simulations of a data set, read from its files a few frames at a time")  # fmt: skip
     add_motion_options(add)
     add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
     add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
@@ -92,5 +98,11 @@ def check(options: argparse.Namespace) -> None:
         if not least <= value <= most:
             wanted = f"at most {most}" if value > most else f"at least {least}"
             raise ValueError(f"--{name.replace('_', '-')} {str(value)[:40]}: {wanted}")
+    if options.dataset and options.motions:
+        raise ValueError(f"--dataset {options.dataset}: has motions of its own; leave out --motions")
+    if TRAININGS[options.model].simulated and not options.dataset:
+        raise ValueError(f"--model {options.model}: is taught by simulations; add --dataset DIR")
+    if options.recipe and TRAININGS[options.model].simulated:
+        raise ValueError(f"--recipe {options.recipe}: {options.model} has its own; leave out --recipe")
     if options.patience and not options.validation:
         raise ValueError(f"--patience {options.patience}: add --validation NAME, a motion to stop by")

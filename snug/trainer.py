@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.baselines.supervised import VertexTargets
+from snug.baselines.supervised import Targets, VertexTargets
 from snug.device import CPU
 from snug.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.dressed_body import DressedBody
@@ -51,7 +51,7 @@ class Trainer:
         steps: int,
         seed: int,
         recipe: Recipe,
-        trajectories: Mapping[str, np.ndarray] | None = None,
+        trajectories: Mapping[str, Targets] | None = None,
         device: torch.device = CPU,
         kernels: bool | None = None,
         group: Group = ALONE,
@@ -105,9 +105,7 @@ class Trainer:
         self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
 
-    def _set_up_supervision(
-        self, motions: Sequence[Any], trajectories: Mapping[str, np.ndarray] | None
-    ) -> None:
+    def _set_up_supervision(self, motions: Sequence[Any], trajectories: Mapping[str, Targets] | None) -> None:
         """By simulated vertices, or by the energies, and then perhaps about a simulated past."""
         how, recipe, data = self.how, self.recipe, self.data
         if how.targets:

@@ -6,11 +6,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from snug.recipe import DEFAULT, Recipe
 
 if TYPE_CHECKING:
+    from snug.baselines.supervised import Targets
     from snug.dressed_body import DressedBody
     from snug.parallel import Group
     from snug.trained_model import TrainedModel
@@ -25,7 +24,7 @@ def train(
     *,
     steps: int,
     seed: int,
-    trajectories: Mapping[str, np.ndarray] | None = None,
+    trajectories: Mapping[str, Targets] | None = None,
     recipe: Recipe = DEFAULT,
     log: Callable[[dict[str, float]], None] | None = None,
     progress: bool = True,

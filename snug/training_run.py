@@ -171,11 +171,12 @@ class TrainingRun:
     def _identity(self) -> dict[str, Any]:
         """What must be the same for a run to be the same run."""
         trainer, digest = self.trainer, hashlib.sha256()
-        taught = trainer.targets.vertices if trainer.targets else trainer.data.ahead
+        taught = trainer.targets.fingerprint() if trainer.targets else _bytes(trainer.data.ahead)
         past = [trainer.past.frames] if trainer.past else []
         weights = trainer.dressed.weights(trainer.recipe.smoothing)
-        for tensor in (trainer.data.features, trainer.data.rest, taught, weights, *past):
-            digest.update(tensor.cpu().numpy().tobytes())
+        tensors = (trainer.data.features, trainer.data.rest, weights, *past)
+        for part in (taught, *map(_bytes, tensors)):
+            digest.update(part)
         digest.update(trainer.dressed.cloth.Dm_inverse.tobytes())
         return {
             "kind": trainer.kind,
@@ -246,6 +247,10 @@ class TrainingRun:
             history=self.history,
             summary=summary,
         )
+
+
+def _bytes(tensor: Tensor) -> bytes:
+    return tensor.cpu().numpy().tobytes()
 
 
 SHORT = ("kind", "seed", "steps", "threads", "processes", "vertices", "every")  # worth naming in one line

@@ -20,6 +20,7 @@ from snug.skinning import skin
 from snug.training_set import Batch, TrainingError, TrainingSet
 
 if TYPE_CHECKING:
+    from snug.baselines.supervised import Targets
     from snug.trainer import Trainer
 
 
@@ -33,7 +34,7 @@ class Validation:
     motions: Sequence[Any]
     every: int = 200
     patience: int = 10
-    trajectories: Mapping[str, np.ndarray] | None = None
+    trajectories: Mapping[str, Targets] | None = None
 
 
 class Validator:

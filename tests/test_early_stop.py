@@ -172,7 +172,7 @@ def test_the_command_writes_curves_of_every_garment(tmp_path, monkeypatch):
     pytest.importorskip("tensorboard")
     from snug import train as module
 
-    monkeypatch.setattr(module, "_motions", lambda options: ([swaying(20)], []))
+    monkeypatch.setattr(module, "_motions", lambda options, data: ([swaying(20)], []))
     words = ["--vertices", "200", "--steps", "2", "-o", str(tmp_path / "mine.safetensors")]
     words += ["--garment", "tshirt", "--garment", "tunic", "--tensorboard", str(tmp_path / "curves")]
     assert module.main(words) == 0

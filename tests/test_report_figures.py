@@ -276,7 +276,9 @@ def test_energies_are_drawn_and_listed_against_the_shape(tmp_path, monkeypatch):
     (figure,) = drawn_by(monkeypatch, shapes.against_shape, tmp_path, run_of(rows))
     lines = {tuple(line.get_ydata()) for line in figure.axes[0].get_lines()}
     assert lines == {(0.3, 0.4, 0.5), (0.35, 0.6, 0.8)} and len(figure.axes) == 2
-    assert all(list(line.get_xdata()) == [0.0, 4.0, 6.0] for line in figure.axes[0].get_lines())
+    labels = [label.get_text() for label in figure.axes[0].get_xticklabels()]
+    assert all(list(line.get_xdata()) == [0, 1, 2] for line in figure.axes[0].get_lines())
+    assert [float(label) for label in labels] == [0.0, 4.0, 6.0]
 
     (made,) = shapes.shapes(run_of(rows))
     names = [column.name for column in made.columns]

@@ -25,7 +25,7 @@ class Outcome:
 
     status and reason: in the words of a result row. failed: whether there is nothing to build upon. result:
     plain values. files: what it has left, by their names in the run's folder; digests: of these, by name,
-    once it is kept. seconds: wall time. origin: commit, preset and hardware, where an earlier run did it.
+    once it is kept. seconds: wall time. origin: commit, preset and hardware of it, once it is kept.
     remark: what has changed since, where it is kept all the same.
     """
 

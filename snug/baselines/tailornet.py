@@ -161,10 +161,16 @@ def band_loss(predicted: Tensor, target: Tensor) -> Tensor:
 
 
 class BandTargets(VertexTargets):
-    """The simulated vertices, unposed and taken apart into two bands; arguments as for VertexTargets."""
+    """The simulated vertices, unposed and taken apart into two bands; arguments as for VertexTargets.
+
+    All of it is in memory, also of trajectories in files: smoothing a batch takes longer than teaching it.
+    """
+
+    from_files = False
 
     def __init__(self, dressed: Any, *arguments: Any) -> None:
         super().__init__(dressed, *arguments)
+        assert isinstance(self.vertices, Tensor)
         offsets = unposed(self.vertices, self.weights, self.transforms) - dressed.rest()
         low = smoothed(offsets.numpy(), np.asarray(dressed.garment.faces))
         self.low = torch.as_tensor(low, dtype=torch.float32)

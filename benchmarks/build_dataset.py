@@ -1,0 +1,200 @@
+"""Building a data set: its sequences are tasks of the runner, one for each motion, and nothing besides."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from snug.dataset import INDEX, DataSet, SimulatedSequence, settings_of
+from snug.garment_file import demand_a_file, is_file_name
+from snug.motion_options import reading_of
+from snug.recipe import DEFAULT
+
+from . import provenance
+from .assets import embedded_motions, open_assets
+from .cache import Cache
+from .execution import executor_of
+from .lock import held
+from .methods import METHODS
+from .plan import Motions, Plan, PlanError
+from .presets import find_preset
+from .registry import by_name
+from .results import RunFolder
+from .roles import FEWEST
+from .run import WORKERS, choose_body, choose_garment, choose_states, split
+from .runner import Runner
+from .scenes import of_garment
+from .schedule import Schedule
+from .tasks.sequence import SimulateSequence
+from .tasks.task import Outcome
+
+if TYPE_CHECKING:
+    from snug.motion import Motion
+
+LONGEST = 1_000_000  # frames of a sequence
+MIXING_SEED = 0  # of mixed clips: the same ones for every data set
+
+
+def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
+    """Simulate what the folder lacks. Raises ValueError, one line, before anything is written."""
+    plan, entry = make_plan(options, words)
+    before = _there(plan.folder)
+    garment = plan.motions.first_garment
+    own = plan.garment.file if plan.garment else None
+    motions = plan.motions.files.values()
+    assets = open_assets(plan.preset, motions, [garment], body=plan.body_file, own=own)
+    settings = settings_of(assets.body, assets.garments[garment]) | {
+        "frames_per_second": _rate(motions), "method": entry.name, "settle_frames": plan.preset.settle_frames,
+    }  # fmt: skip
+    commands: tuple[str, ...] = (plan.command,)
+    if before:
+        before.check(settings)
+        commands = tuple(dict.fromkeys((*before.commands, plan.command)))
+    tasks = tasks_of(plan, entry)
+    with held(plan.folder):
+        folder = RunFolder(plan.folder)
+        folder.remove_parts()
+        hardware = provenance.hardware_line(provenance.hardware())
+        origin = {"commit": provenance.commit(), "hardware": hardware}
+        runner = Runner(tasks, Cache(folder, only=plan.only, origin=origin))
+        kept = before.sequences if before else ()
+        DataSet(plan.folder, settings, _lines(tasks, {}, kept), commands).write()
+        try:
+            runner.run(executor_of(plan, folder, assets), _Stages())
+        finally:
+            found = DataSet(plan.folder, settings, _lines(tasks, runner.known(), kept), commands)
+            found.write()
+    if runner.reused:
+        print(f"{len(runner.reused)} sequences were there", file=sys.stderr)
+    return found
+
+
+class _Stages:
+    """There is one stage, and the bar tells of it."""
+
+    def stage(self, name: str) -> nullcontext[None]:
+        return nullcontext()
+
+
+def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, Any]:
+    """A plan of these motions, and the method that simulates them. Raises ValueError, one line."""
+    for name, least in (("sequences", 1), ("frames", FEWEST), ("vertices", 1), ("settle", 2), ("workers", 1)):
+        value = getattr(options, name)
+        if value is not None and not least <= value <= LONGEST:
+            raise PlanError(f"--{name} {value}: give a whole number from {least} to {LONGEST}")
+    methods = {entry.name: entry for entry in METHODS if not (entry.trained or entry.needs_body)}
+    if options.method not in methods:
+        raise PlanError(f"--method {options.method}: no solver is called so; see benchmarks.run --list")
+    own = None
+    if is_file_name(options.garment):
+        own = choose_garment(options)
+    else:
+        demand_a_file(options)
+    worn = (own.scenes,) if own else (of_garment(options.garment),)
+    if why := methods[options.method].skip(worn[0].scene("")):
+        raise PlanError(f"--method {options.method}: {why}")
+    motions = choose_motions(options, dynamic=worn[0].dynamic)
+    preset = replace(
+        find_preset("quick"), garment_vertices=options.vertices, frames=LONGEST, settle_frames=options.settle
+    )
+    if options.scheduler:
+        from .cluster import check_scheduler
+
+        check_scheduler(options.scheduler)
+    rest = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    rest.add_argument("-o", "--out")
+    plan = Plan(
+        preset=preset, suites=(), cells=(), cases=(), seeds=(), device="cpu", folder=Path(options.out),
+        motions=Motions(train=tuple(motions), files=motions, worn=worn), body=choose_body(options.body),
+        garment=own, only=choose_states(split(options.only), fresh=False),
+        scheduler=options.scheduler or "",
+        workers=options.workers or min(WORKERS, provenance.usable_cores()),
+        command=shlex.join(["python", "-m", "benchmarks.dataset", *rest.parse_known_args(words)[1]]),
+    )  # fmt: skip
+    return plan, methods[options.method]
+
+
+def choose_motions(options: argparse.Namespace, *, dynamic: bool) -> dict[str, Motion]:
+    """Name -> motion of each sequence. Raises ValueError for names that come twice, and for none."""
+    from snug import motion_library as library
+    from snug.motion_augmentation import FRAMES, mixed_motions
+    from snug.motion_files import load_motions
+
+    reading, given = reading_of(options), list[Any]()
+    for path in options.motions or ["library"]:
+        names = library.DYNAMIC_TRAIN if dynamic else library.TRAIN
+        given += embedded_motions(names) if path == "library" else load_motions(path, reading=reading)
+    count = len(given) if options.sequences is None else options.sequences
+    if more := max(0, count - len(given)):
+        turn, lifted = DEFAULT.mixed_turn, DEFAULT.mixed_lift
+        given += mixed_motions(given, more * FRAMES, turn=turn, lifted=lifted, seed=MIXING_SEED)
+    if not 0 <= options.first < count:
+        raise PlanError(f"--from {options.first}: give a whole number below {count}, that of the sequences")
+    motions: dict[str, Motion] = by_name("motion", given[:count])
+    chosen = list(motions.values())[options.first :]
+    cut = [motion.cut(0, options.frames) if options.frames else motion for motion in chosen]
+    for motion in cut:
+        if motion.frames < FEWEST:
+            raise PlanError(f"motion {motion.name}: {motion.frames} frames; at least {FEWEST} are needed")
+    return {motion.name: motion for motion in cut}
+
+
+def tasks_of(plan: Plan, entry: Any) -> list[SimulateSequence]:
+    """One for each motion. On what machine they run decides nothing."""
+    schedule, garment, tasks = Schedule(plan), plan.motions.first_garment, []
+    for name, motion in plan.motions.files.items():
+        task = schedule.data(name, garment, entry)
+        given = {field.name: getattr(task, field.name) for field in fields(task)}
+        inputs = {name: value for name, value in task.inputs.items() if name != "machine"}
+        modules = (*task.modules, "benchmarks.tasks.sequence")
+        units = motion.frames + plan.preset.settle_frames
+        tasks.append(
+            SimulateSequence(**given | {"label": name, "inputs": inputs, "modules": modules, "units": units})
+        )
+    return tasks
+
+
+def _there(folder: Path) -> DataSet | None:
+    """The data set to go on with. Raises ValueError for a folder that holds other things."""
+    if folder.is_dir() and any(folder.iterdir()):
+        if not (folder / INDEX).exists():
+            raise PlanError(f"--out {folder}: is not empty and holds no data set; name a new folder")
+        return DataSet.read(folder)
+    return None
+
+
+def _rate(motions: Any) -> float:
+    rates = sorted({float(motion.fps) for motion in motions})
+    if len(rates) != 1:
+        raise PlanError(f"the motions have {rates} frames per second; give those of one rate")
+    return rates[0]
+
+
+def _lines(
+    tasks: Sequence[SimulateSequence], outcomes: Any, kept: Sequence[SimulatedSequence]
+) -> tuple[SimulatedSequence, ...]:
+    """The index: what was there, and of each task what came of it; in the order of the first asking."""
+    lines = {line.name: line for line in kept}
+    for task in tasks:
+        name, outcome = task.scene.motion, outcomes.get(task.id)
+        lines[name] = _line(name, outcome) if outcome else lines.get(name, SimulatedSequence(name))
+    return tuple(lines.values())
+
+
+def _line(name: str, outcome: Outcome) -> SimulatedSequence:
+    told = {name: outcome.origin[name] for name in ("hardware", "commit")}
+    told |= {"reason": outcome.reason, "seconds": round(outcome.seconds, 3)}
+    if outcome.failed or not outcome.files:
+        return SimulatedSequence(name, status=outcome.status, **told)
+    trajectory, motion, vertices = outcome.files
+    status, _, reason = outcome.result["ending"].partition(": ")
+    return SimulatedSequence(
+        name, trajectory, motion, vertices, outcome.digests, outcome.result["frames"], status,
+        usable=outcome.result["whole"], **told | {"reason": reason},
+    )  # fmt: skip

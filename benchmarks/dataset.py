@@ -1,0 +1,179 @@
+"""python -m benchmarks.dataset: simulated motions in many files with an index, for training to read from."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from snug.garment_file import add_garment_options
+from snug.motion_options import add_motion_options
+
+from .run_options import Parser
+from .timing import one_thread
+
+if TYPE_CHECKING:
+    from snug.dataset import DataSet
+
+PROGRAM = "benchmarks.dataset"
+EXAMPLES = """examples:
+  python -m benchmarks.dataset build -o data/walks                     the library's training motions
+  python -m benchmarks.dataset build --sequences 1000 --vertices 4400 -o data/thousand
+  python -m benchmarks.dataset build --motions clips/ --garment shirt.obj --body mine.npz -o data/mine
+  python -m benchmarks.dataset build --from 500 --sequences 1000 -o data/second    another machine's half
+  python -m benchmarks.dataset verify data/thousand                    every byte against the index
+  python -m benchmarks.dataset list data/thousand
+  python -m benchmarks.dataset merge data/first data/second -o data/both
+  python -m snug.train --dataset data/both --model supervised          training reads windows from the files
+
+sequences: the motions as given, in order, and then mixed clips of 60 frames made from them, always the same
+  ones, until there are as many as asked for. Test and validation motions of the library are never among
+  them. A folder that holds a data set of the same garment is gone on with: what is there for the same inputs
+  and code is kept, the rest is simulated; so is what was killed, or what verify found damaged.
+
+exit status: 0 all is there; 1 a sequence failed, is damaged or not there yet: a line says which, and the
+  rest went on; 2 the request cannot be met: one line says why and nothing is written; 130 interrupted: what
+  had ended is kept, and the same command goes on from there."""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    parser = Parser(
+        prog=f"python -m {PROGRAM}",
+        description="Data sets of simulated motions: many files, an index, checksums.",
+        epilog=EXAMPLES,
+    )
+    actions = parser.add_subparsers(dest="action", required=True, metavar="build|verify|list|merge")
+    add_build_options(actions.add_parser("build", help="simulate what is not there yet", epilog=EXAMPLES))
+    for name, words in (("verify", "compare every file with its digest"), ("list", "what there is")):
+        actions.add_parser(name, help=words, epilog=EXAMPLES).add_argument("folder", metavar="DIR")
+    merge = actions.add_parser("merge", help="join folders of several machines", epilog=EXAMPLES)
+    merge.add_argument("folders", metavar="DIR", nargs="+")
+    merge.add_argument("-o", "--out", metavar="DIR", required=True, help="a new folder")
+    return parser
+
+
+def add_build_options(parser: argparse.ArgumentParser) -> None:
+    """What is simulated, and where."""
+    add = parser.add_argument
+    add(
+        "--motions",
+        action="append",
+        default=[],
+        metavar="PATH",
+        help="motion file (.npz, .bvh, .amc with .asf), folder, or library (default); repeatable",
+    )
+    add_motion_options(add)
+    add("--sequences", type=int, metavar="N", help="how many: the first motions, or all and mixed clips "
+        "beside them (default: the motions)")  # fmt: skip
+    add("--from", type=int, default=0, metavar="N", dest="first",
+        help="leave out the first N of them, which another machine builds (default 0)")  # fmt: skip
+    add("--frames", type=int, metavar="N", help="of a sequence at most (default: all)")
+    add("--garment", default="tshirt", metavar="NAME|FILE", help="what is worn (default tshirt)")
+    add("--vertices", type=int, default=1000, metavar="N", help="of a tailored garment (default 1000)")
+    add("--body", metavar="FILE", help="an own body of SMPL's family (default: the package's)")
+    add("--settle", type=int, default=30, metavar="N",
+        help="frames in which the body goes from the T-pose into the first pose (default 30)")  # fmt: skip
+    add("--method", default="simulation", metavar="NAME",
+        help="what simulates: a solver of benchmarks.run --list (default simulation, converged)")  # fmt: skip
+    add("-o", "--out", metavar="DIR", required=True, help="a new folder, or one to go on with")
+    add("--only", action="append", default=[], metavar="STATE,...",
+        help="do again what is failed, stale or missing (default stale,missing)")  # fmt: skip
+    add("--workers", type=int, metavar="N", help="processes side by side (default 2, or the cores there are)")
+    add("--scheduler", metavar="ADDRESS", help="a cluster that simulates instead, see docs/scale.md")
+    add_garment_options(parser)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    one_thread()
+    actions: dict[str, Callable[[argparse.Namespace, Sequence[str]], int]] = {
+        "build": _build, "verify": _verify, "list": _list, "merge": _merge,
+    }  # fmt: skip
+    try:
+        options = make_parser().parse_args(words)
+        return actions[options.action](options, words)
+    except KeyboardInterrupt:
+        print(f"{PROGRAM}: interrupted; what had ended is kept", file=sys.stderr)
+        return 130
+    except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
+        from reference_sim.whole_file import disk_full
+
+        full = disk_full(error)
+        print(f"{PROGRAM}: {full or ' '.join(str(error).split())}", file=sys.stderr)
+        return 1 if full else 2
+
+
+def _build(options: argparse.Namespace, words: Sequence[str]) -> int:
+    from .build_dataset import build
+    from .tasks.task import RunStopped
+
+    try:
+        return _told(build(options, words))
+    except RunStopped as error:  # as of a full disk
+        print(f"{PROGRAM}: {error}; the same command goes on from there", file=sys.stderr)
+        return 1
+
+
+def _told(found: DataSet) -> int:
+    """Its contents in a line, and on standard error what cannot be learned from."""
+    for line in found.sequences:
+        if not line.usable:
+            why = ": ".join(filter(None, (line.status, line.reason)))
+            print(f"{line.name}: left out: {why}", file=sys.stderr)
+    frames = sum(line.frames for line in found.usable)
+    files = [found.folder / name for line in found.sequences for name in line.digests]
+    size = sum(path.stat().st_size for path in files if path.is_file())
+    seconds = sum(line.seconds for line in found.sequences)
+    print(f"{len(found.usable)} of {len(found.sequences)} sequences to learn from, {frames} frames, "
+          f"{size / 1e6:.1f} MB, {seconds:.0f} s of simulation in {found.folder}")  # fmt: skip
+    return 0 if len(found.usable) == len(found.sequences) else 1
+
+
+def _verify(options: argparse.Namespace, words: Sequence[str]) -> int:
+    from snug.dataset import MISSING, DataSet
+
+    from .cache import damaged
+    from .results import RunFolder
+
+    found = DataSet.read(options.folder)
+    folder, wrong = RunFolder(found.folder), 0
+    for line in found.sequences:
+        complaint = MISSING if line.status == MISSING else damaged(folder, line.digests)
+        if complaint:
+            print(f"{line.name}: {complaint}")
+            wrong += 1
+    print(f"{len(found.sequences) - wrong} of {len(found.sequences)} sequences are as they were written")
+    if wrong:
+        print("what is missing or damaged, and nothing else, is made again by:")
+        for command in found.commands:
+            print(f"  {command} -o {shlex.quote(str(options.folder))}")
+    return 1 if wrong else 0
+
+
+def _list(options: argparse.Namespace, words: Sequence[str]) -> int:
+    from snug.dataset import DataSet
+
+    found = DataSet.read(options.folder)
+    for name, value in found.settings.items():
+        print(f"{name}: {value}")
+    width = max((len(line.name) for line in found.sequences), default=0)
+    for line in found.sequences:
+        print(f"{line.name:{width}}  {line.frames:6} frames  {line.seconds:8.1f} s  {line.status}  "
+              f"{line.digests.get(line.trajectory, '-')}  {line.trajectory}")  # fmt: skip
+    _told(found)
+    return 0
+
+
+def _merge(options: argparse.Namespace, words: Sequence[str]) -> int:
+    from .merge_datasets import merge
+
+    return _told(merge([Path(folder) for folder in options.folders], Path(options.out)))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
