@@ -27,7 +27,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.baselines.supervised import matched_targets
+from snug.baselines.supervised import Targets, all_relative, matched_targets
 from snug.motion_perceptron import MotionPerceptron
 from snug.skinning import unposed
 from snug.training_set import Batch, TrainingSet
@@ -45,14 +45,12 @@ class SimulatedPast:
     """
 
     def __init__(
-        self, data: TrainingSet, motions: Sequence[Any], trajectories: Mapping[str, Any] | None
+        self, data: TrainingSet, motions: Sequence[Any], trajectories: Mapping[str, Targets] | None
     ) -> None:
         self.data, dressed = data, data.dressed
         targets = matched_targets(motions, trajectories, dressed.vertices)
-        pelvis = [dressed.pelvis(motion) for motion in motions]
-        rows = [torch.as_tensor(x - p[:, None]).float() for x, p in zip(targets, pelvis)]
-        self.frames = torch.cat(rows).to(data.device)
-        third = [torch.arange(len(x)) >= 2 for x in rows]  # with two before it in its motion
+        self.frames = all_relative(dressed, motions, targets).to(data.device)
+        third = [torch.arange(motion.frames) >= 2 for motion in motions]  # with two before it in its motion
         self.third = torch.cat(third).to(data.device)
         masses = torch.as_tensor(dressed.cloth.masses, dtype=torch.float32, device=data.device)
         self.stiffness = masses[:, None] / data.dt**2  # (V, 1) [N/m]
