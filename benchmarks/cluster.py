@@ -230,7 +230,8 @@ class ClusterExecutor(LocalExecutor):
         """The next task of its batch to a thread, once all files that it needs are there."""
         task = lane.batch[0]
         try:
-            self._send(worker, ASSETS, digest(self._packed), io.BytesIO(self._packed))
+            if ASSETS not in worker.has:
+                self._send(worker, ASSETS, digest(self._packed), io.BytesIO(self._packed))
             for outcome in lane.needed.values():
                 for name, content in outcome.digests.items():
                     self._send(worker, name, content)

@@ -29,7 +29,7 @@ from .timing import one_thread
 
 PIECE = 8 << 20  # bytes of a file at a time
 WATCH = 1.0  # [s] between looks at what nobody wants any more
-IDLE = 600.0  # [s] after which a run that nobody asks about is forgotten
+IDLE = 120.0  # [s] after which a run that nobody asks about is forgotten
 ASSETS = ".assets.pickle"  # beside the files of the run
 SEVERAL = 3  # differences that are named
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from . import provenance
+from . import frame_energies, provenance
 from .cache import Cache
 from .console import remarks, summary
 from .executor import Executor, LocalExecutor
@@ -215,7 +215,7 @@ class RunLog:
         self.folder.write_config(self.config)
 
     def write_rows(self, rows: Sequence[Row]) -> None:
-        """results.csv, and what run.json says of them."""
+        """results.csv, energies of frames, and what run.json says of them."""
         everything = provenance.hardware_line(self.hardware)
         self.rows = [
             dataclasses.replace(row, hardware=everything)
@@ -225,8 +225,10 @@ class RunLog:
         ]
         self.count_look()
         self.folder.write_rows(self.rows)
+        frame_energies.write(self.folder, self.rows)
         self.config |= described(self.plan, self.rows)
-        self.config["digests"] = {self.folder.rows_path.name: digest_of_file(self.folder.rows_path)}
+        written = (self.folder.rows_path, self.folder.frame_energies_path)
+        self.config["digests"] = {path.name: digest_of_file(path) for path in written if path.is_file()}
         self.folder.write_config(self.config)
 
     def count_look(self) -> None:

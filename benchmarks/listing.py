@@ -11,7 +11,7 @@ from .performance.microbenchmark import SUITE
 from .performance.registry import MICROBENCHMARKS
 from .presets import PRESETS, find_preset
 from .scenes import FURTHER, GARMENT_SCENES, SCENES
-from .scenes.further import there_and_back
+from .scenes.further import shapes, there_and_back
 from .selection import default_suites
 from .suites import SUITES
 from .validation.registry import CASES
@@ -45,6 +45,7 @@ def listing() -> str:
                 *((s.name, s.description) for s in SCENES),
                 *dressed,
                 *((s.name, s.description) for s in map(there_and_back, TEST[:1])),
+                *((s.name, s.description) for s in shapes(TEST[0])),
                 *((s.name, s.description) for s in FURTHER),
             ],
         ),

@@ -184,6 +184,11 @@ class RunFolder:
         return self.path / "results.csv"
 
     @property
+    def frame_energies_path(self) -> Path:
+        """See benchmarks.frame_energies."""
+        return self.path / "frame_energies.csv"
+
+    @property
     def report_path(self) -> Path:
         return self.path / "report.pdf"
 

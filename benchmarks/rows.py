@@ -168,8 +168,7 @@ def machines_of(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str,
     """Metric -> where its seconds were measured, of those that other tasks than the cell have taken."""
     if (network := network_of(cell)) is None:
         return {}
-    data = [task.id for task in schedule.ground_truth(network)]
-    training = [schedule.network(network).id]
+    data, training = [task.id for task in schedule.ground_truth(network)], [schedule.network(network).id]
     metrics = {"cost/data": data, "cost/setup": training, "cost/train": training}
     found = {metric: [outcomes[id].origin for id in ids if id in outcomes] for metric, ids in metrics.items()}
     return {

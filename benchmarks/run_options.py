@@ -75,8 +75,8 @@ def make_parser() -> argparse.ArgumentParser:
     add_scene_options(parser)
     add = parser.add_argument
     add("--suite", action="append", default=[], metavar="NAME",
-        help="garments, speed, validation, extremes, performance or all, in full; repeat or separate by "
-        "commas (default: the quick subset of each but performance)")  # fmt: skip
+        help="garments, speed, validation, extremes, shapes, performance or all, in full; repeat or separate "
+        "by commas (default: the quick subset of each but shapes and performance)")  # fmt: skip
     own = "; a file (mine.py) or an entry point of a package means all that it declares"
     add(
         "--scenes", action="append", default=[], metavar="NAME,...", help=f"only these; patterns allowed{own}"

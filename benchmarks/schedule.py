@@ -6,16 +6,12 @@ Loads nothing heavy: a dry run asks for the same tasks as a run.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property
+from collections.abc import Iterator
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
-from snug.recipe import TERMS
-from snug.recipes import TRAININGS
+from snug.recipes import TRAININGS, Simulated
 
-from . import provenance
 from .cache import dependencies
 from .method import MethodEntry
 from .methods import find_method
@@ -23,10 +19,10 @@ from .metric import COMPARED_WITH
 from .metrics import names_of
 from .performance.microbenchmark import Microbenchmark, Settings
 from .plan import Network, Plan, network_of, runs
-from .results import digest_of_file
 from .scene import Scene
 from .scenes import find_scene, of_garment
 from .source import digest, find_module
+from .task_inputs import ASSETS, TaskInputs, declared, modules_behind, modules_of
 from .tasks.case import RunCase
 from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
 from .tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
@@ -37,7 +33,7 @@ from .tasks.training import LONGEST, TrainNetwork
 from .tasks.training_windows import SUITE, CompareWindows
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
-TASKS, ASSETS = "benchmarks.tasks", "benchmarks.assets"
+TASKS = "benchmarks.tasks"
 
 
 def tasks_of(plan: Plan) -> list[Task]:
@@ -52,7 +48,7 @@ class Schedule:
     """Makes the tasks of one plan."""
 
     def __init__(self, plan: Plan) -> None:
-        self.plan, self.preset = plan, plan.preset
+        self.plan, self.preset, self.inputs = plan, plan.preset, TaskInputs(plan)
 
     def tasks(self) -> Iterator[Task]:
         plan = self.plan
@@ -81,7 +77,7 @@ class Schedule:
         needs = (self.start(self._settled_in(scene)).id,) if scene.start_of else ()
         return SettleStart(
             name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.settle_frames,
-            needs=needs, **self._of_scene(scene, f"{TASKS}.ground_truth"),
+            needs=needs, **self.inputs.of_scene(scene, f"{TASKS}.ground_truth"),
         )  # fmt: skip
 
     def ground_truth(self, network: Network) -> list[SimulateMotion | SimulateClips]:
@@ -92,52 +88,47 @@ class Schedule:
         entry, garment = find_method(said.method), network.garment
         motions, held_out = self._learned(network)
         given = [self.data(motion, garment, entry) for motion in (*motions, *held_out)]
-        return [*given, *(self.clips(garment, entry, motions, part) for part in range(said.mixed))]
+        return [*given, *(self.clips(garment, said, motions, part) for part in range(said.mixed))]
 
     def data(self, motion: str, garment: str, entry: MethodEntry) -> SimulateMotion:
         scene = of_garment(garment, self.plan.motions.worn).scene(motion).at(self.preset)
         return SimulateMotion(
             name=f"{flat(scene.name)}/{flat(entry.name)}", label=_beside(scene.name, entry), scene=scene,
             entry=entry, units=self.preset.settle_frames + self.preset.frames,
-            **self._simulated_by(entry, self._of_scene(scene, f"{TASKS}.ground_truth")),
+            **self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}.ground_truth")),
         )  # fmt: skip
 
-    def clips(self, garment: str, entry: MethodEntry, motions: tuple[str, ...], part: int) -> SimulateClips:
-        clips = f"{garment}/mixed-{len(motions)}"
+    def clips(self, garment: str, said: Simulated, motions: tuple[str, ...], part: int) -> SimulateClips:
+        sort, entry = "swinging" if said.swinging else "mixed", find_method(said.method)
+        clips = f"{garment}/{sort}-{len(motions)}"
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
-        of_scene = self._simulated_by(entry, self._of_scene(scene, f"{TASKS}.ground_truth"))
-        mixed = {"part": part, "motions": {name: self._motion(name) for name in motions}}
+        of_scene = self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}.ground_truth"))
+        mixed_of = {name: self.inputs.motion(name) for name in motions}
+        inputs = of_scene["inputs"] | {"part": part, "swinging": said.swinging, "motions": mixed_of}
         return SimulateClips(
             name=f"{flat(clips)}/{flat(entry.name)}-{part}",
-            label=_beside(f"{garment}, clips mixed of {len(motions)} motions, part {part}", entry),
-            scene=scene, entry=entry, motions=motions, clips=clips, part=part,
+            label=_beside(f"{garment}, {sort} clips of {len(motions)} motions, part {part}", entry),
+            scene=scene, entry=entry, motions=motions, clips=clips, part=part, swinging=said.swinging,
             units=len(motions) * self.preset.frames,
-            **of_scene | {"inputs": of_scene["inputs"] | mixed},
+            **of_scene | {"inputs": inputs},
         )  # fmt: skip
-
-    def _simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:
-        """inputs and modules of a task that builds the scene, with those of the method."""
-        return {
-            "inputs": of_scene["inputs"] | {"method": _declared(entry)},
-            "modules": (*of_scene["modules"], *_modules_behind(entry)),
-        }
 
     def network(self, network: Network) -> TrainNetwork:
         chosen, (motions, held_out) = network.training, self._learned(network)
         kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
         steps = self.preset.steps_of(steps_of or network.name, kind)
         steps *= LONGEST if chosen and chosen.converged else 1
-        inputs = self._inputs(self.plan.device) | self._of_body(network.garment) | {
+        inputs = self.inputs.machine(self.plan.device) | self.inputs.of_body(network.garment) | {
             "training": [network.name, chosen],
             "seed": network.seed,
             "steps": steps,
-            "motions": {name: self._motion(name) for name in motions},
-            "held out": {name: self._motion(name) for name in held_out},
+            "motions": {name: self.inputs.motion(name) for name in motions},
+            "held out": {name: self.inputs.motion(name) for name in held_out},
         }  # fmt: skip
         truth = self.ground_truth(network)
         simulated = {task.scene.motion: task.id for task in truth if isinstance(task, SimulateMotion)}
         clips = tuple(task.id for task in truth if isinstance(task, SimulateClips))
-        further = _modules_of(chosen.recipe.terms) if chosen else ()
+        further = modules_of(chosen.recipe.terms) if chosen else ()
         further = (*further, network.declared_in) if network.declared_in else further
         return _keyed(TrainNetwork(
             name=f"{network.garment}/{network.name}-seed{network.seed}", label=network.label,
@@ -167,8 +158,8 @@ class Schedule:
                 )
 
     def cell(self, cell: Cell) -> RunCell:
-        of_scene = self._of_scene(cell.scene, f"{TASKS}.cell", *_modules_behind(cell.entry))
-        inputs = of_scene["inputs"] | {"method": _declared(cell.entry)}
+        of_scene = self.inputs.of_scene(cell.scene, f"{TASKS}.cell", *modules_behind(cell.entry))
+        inputs = of_scene["inputs"] | {"method": declared(cell.entry)}
         if cell.timed:
             inputs["least"] = self._least(cell)
         if cell.entry.seeded:
@@ -201,7 +192,7 @@ class Schedule:
     def quasi_static(self, scene: Scene) -> SimulateQuasiStatic:
         return SimulateQuasiStatic(
             name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.frames,
-            needs=(self.start(scene).id,), **self._of_scene(scene, f"{TASKS}.ground_truth"),
+            needs=(self.start(scene).id,), **self.inputs.of_scene(scene, f"{TASKS}.ground_truth"),
         )  # fmt: skip
 
     def metrics(self, cell: Cell) -> MeasureCell:
@@ -222,7 +213,7 @@ class Schedule:
                 reads = (*reads, ("cell", counterpart.name))
         names = names_of(scene.metrics)
         modules = [f"benchmarks.metrics.{name}" for name in names] + list(plan.metrics)
-        of_scene = self._of_scene(scene, f"{TASKS}.metrics", *modules)
+        of_scene = self.inputs.of_scene(scene, f"{TASKS}.metrics", *modules)
         inputs = {
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,
@@ -260,64 +251,26 @@ class Schedule:
     def case(self, case: Any) -> RunCase:
         return RunCase(
             name=case.name, label=case.name, case=case, deadline=case.seconds,
-            inputs=self._inputs() | {"declared": _declared(case)},
+            inputs=self.inputs.machine() | {"declared": declared(case)},
             modules=(case.module, "benchmarks.validation.case", f"{TASKS}.case"),
         )  # fmt: skip
 
     def microbenchmark(self, benchmark: Microbenchmark) -> RunMicrobenchmark:
         name, method = flat(benchmark.label.replace(" ", "-")), benchmark.method
         chosen = TRAININGS.get(method)
-        inputs: dict[str, Any] = {"declared": _declared(benchmark), "training": chosen}
+        inputs: dict[str, Any] = {"declared": declared(benchmark), "training": chosen}
         settings = Settings(method=method, repeats=benchmark.repeats, chosen=chosen)
         if benchmark.trains:
             steps = self.preset.steps_of(method, method)
             settings = dataclasses.replace(settings, device=self.plan.device, steps=steps)
             inputs["steps"] = steps
         return _keyed(RunMicrobenchmark(
-            name=name, label=benchmark.label, inputs=self._inputs(settings.device) | inputs,
+            name=name, label=benchmark.label, inputs=self.inputs.machine(settings.device) | inputs,
             modules=(benchmark.module, "benchmarks.performance.microbenchmark", f"{TASKS}.microbenchmark"),
             benchmark=benchmark, entry=find_method(method), settings=settings, process=name,
         ))  # fmt: skip
 
-    # --- inputs --------------------------------------------------------------------------------------------
-
-    def _inputs(self, device: str = "cpu") -> dict[str, Any]:
-        """Times of another machine are not reused. device: of what trains; nothing else uses another."""
-        facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
-        names = ("processor", "cores", "python", "accelerator")
-        return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
-
-    @cached_property
-    def _hardware(self) -> dict[str, Any]:
-        return provenance.hardware(self.plan.device)
-
-    def _of_scene(self, scene: Scene, *modules: str) -> dict[str, Any]:
-        """inputs and modules of a task that builds the scene; what is measured in it is no part of it."""
-        said = _declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
-        del said["metrics"], said["counterpart"]
-        inputs = self._inputs() | {"scene": said}
-        modules = (*modules, *_modules_behind(scene))
-        if not scene.dressed:
-            return {"inputs": inputs, "modules": modules}
-        inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
-        if scene.part == "clip":
-            inputs["clip_frames"] = self.preset.clip_frames
-        return {"inputs": inputs, "modules": (*modules, ASSETS)}
-
-    def _of_body(self, garment: str) -> dict[str, Any]:
-        """What the assets are made from."""
-        sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
-        own: dict[str, Any] = {}
-        if self.plan.body:
-            own["body"] = self.plan.body.digest
-        if self.plan.garment and garment == self.plan.garment.file.name:
-            own["own garment"] = self.plan.garment.inputs
-        return {"assets": sizes} | own
-
-    def _motion(self, name: str) -> str:
-        """Of a file its content; an embedded one is made by code, looked at by itself."""
-        files = self.plan.motions.files
-        return f"{name} {digest(files[name])}" if name in files else name
+    # --- what of the plan is asked for several times -----------------------------------------------------
 
     def _learned(self, network: Network) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """The motions that a network trains on, and those that stop its training."""
@@ -335,24 +288,9 @@ class Schedule:
         return any(cell.entry.role == "reference" and runs(cell) for cell in of_scene)
 
 
-def _declared(entry: Any) -> dict[str, Any]:
-    """What a scene, a method or a case declares, but for the words about it; of files their content."""
-    fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
-    kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
-    said = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
-    if isinstance(entry, MethodEntry):
-        said["files"] = {path: digest_of_file(Path(path)) for path in said["files"]}
-    return said
-
-
 def _beside(what: str, entry: MethodEntry) -> str:
     """A label: the reference goes without saying."""
     return what if entry.role == "reference" else f"{what} by {entry.name}"
-
-
-def _modules_behind(entry: Any) -> tuple[str, ...]:
-    """Of a scene or a method: its module, and what declares it where that is outside."""
-    return tuple(dict.fromkeys(filter(None, (entry.module, entry.declared_in))))
 
 
 def _keyed(task: Any) -> Any:
@@ -361,12 +299,3 @@ def _keyed(task: Any) -> Any:
     if isinstance(task, RunMicrobenchmark):
         return dataclasses.replace(task, settings=dataclasses.replace(task.settings, key=key))
     return dataclasses.replace(task, key=key)
-
-
-def _modules_of(terms: Iterable[str]) -> tuple[str, ...]:
-    """Modules of energies that a recipe names beside the usual ones: they are found by name, not imported."""
-    if set(terms) <= set(TERMS):
-        return ()
-    from reference_sim.energies import MODULE_OF
-
-    return tuple(f"reference_sim.energies.{module}" for module in sorted(set(MODULE_OF.values())))

@@ -11,7 +11,7 @@ from .methods.learned import LEARNED, RECIPE_DEVIATIONS
 from .plan import Motions
 from .presets import Preset
 from .scenes import GARMENT_SCENES
-from .scenes.further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
+from .scenes.further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 from .scenes.further import SMALL as SMALL_OUT_OF_DISTRIBUTION
 
 
@@ -78,6 +78,7 @@ OTHER_SOLVERS = (
 )  # fmt: skip
 EXTERNAL = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
 FAST = ("skinning", "snug", "supervised", "pbns")
+OTHER_SPRINGS = ("simulation-springs", "simulation-pbns-springs")
 CHEAP = ("snug+fast-lbfgs-1", "fast-lbfgs-10")  # solvers of some milliseconds, where others are not asked
 
 
@@ -130,6 +131,17 @@ def _out_of_distribution(extent: Extent) -> list[str]:
     return [scene.name for scene in OUT_OF_DISTRIBUTION]
 
 
+# --- body shapes --------------------------------------------------------------------------------------------
+
+SHAPED = "snug-shapes"
+
+
+def _shapes(extent: Extent) -> list[str]:
+    """One motion on other bodies: where the suite or scenes are named, or at paper."""
+    motions = extent.motions.measured[:1] if extent.full or extent.further else ()
+    return [scene.name for motion in motions for scene in shapes(motion, extent.motions.first_garment)]
+
+
 SUITES = (
     Suite(
         name="garments",
@@ -142,7 +154,9 @@ SUITES = (
             *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
             "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
-        named_methods=tuple(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
+        named_methods=(
+            *OTHER_SPRINGS, *(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
+        ),
     ),
     Suite(
         name="speed",
@@ -163,6 +177,7 @@ SUITES = (
         scenes=_dependence,
         methods=lambda extent: ["simulation", "skinning", "newton-1"],
         more_methods=("simulation-printed-bending",),
+        named_methods=OTHER_SPRINGS,
     ),
     Suite(
         name="extremes",
@@ -171,6 +186,14 @@ SUITES = (
         scenes=_out_of_distribution,
         methods=lambda extent: ["simulation", *FAST, *CHEAP],
         more_methods=tuple(entry.name for entry in LEARNED if entry.batched),
+    ),
+    Suite(
+        name="shapes",
+        description="a motion on body shapes that no training has drawn: energies against the shape; only "
+        "where it is named, or at preset paper",
+        scenes=_shapes,
+        methods=lambda extent: ["simulation", "skinning", "snug", SHAPED, "pbns", *CHEAP],
+        more_methods=tuple(entry.name for entry in LEARNED if entry.batched and entry.name != SHAPED),
     ),
     Suite(
         name="performance",

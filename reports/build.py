@@ -1,8 +1,8 @@
 """python -m reports.build RUN_DIR: the tables, figures and PDF of a finished run.
 
-Reads run.json, results.csv, trajectories and histories of trainings in RUN_DIR, and nothing else; writes
-tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same bytes
-twice.
+Reads run.json, results.csv, frame_energies.csv, trajectories and histories of trainings in RUN_DIR, and
+nothing else; writes tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it
+writes the same bytes twice.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 TEMPLATE = Path(__file__).parent / "report.typ"
 # Names of what draw() makes.
 FIGURES = (
-    "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "equal_data.*", "energy_series_*",
-    "error_against_time*", "failures.*", "frames_*", "held_out.*", "hem_*", "histograms.*",
+    "against_shape.*", "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "equal_data.*",
+    "energy_series_*", "error_against_time*", "failures.*", "frames_*", "held_out.*", "hem_*", "histograms.*",
     "known_answers.*", "lead.*", "map_*", "stability_maps.*", "strip_*", "training_*", "training.*",
 )  # fmt: skip
 
@@ -73,9 +73,11 @@ def read_run(folder: RunFolder) -> Run:
     config, rows = folder.read_config(), folder.read_rows()
     if not rows:
         raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
+    from reports.by_frame import read_frames
     from reports.data import run_data
 
-    return run_data(config, rows, folder.changed(config))
+    run = run_data(config, rows, folder.changed(config))
+    return replace(run, frames=read_frames(folder.frame_energies_path))
 
 
 def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: list[str]) -> list[Picture]:
@@ -85,13 +87,14 @@ def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: li
     from reports.convergence import convergence_curve
     from reports.equal_data import error_against_frames, held_out_curves
     from reports.roll_outs import draw_roll_outs
+    from reports.shapes import against_shape
     from reports.stability import stability_maps
     from reports.training import training_curves
     from reports.work_precision import error_against_time
 
     pictures = draw_roll_outs(folder, run, lambda path: read_trajectory(folder, path, problems))
     for make in (
-        error_against_time, break_even, figures.dots, figures.against_vertices,
+        error_against_time, break_even, figures.dots, figures.against_vertices, against_shape,
         figures.known_answers, stability_maps, error_against_frames,
     ):  # fmt: skip
         pictures += make(folder.figures, run)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pandas as pd
@@ -12,7 +12,7 @@ from benchmarks.results import COLUMNS, ROLES, Row, as_right
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
 USABLE = ("ok", "stalled")
-SUITES = ("garments", "speed", "validation", "extremes", "performance")
+SUITES = ("garments", "speed", "validation", "extremes", "shapes", "performance")
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,8 @@ class Run:
 
     frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table` (of
     its metric) and `case` (the check or stress test that it is, else empty). changed: files that are not as
-    the run wrote them.
+    the run wrote them. frames: the lines of benchmarks.frame_energies, without any where there is no such
+    file.
     """
 
     config: Mapping[str, Any]
@@ -58,6 +59,7 @@ class Run:
     metrics: Mapping[str, Metric]
     methods: Mapping[str, Method]
     changed: Sequence[str] = ()
+    frames: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     def suite(self, *names: str) -> pd.DataFrame:
         return self.frame[self.frame["suite"].isin(names)]

@@ -60,6 +60,7 @@ def document(
         "Garments in motion": drawn("frames", "strip", "colours", "failures"),
         "Behind the means": drawn("dots", "histograms"),
         "Dynamics": printed("dynamics") + drawn("hem", "series"),
+        "Body shapes": drawn("shapes") + printed("shapes"),
         "Validation": drawn("known answers") + _failed(run, tables),
         "Stress": drawn("maps") + _not_converged(run, tables),
         "Training": drawn("curves", "convergence") + _performance(run, tables),

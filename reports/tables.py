@@ -22,6 +22,7 @@ from reports.equal_data import equal_data
 from reports.means import means
 from reports.overview import overview
 from reports.pareto import ERRORS, TIME, WHOLE
+from reports.shapes import shapes
 from reports.table import Cell, Column, Table, metric_column, table
 
 BY_SCENE = ("suite", "scene")  # what groups the lines of a table that is not averaged over scenes
@@ -35,7 +36,8 @@ def make_tables(run: Run) -> dict[str, Table]:
     names = list(dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table))
     found = [made for name in names for made in (*by_garment(run, name), *by_scene(run, name))]
     for make in (
-        overview, findings, equal_data, ablations, ablation_effects, crossings, speed, validation, extremes,
+        overview, findings, equal_data, ablations, ablation_effects, crossings, speed, shapes, validation,
+        extremes,
         unfinished, metrics,
     ):  # fmt: skip
         found += make(run)

@@ -68,10 +68,10 @@ def _weight(energy: Any) -> Kernel:
     return run
 
 
-def inertia_kernel(energy: Inertia, ahead: np.ndarray, windows: int, *, detached: bool) -> Kernel:
+def inertia_kernel(energy: Inertia, ahead: np.ndarray, windows: int) -> Kernel:
     """With a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t: E = m / (2 dt^2) |a|^2, zero for the first two frames.
 
-    ahead (C, 3, LANES) [m], of windows that fill whole blocks; detached: no gradient by earlier frames.
+    ahead (C, 3, LANES) [m], of windows that fill whole blocks.
     """
     stiffness = (energy.masses / energy.dt**2).astype(np.float32)[:, None, None]
     one = windows // LANES  # blocks a frame
@@ -86,10 +86,9 @@ def inertia_kernel(energy: Inertia, ahead: np.ndarray, windows: int, *, detached
         a *= force
         values = np.zeros((len(x), LANES), np.float32)
         values[2 * one :] = 0.5 * a.sum((1, 2), dtype=np.float64)
-        if not detached:
-            gradients[: -2 * one] += force
-            force += force
-            gradients[one:-one] -= force
+        gradients[: -2 * one] += force
+        force += force
+        gradients[one:-one] -= force
         return values
 
     return run

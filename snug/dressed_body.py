@@ -14,12 +14,14 @@ import torch
 from torch import Tensor
 
 from reference_sim.material import Material
-from snug.motion_inputs import motion_rates
+from snug.motion_inputs import HISTORY, motion_history
 from snug.recipe import Recipe
 from snug.skeleton import rotation_matrices
 from snug.skinning import skin
 
-FEATURE_SETS = ("motion", "pose", "pose_shape", "rates")
+# Which inputs there are, and the frames before one that they are made from: rates are first and second
+# differences.
+FEATURE_SETS = {"motion": 1, "pose": 0, "pose_shape": 0, "history": HISTORY + 1}
 
 
 class DressedBody:
@@ -98,19 +100,19 @@ class DressedBody:
         still: bool = False,
     ) -> Tensor:
         """Inputs of a network, (T, D) float32: the pose; for `motion` the root velocity and the shape too,
-        for `pose_shape` the shape, for `rates` how root and joints move (snug.motion_inputs).
+        for `pose_shape` the shape, for `history` how root and joints move and moved (snug.motion_inputs).
 
         still: as if each pose were held, whatever came before it.
         """
         if kind not in FEATURE_SETS:
-            raise ValueError(f"unknown features {kind!r}: use one of {FEATURE_SETS}")
+            raise ValueError(f"unknown features {kind!r}: use one of {tuple(FEATURE_SETS)}")
         rotations = rotation_matrices(motion.poses)
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
         if kind == "motion":
             velocity = _root_velocity(motion, rotations[:, 0], recipe.velocity_frame)
             parts.append(velocity * (not still))
-        if kind == "rates":
-            parts.append(motion_rates(motion) * (not still))
+        if kind == "history":
+            parts.append(motion_history(motion) * (not still))
         if kind in ("motion", "pose_shape"):
             shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
             parts.append(np.broadcast_to(shape, (len(motion.poses), len(shape))))

@@ -220,8 +220,13 @@ def run_gru(gru: nn.GRU, x: Tensor, state: Tensor | None) -> tuple[Tensor, Tenso
     return FastGRU.apply(x, state, *weights)
 
 
-def run_linear(layer: nn.Linear, x: Tensor) -> Tensor:
-    """What layer(x) gives, x (..., k); by `product` where no gradient is asked for, in float32 on a CPU."""
+def run_linear(layer: nn.Linear, x: Tensor, *, closed_form: bool = False) -> Tensor:
+    """What layer(x) gives, x (..., k); by `product` where no gradient is asked for, in float32 on a CPU.
+
+    closed_form: x (N, T, k) by FastLinear, where a gradient is.
+    """
+    if closed_form and torch.is_grad_enabled():
+        return FastLinear.apply(x, layer.weight, layer.bias)
     if torch.is_grad_enabled() or x.device.type != "cpu" or x.dtype != torch.float32:
         return layer(x)
     return product(x.flatten(0, -2), layer.weight, layer.bias).view(*x.shape[:-1], -1)

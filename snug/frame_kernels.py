@@ -15,7 +15,8 @@ from numba.extending import overload
 
 from reference_sim.kernel_cache import njit
 
-PRODUCT, ADDED, RECTIFIED, CELL = range(4)  # kinds of operations: y = W x + b, y += that, its positive part
+# Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU).
+PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL = range(5)
 ROWS, COLUMNS = 4, 32  # a matrix has multiples of these: rows at once, and numbers in vector registers
 LANES = 64  # vertices that are skinned together
 FAST = {"reassoc", "contract", "nsz"}  # a number that is not finite stays so
@@ -143,6 +144,8 @@ def _multiply(
                 value += y[j]
             elif kind == RECTIFIED and value < _ZERO:
                 value = _ZERO
+            elif kind == SMOOTH:
+                value *= _sigmoid(value)
             y[j] = value
 
 

@@ -22,10 +22,12 @@ from snug.frame_kernels import (
     PRODUCT,
     RECTIFIED,
     ROWS,
+    SMOOTH,
     run_frame,
     skin_frame,
 )
 
+ACTIVATIONS = {nn.Identity: PRODUCT, nn.ReLU: RECTIFIED, nn.SiLU: SMOOTH}
 PRECISIONS = ("float32", "bf16", "int8")  # in which matrices are stored; all else is float32
 
 
@@ -95,19 +97,15 @@ class FramePlan:
         operations = np.array(self._operations, np.int64)
         return operations, np.concatenate(self._matrices), np.concatenate(self._terms)
 
-    def normalised(self, network: Any, further: int = 0) -> slice:
-        """The features by the network's mean and spread, and a place for `further` numbers behind them.
-
-        It comes first.
-        """
+    def normalised(self, network: Any) -> slice:
+        """The features by the network's mean and spread. It comes first."""
         self._terms += [network.input_mean.numpy(), network.input_std.numpy()]
-        return self._place(len(network.input_mean) + further)
+        return self._place(len(network.input_mean))
 
-    def linear(self, layer: Any, x: slice, *, rectified: bool = False, target: slice | None = None) -> slice:
-        """A torch.nn.Linear of the numbers at x; of it the positive part, if rectified."""
-        target = target or self._place(layer.out_features)
-        kind = RECTIFIED if rectified else PRODUCT
-        self._product(kind, *_numbers_of(layer), x, target.start)
+    def linear(self, layer: Any, x: slice, activation: type[nn.Module] = nn.Identity) -> slice:
+        """A torch.nn.Linear of the numbers at x, and of that one of ACTIVATIONS."""
+        target = self._place(layer.out_features)
+        self._product(ACTIVATIONS[activation], *_numbers_of(layer), x, target.start)
         return target
 
     def gru(self, gru: nn.GRU, x: slice) -> slice:

@@ -5,8 +5,7 @@ For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
     [ sum_t  strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)  +  sum_{t >= 3} inertia(x_t) ] / T
 
 in joules a frame: a frame without two frames before it in the window has no inertia term, so a window of
-three holds three static terms and one inertia. Its gradient reaches all three frames, or, where the recipe is
-`detached`, the last alone.
+three holds three static terms and one inertia, whose gradient reaches all three frames.
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
 kernels (snug.batched_kernels, or those beside the definition) give the same values and gradients in a small
@@ -158,7 +157,7 @@ class PhysicsLoss:
     def __init__(
         self, cloth: Cloth, recipe: Recipe, *, dt: float, device: torch.device = CPU, kernels: bool = True
     ) -> None:
-        self.terms, self.kernels, self.detached = recipe.terms, kernels, recipe.detached
+        self.terms, self.kernels = recipe.terms, kernels
         self.contact = make_contact(cloth, recipe)
         self.inertia = Inertia(cloth, dt)
         self.static = static_terms(cloth, recipe)
@@ -201,13 +200,12 @@ class PhysicsLoss:
         """Those terms that have a kernel in lanes."""
         found: dict[str, Any] = {name: batched_kernel(energy) for name, energy in self.static.items()}
         if "inertia" in self.terms and x.shape[1] >= 3 and len(x) % LANES == 0:
-            found["inertia"] = inertia_kernel(self.inertia, laid(ahead), len(x), detached=self.detached)
+            found["inertia"] = inertia_kernel(self.inertia, laid(ahead), len(x))
         if "collision" in self.terms and callable(planes):
             found["collision"] = planes
         return {name: kernel for name, kernel in found.items() if kernel}
 
     def _inertia(self, x: Tensor, ahead: Tensor) -> Tensor:
-        past = x.detach() if self.detached else x
-        x_hat = 2 * past[:, 1:-1] - past[:, :-2] + ahead[:, 2:, None]
+        x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
         inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
         return torch.nn.functional.pad(inertia, (2, 0))

@@ -3,20 +3,22 @@
 Self-supervision needs no simulation, so a training set is not bound to what was recorded. Fourteen clips show
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
 clip takes the root, the spine, each leg and each arm from six random places of the training clips (mirrored
-half of the time), scales legs and spine, adds to each joint of the trunk a slow turn about a random axis,
-lifts some thighs, and spreads the arms and opens the hips where limbs come too near to the torso. Legs that
-always come as a pair show no lunge; and a network that has met no thigh as high as in a squat lets it through
-the hem. Every part stays continuous in time, so velocities keep their meaning.
+half of the time), scales legs and spine, adds to each joint that carries cloth a slow turn about a random
+axis, lifts some thighs, hangs each arm at a random distance from the torso, and opens the hips where a thigh
+comes too near to it. Legs that always come as a pair show no lunge; a network that has met no thigh as high
+as in a squat lets it through the hem; and people, unlike tables of angles, let their arms hang close to the
+torso and turned in their sockets. Every part stays continuous in time, so velocities keep their meaning.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
-from snug.motion import Motion, arm_clearance, spread_arms
+from snug.motion import Motion, arm_clearance
 from snug.recipe import DEFAULT, Recipe
 from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
 
@@ -29,15 +31,18 @@ PARTS: tuple[tuple[str, ...], ...] = (
     ("right_collar", "right_shoulder", "right_elbow", "right_wrist", "right_hand"),
 )
 SCALE = dict.fromkeys((1, 2, 3), (0.6, 1.3))  # of legs and spine; an arm swung further might enter the torso
-CLEARANCE = 30.0  # degrees between upper arm and spine: nearer, a sleeve is pinched and no shape is good
+# Degrees between upper arm and spine where an arm of a clip comes nearest. The lower end is where recorded
+# arms are spread to (snug.motion.ARMS_CLEAR): nearer, a sleeve is pinched and no shape is good.
+HANGING = (25.0, 50.0)
 # Degrees between thigh and spine: a hip bends by about 120 and no further. At 40, as a squat under the spine
 # of a bow has it, thighs enter the belly, and no hem between them is free.
 LAP = 60.0
 LIFT = 90.0  # degrees, at most: a lifted thigh comes up and goes down again by a random part of it
-# Turn of each joint, relative to the recipe's; the collar bone turns little.
+# Turn of each joint, relative to the recipe's; the collar bone turns little, the shoulder most.
 TURNED = {
     "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,
-    "left_shoulder": 1.2, "right_shoulder": 1.2, "left_collar": 0.4, "right_collar": 0.4,
+    "left_shoulder": 2.0, "right_shoulder": 2.0, "left_collar": 0.4, "right_collar": 0.4, "neck": 1.0,
+    "head": 1.0,
 }  # fmt: skip
 RATE = (0.2, 1.0)  # Hz, of the slow turns and lifts
 FRAMES = 60  # of a mixed clip
@@ -46,6 +51,8 @@ SHARED_SEED = 0  # of clips that are simulated: once, whatever the seed of the t
 MOST_ANCHORS = 2e9  # bytes, of those of mixed frames
 ANCHORS = 24  # bytes of a frame's for each vertex: six samples, four bytes each
 HIPS, SIDEWAYS = (JOINT["left_hip"], JOINT["right_hip"]), np.array([1.0, 0.0, 0.0])
+SHOULDERS, FRONT = (JOINT["left_shoulder"], JOINT["right_shoulder"]), np.array([0.0, 0.0, 1.0])
+SHAPES = 1  # stream of random numbers beside that of the clips
 OPENINGS = 5  # leave less than a degree missing, almost always
 
 
@@ -56,11 +63,33 @@ def mixed_for(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed:
     return mixed_motions(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
 
 
-def shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> list[Motion]:
+def shared_clips(
+    motions: Sequence[Motion], share: int, *, vertices: int, swinging: bool = False
+) -> list[Motion]:
     """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
-    recipe does. Fewer are the first of more.
+    recipe does. Fewer are the first of more. swinging: those of each share as one snug.swinging_motions.
     """
-    return mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    from snug.swinging_motions import swinging_motion
+
+    clips = mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    if not swinging:
+        return clips
+    given = sum(motion.frames for motion in motions)
+    ends = [round(part * given / FRAMES) for part in range(share + 1)]
+    parts = [clips[first:end] for first, end in pairwise(ends)]
+    return [
+        swinging_motion(part, f"swinging_{number}", seed=number) for number, part in enumerate(parts) if part
+    ]
+
+
+def shapes_of_mixed(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:
+    """Shape numbers (count, coefficients) of the bodies of mixed clips, where each has its own: those of the
+    recipe's share from its U(-r, r), the others zero.
+    """
+    random = np.random.default_rng([seed, SHAPES])
+    drawn = recipe.shape_range * random.uniform(-1.0, 1.0, (count, coefficients))
+    drawn[random.random(count) >= recipe.shape_share] = 0.0
+    return drawn
 
 
 def mixed_motions(
@@ -125,7 +154,22 @@ def _mixed(
         forward = rotation_matrices(-0.5 * height * (1 + np.sin(phase)) * SIDEWAYS)
         poses[:, hip] = axis_angles(forward @ rotation_matrices(poses[:, hip]))
     mixed = opened_hips(Motion(name, poses, translations, fps=fps, kind="mixed"))
-    return spread_arms(mixed, max(0.0, CLEARANCE - float(np.rad2deg(arm_clearance(mixed).min()))))
+    return hung_arms(mixed, np.deg2rad(random.uniform(*HANGING, 2)))
+
+
+def hung_arms(motion: Motion, nearest: np.ndarray) -> Motion:
+    """Each shoulder turned about the chest's front axis, by one angle in all frames, until its upper arm
+    comes as near to the downward spine as `nearest` says: (2,) [rad], left and right.
+
+    An arm held forward, which is not square to that axis, is moved less.
+    """
+    poses = motion.poses.copy()
+    outward = (nearest - arm_clearance(motion).min(axis=0)) * [1.0, -1.0]
+    for shoulder, angle in zip(SHOULDERS, outward):
+        poses[:, shoulder] = axis_angles(
+            rotation_matrices(angle * FRONT) @ rotation_matrices(poses[:, shoulder])
+        )
+    return replace(motion, poses=poses)
 
 
 def lap_clearance(motion: Motion) -> np.ndarray:

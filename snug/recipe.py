@@ -1,7 +1,7 @@
 """Recipe: every choice of a training run in one frozen place. The named ones are in snug.recipes.
 
-No recipe holds a balancing weight between the energies: there is none (`pca_dynamics` of `dynamic` weighs
-what a simulation teaches). Imports nothing heavy, so that a command can list recipes without loading torch.
+No recipe holds a balancing weight between the energies: there is none. Imports
+nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
@@ -11,9 +11,6 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 TERMS = ("strain", "bending", "gravity", "inertia", "collision")
-
-
-MOST_COMPONENTS = 1024
 
 
 class RecipeError(ValueError):
@@ -38,13 +35,16 @@ class Recipe:
     h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
     remembered: that noise is added to the state which the network last had after the frame before (see
         snug.hidden_state_cache), instead of to nothing. Not for what learns simulated vertices, nor where
-        `shape_range` gives a sub-sequence another body each time; of little use where `window_stride` is no
+        each window gets a shape of its own (`shape_of`); of little use where `window_stride` is no
         divisor of `window`, for then few frames before a window ever end one.
     window, batch: frames of a sub-sequence, sub-sequences of a step.
     window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
     even: parts of an epoch that each pass over all motions, each taking one sub-sequence of so many: by
         chance alone (1) a hard pose may come so late that the network, by then settled, meets it with joules.
-    shape_range: each sub-sequence gets shape numbers from U(-r, r).
+    shape_range: bodies get shape numbers from U(-r, r). shape_of: who gets them, each `window` in each step
+        anew, as the paper has it, or each mixed `clip` once, while given motions stay on the mean body: what
+        is known of a frame (its posed body, its anchors, the state before it) then stays true. shape_share:
+        of these clips that leave the mean body.
     contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
     contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most one
@@ -58,10 +58,8 @@ class Recipe:
         stiffness and margin of contact).
     bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints them; of
         no account with material `pbns`.
-    detached: previous frames are given to inertia, not moved by it: without it a network makes its past agree
-        with a still present instead of learning to move.
-    pca_dynamics, pca_components, pretraining: weight, number of components and updates, see
-        snug.pca_dynamics; of no account where no simulation teaches.
+    pretraining: updates before those by the energies, for a network that learns from a simulated past, see
+        snug.simulated_past.
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped; what
         else is done about such batches: see snug.divergence_guard.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
@@ -84,6 +82,8 @@ class Recipe:
     window_stride: int = 1
     even: int = 20
     shape_range: float = 0.0
+    shape_of: str = "window"
+    shape_share: float = 1.0
     contact_samples: str = "all"
     contact_stiffness: float | None = None
     contact_margin: float | None = None
@@ -94,10 +94,7 @@ class Recipe:
     terms: tuple[str, ...] = TERMS
     material: str = "stvk"
     bending: str = "length_area"
-    detached: bool = False
-    pca_dynamics: float = 0.0
-    pca_components: int = 16
-    pretraining: int = 300
+    pretraining: int = 0
     spike: float = 2.0
     gradient_limit: float = 1.0
 
@@ -109,6 +106,7 @@ class Recipe:
             ("contact_samples", ("all", "vertices")),
             ("material", ("stvk", "springs", "pbns")),
             ("bending", ("length_area", "none")),
+            ("shape_of", ("window", "clip")),
         ):
             if getattr(self, option) not in allowed:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
@@ -119,16 +117,17 @@ class Recipe:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
-        if not 1 <= self.pca_components <= MOST_COMPONENTS:
-            raise RecipeError(
-                f"recipe option pca_components={self.pca_components}: use 1 to {MOST_COMPONENTS}"
-            )
-        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pca_dynamics", "pretraining")
-        for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", *sizes):
+        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pretraining")
+        for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", "shape_share", *sizes):
             if getattr(self, option) < 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
-        if self.mixed_lift > 1.0:
-            raise RecipeError(f"recipe option mixed_lift={self.mixed_lift}: a share, so at most 1")
+        if self.shape_of == "clip" and self.shape_range and not self.mixed:
+            raise RecipeError(
+                "recipe option shape_of='clip': mixed clips get the shapes, so mixed above zero"
+            )
+        for option in ("mixed_lift", "shape_share"):
+            if getattr(self, option) > 1.0:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)}: a share, so at most 1")
         for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")

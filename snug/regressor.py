@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.fast_network import FastLinear, run_gru, run_linear
+from snug.fast_network import run_gru, run_linear
 
 if TYPE_CHECKING:
     from snug.frame_plan import FramePlan
@@ -27,8 +27,7 @@ class Regressor(nn.Module):
 
     The features are normalised inside, by the mean and spread of the training frames, which are saved with
     the weights: a caller passes plain features and cannot forget it. closed_form: train by
-    snug.fast_network, on a CPU; the state that comes out then has no gradient. further: numbers a frame that
-    the recurrent units see beside the features, in a network that makes them itself.
+    snug.fast_network, on a CPU; the state that comes out then has no gradient.
     """
 
     def __init__(
@@ -36,7 +35,6 @@ class Regressor(nn.Module):
         inputs: int,
         vertices: int,
         *,
-        further: int = 0,
         output_scale: float = 1.0,
         zero_last_layer: bool = False,
         hidden: int = HIDDEN,
@@ -48,7 +46,7 @@ class Regressor(nn.Module):
         self.input_std: Tensor
         self.register_buffer("input_mean", torch.zeros(inputs))
         self.register_buffer("input_std", torch.ones(inputs))
-        self.gru = nn.GRU(inputs + further, hidden, layers, batch_first=True)
+        self.gru = nn.GRU(inputs, hidden, layers, batch_first=True)
         self.offsets = nn.Linear(hidden, 3 * vertices)
         if zero_last_layer:
             nn.init.zeros_(self.offsets.weight)
@@ -60,16 +58,12 @@ class Regressor(nn.Module):
         self.input_std.copy_(torch.as_tensor(std))
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
-        return self.answer((features - self.input_mean) / self.input_std, state)
-
-    def answer(self, normalised: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor]:
-        """What `forward` gives, of what the recurrent units see (N, T, D + further)."""
+        normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
         if self.closed_form and torch.is_grad_enabled():
             hidden, state = run_gru(self.gru, normalised, state)
-            flat = FastLinear.apply(hidden, self.offsets.weight, self.offsets.bias) * self.output_scale
         else:
             hidden, state = self.gru(normalised, state)  # (N, T, 256), (4, N, 256)
-            flat = run_linear(self.offsets, hidden) * self.output_scale  # (N, T, 3V)
+        flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), state
 
     def lay_out(self, plan: FramePlan) -> None:

@@ -15,13 +15,12 @@ import torch
 from torch import Tensor
 
 from reference_sim.trajectory import Trajectory
-from snug.dressed_body import DressedBody
+from snug.dressed_body import FEATURE_SETS, DressedBody
 from snug.frame_plan import CompiledFrame
 from snug.skinning import skin
 from snug.trained_model import TrainedModel, find_kind
 
 WARM_UP = 10  # frames run and thrown away, before whoever times the rest starts a clock
-PAST = 2  # frames before one that its features are made from: accelerations are second differences
 QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
 
 
@@ -188,13 +187,14 @@ def frame_inputs(
     """
     whole = _joined(before, motion)
     first = whole.frames - motion.frames
+    past = 0 if model is None else FEATURE_SETS[find_kind(model.kind).features]
 
     def inputs(frame: int) -> tuple[Tensor | None, Tensor, np.ndarray]:
         now = motion.cut(frame, frame + 1)
         transforms, pelvis = dressed.transforms(now.poses, betas)[0], dressed.pelvis(now, betas)[0]
         if model is None:
             return None, transforms, pelvis
-        recent = whole.cut(max(first + frame - PAST, 0), first + frame + 1)
+        recent = whole.cut(max(first + frame - past, 0), first + frame + 1)
         return _features(model, dressed, recent, betas)[-1], transforms, pelvis
 
     return inputs

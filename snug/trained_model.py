@@ -16,13 +16,12 @@ from snug.baselines.pbns import PoseSpaceDeformation
 from snug.baselines.santesteban2019 import FitAndWrinkles
 from snug.baselines.supervised import VertexTargets
 from snug.baselines.tailornet import BandTargets, FrequencyMixture
-from snug.pca_dynamics import DynamicsSupervision
+from snug.motion_perceptron import MotionPerceptron
 from snug.recipe import Recipe
 from snug.regressor import Regressor, parameter_megabytes
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
-from snug.two_stage_regressor import TwoStageRegressor
 
-FORMAT = "snug-model-7"
+FORMAT = "snug-model-8"
 _TYPES: dict[str, Any] = {
     "kind": str, "recipe": dict, "inputs": int, "vertices": int, "pins": list, "seed": int, "steps": int,
     "seconds": int | float, "setup_seconds": int | float, "history": list, "summary": dict,
@@ -34,15 +33,15 @@ KEPT = ("seed", "steps", "seconds", "setup_seconds", "history", "summary")  # in
 class Kind:
     """A sort of model: its network, the inputs it reads, whether it sees sequences, and what teaches it.
 
-    targets: what simulated vertices become for it; None where the energies teach it. supervision: what a
-    simulation teaches beside the energies.
+    targets: what simulated vertices become for it; None where the energies teach it. past: whether inertia is
+    that of a simulation's previous frames, see snug.simulated_past.
     """
 
     network: type[nn.Module]
     features: str
     sequences: bool
     targets: type[VertexTargets] | None = None
-    supervision: type[DynamicsSupervision] | None = None
+    past: bool = False
 
     @property
     def physics(self) -> bool:
@@ -51,7 +50,7 @@ class Kind:
 
 KINDS = {
     "snug": Kind(Regressor, "motion", sequences=True),
-    "dynamic": Kind(TwoStageRegressor, "rates", sequences=True, supervision=DynamicsSupervision),
+    "dynamic": Kind(MotionPerceptron, "history", sequences=False, past=True),
     "supervised": Kind(Regressor, "motion", sequences=True, targets=VertexTargets),
     "pbns": Kind(PoseSpaceDeformation, "pose", sequences=False),
     "santesteban2019": Kind(FitAndWrinkles, "pose_shape", sequences=True, targets=VertexTargets),
@@ -181,8 +180,6 @@ def make_network(
     """
     how = find_kind(kind)
     options: dict[str, Any] = {"output_scale": recipe.output_scale, "zero_last_layer": recipe.zero_last_layer}
-    if how.supervision:
-        options["components"] = recipe.pca_components
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         network: Any = how.network(inputs, vertices, **options)

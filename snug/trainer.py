@@ -21,11 +21,12 @@ from snug.dressed_body import DressedBody
 from snug.fast_skinning import FastSkin
 from snug.hidden_state_cache import HiddenStateCache
 from snug.loss import PhysicsLoss
-from snug.motion_augmentation import mixed_for
+from snug.motion_augmentation import mixed_for, shapes_of_mixed
+from snug.motion_perceptron import MotionPerceptron
 from snug.parallel import ALONE, Group, GroupError
-from snug.pca_dynamics import DynamicsSupervision
 from snug.recipe import Recipe
 from snug.regressor import Regressor
+from snug.simulated_past import SimulatedPast
 from snug.skinning import skin
 from snug.stopwatch import Stopwatch
 from snug.trained_model import find_kind, make_network
@@ -66,9 +67,17 @@ class Trainer:
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
         mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
+        drawn = recipe.shape_range and dressed.body.shape_count and how.features == "motion" and how.physics
+        self.shaped = bool(drawn) and recipe.shape_of == "window"
+        shapes = None
+        if drawn and recipe.shape_of == "clip":
+            mean = np.zeros((len(motions), dressed.body.shape_count))
+            of_mixed = shapes_of_mixed(len(mixed), dressed.body.shape_count, recipe, seed=seed)
+            shapes = np.concatenate([mean, of_mixed])
         self.data = TrainingSet(
-            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences, device=device
-        )
+            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences,
+            device=device, shapes=shapes,
+        )  # fmt: skip
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
         pins = dressed.garment.pins
         network = make_network(
@@ -76,23 +85,20 @@ class Trainer:
         )
         network.normalise_by(*self.data.input_statistics())
         self.network = network.to(device)
-        if isinstance(network, Regressor):
+        if isinstance(network, Regressor | MotionPerceptron):
             network.closed_form = self.kernels
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay, fused=True
         )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
-        self.shaped = (
-            bool(recipe.shape_range and dressed.body.shape_count) and how.features == "motion" and how.physics
-        )
         self.windows = recipe.batch if how.sequences else recipe.batch * recipe.window
         self.order = np.empty(0, np.int64)
         self.epoch = 0
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
         self.targets: VertexTargets | None = None
-        self.supervision: DynamicsSupervision | None = None
+        self.past: SimulatedPast | None = None
         self.pretraining_seconds = 0.0  # s
         self._set_up_supervision(motions, trajectories)
         self.hidden_states = self._hidden_state_cache()
@@ -100,7 +106,7 @@ class Trainer:
         self._callable = group.wrapped(self.network)
 
     def _set_up_supervision(self, motions: Sequence[Any], trajectories: Mapping[str, Targets] | None) -> None:
-        """By simulated vertices, or by the energies, and then perhaps by simulated dynamics too."""
+        """By simulated vertices, or by the energies, and then perhaps about a simulated past."""
         how, recipe, data = self.how, self.recipe, self.data
         if how.targets:
             if self.group.size > 1:
@@ -116,13 +122,12 @@ class Trainer:
         self.contact = self.contact_of(data)
         if self.contact:
             self.contact.search_first(self.weights)
-        if how.supervision:
-            self.supervision = how.supervision(data, motions, trajectories, self.weights, recipe)
-            begun = time.perf_counter()
-            self.supervision.pretrain(
-                self.network, steps=recipe.pretraining, sigma=recipe.h0_sigma, seed=self.seed
-            )
-            self.pretraining_seconds = time.perf_counter() - begun
+        if how.past and "inertia" in recipe.terms:
+            self.past = SimulatedPast(data, motions, trajectories)
+            if recipe.pretraining:
+                begun = time.perf_counter()
+                self.past.pretrain(self.network, self.weights, steps=recipe.pretraining, seed=self.seed)
+                self.pretraining_seconds = time.perf_counter() - begun
 
     def _hidden_state_cache(self) -> HiddenStateCache | None:
         start = self.network.random_state(1, 0.0, torch.Generator())
@@ -139,7 +144,7 @@ class Trainer:
             data,
             self.loss.contact,
             refresh=self.recipe.contact_refresh,
-            one_shape=not self.shaped,
+            kept=not self.shaped,
             kernels=self.kernels,
             group=self.group if data is self.data else ALONE,
         )
@@ -185,7 +190,7 @@ class Trainer:
     ) -> dict[str, float]:
         """windows (N,), frames (N, T): of all processes; batch: of this one."""
         assert self.loss is not None
-        x, offsets, after = self.predict(batch, state)
+        x, after = self.predict(batch, state)
         planes = posed = None
         if self.contact:
             with self.clock.part("contact"):
@@ -195,8 +200,8 @@ class Trainer:
             terms = self.loss(x, batch.ahead, planes)
             if self.contact and posed and self._searched_for_high(number, frames, posed, x, terms):
                 terms = self.loss(x, batch.ahead, self.contact.planes(batch, posed))
-            if self.supervision:
-                terms["pca_dynamics"] = self.supervision.energy(offsets, batch)
+            if self.past:
+                terms |= self.past.terms(x, batch)
         means, trusted = self._update(number, windows, terms)
         if trusted and self.hidden_states:
             self.hidden_states.keep(batch.frames[:, -1], after, self.group)
@@ -239,16 +244,14 @@ class Trainer:
         state = state[:, mine].contiguous()  # as cuDNN wants it
         return state + self.hidden_states.at(batch.frames[:, 0]) if self.hidden_states else state
 
-    def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Tensor, Any]:
-        """Vertices relative to the pelvis and offsets of the unposed garment, both (N, T, V, 3) [m], and the
-        state after them.
-        """
+    def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Any]:
+        """Vertices relative to the pelvis (N, T, V, 3) [m], and the state after them."""
         with self.clock.part("forward"):
             offsets, after = self._callable(batch.features, state)
         with self.clock.part("skinning"):
             # Offsets first: the sum then lies in memory as they do.
             posed_by = FastSkin.apply if self.kernels else skin
-            return posed_by(offsets + batch.rest, self.weights, batch.transforms), offsets, after
+            return posed_by(offsets + batch.rest, self.weights, batch.transforms), after
 
     def _set_rate(self, number: int) -> None:
         recipe, share = self.recipe, 1.0
@@ -296,8 +299,6 @@ class Trainer:
         tensors["order"], tensors["noise"] = torch.as_tensor(self.order.copy()), self.noise.get_state()
         if self.hidden_states:
             tensors["hidden_states"] = self.hidden_states.states
-        if self.supervision:
-            tensors |= {f"supervision.{key}": tensor for key, tensor in self.supervision.state().items()}
         facts: dict[str, Any] = {"epoch": self.epoch, "random": self.random.bit_generator.state}
         for name, part in (("guard", self.guard), ("contact", self.contact)):
             if part is not None:
@@ -317,8 +318,6 @@ class Trainer:
         self.network.load_state_dict(part_of(tensors, "network"))
         if self.hidden_states:
             self.hidden_states.states.copy_(tensors["hidden_states"])
-        if self.supervision:
-            self.supervision.resume(part_of(tensors, "supervision"))
         self.guard.resume(part_of(tensors, "guard"), facts["guard"])
         if self.contact is not None:
             self.contact.resume(part_of(tensors, "contact"), facts["contact"])

@@ -8,6 +8,7 @@ claims a contact that is none, or misses a thigh that stands in the hem.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -38,8 +39,8 @@ MARKED = 25  # every so many vertices of the patch there is a mark
 class TrainingContact:
     """Anchors of all training frames. With `kernels` in numpy and numba, else in torch on the set's device.
 
-    refresh: see Recipe.contact_refresh. one_shape: all on the mean body; the kernels then pose it once for
-    all frames. A group shares the work, and every process of it keeps all anchors.
+    refresh: see Recipe.contact_refresh. kept: whether each frame has one body for good; the kernels then pose
+    them all once. A group shares the work, and every process of it keeps all anchors.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class TrainingContact:
         contact: ContactPenalty,
         *,
         refresh: float,
-        one_shape: bool,
+        kept: bool,
         kernels: bool = True,
         group: Group = ALONE,
     ) -> None:
@@ -72,9 +73,7 @@ class TrainingContact:
             self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
-        self._mean_shape: tuple[np.ndarray, np.ndarray] | None = None
-        if one_shape and kernels:
-            self._mean_shape = self._posed_everywhere()
+        self._kept = self._posed_everywhere() if kept and kernels else None
         self._changed = np.zeros(frames, bool)
         self._before: tuple[Any, ...] | None = None
         self._credit = 0.0
@@ -89,34 +88,48 @@ class TrainingContact:
         return skin(rest, self.weights[::every].to(rest.device), transforms)
 
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
-        """Patch positions and normals (F, P, 3) of every frame: one body shape, computed once."""
-        corners = torch.cat([self.template, torch.ones(len(self.template), 1)], 1)  # (P, 4)
-        # sum_j w_pj T_j (p, 1) as a matrix product over (j, 4), of many frames at once: several times faster
-        # than blending first, and ten times faster than frame by frame.
-        spread = (self.weights[:, :, None] * corners[:, None]).flatten(1)  # (P, 96)
+        """Patch positions and normals (F, P, 3) of every frame, computed once."""
         positions = np.empty((self.data.frames, *self.template.shape), np.float32)
-        for start in range(0, self.data.frames, TOGETHER):
-            transforms = self.data.transforms[start : start + TOGETHER]  # (C, 24, 3, 4)
-            if self.correctives is not None:
-                positions[start : start + TOGETHER] = self._skinned(self.template, transforms).numpy()
-                continue
-            columns = transforms.permute(1, 3, 0, 2).reshape(spread.shape[1], -1)  # (96, 3 C)
-            posed = (spread @ columns).view(len(spread), len(transforms), 3)
-            positions[start : start + TOGETHER] = posed.transpose(0, 1).numpy()
+        for rest, frames in self._worn():
+            corners = torch.cat([rest, torch.ones(len(rest), 1)], 1)  # (P, 4)
+            # sum_j w_pj T_j (p, 1) as a matrix product over (j, 4), of many frames at once: several times
+            # faster than blending first, and ten times faster than frame by frame.
+            spread = (self.weights[:, :, None] * corners[:, None]).flatten(1)  # (P, 96)
+            for start in range(frames.start, frames.stop, TOGETHER):
+                some = slice(start, min(start + TOGETHER, frames.stop))
+                transforms = self.data.transforms[some]  # (C, 24, 3, 4)
+                if self.correctives is not None:
+                    positions[some] = self._skinned(rest, transforms).numpy()
+                    continue
+                columns = transforms.permute(1, 3, 0, 2).reshape(spread.shape[1], -1)  # (96, 3 C)
+                posed = (spread @ columns).view(len(spread), len(transforms), 3)
+                positions[some] = posed.transpose(0, 1).numpy()
         return positions, self.patch.normals(positions)
+
+    def _worn(self) -> Iterator[tuple[Tensor, slice]]:
+        """Unposed patches (P, 3) and the frames of each: motion by motion, or one of all frames."""
+        shapes, first = self.data.shapes, self.data.first
+        if shapes is None:
+            yield self.template, slice(0, self.data.frames)
+            return
+        for betas, start, stop in zip(shapes, first[:-1], first[1:]):
+            moved = self.directions @ torch.as_tensor(betas).to(self.directions)
+            yield self.template + moved, slice(int(start), int(stop))
 
     @cached_property
     def _marks(self) -> np.ndarray:
-        """Some vertices of the patch in every frame, on the mean body: (F, M, 3) [m]; to propagate by."""
+        """Some vertices of the patch in every frame: (F, M, 3) [m]; to propagate by."""
         # On the CPU whatever the device, so that processes that share a run propagate alike.
-        rest = self.template.cpu()
-        parts = self.data.transforms.split(TOGETHER)
-        return np.concatenate([self._skinned(rest, part.cpu(), MARKED).numpy() for part in parts])
+        return np.concatenate([
+            self._skinned(rest.cpu(), part.cpu(), MARKED).numpy()
+            for rest, frames in self._worn()
+            for part in self.data.transforms[frames].split(TOGETHER)
+        ])  # fmt: skip
 
     def posed(self, batch: Batch) -> Posed:
         """The body where the frames of a batch have it."""
-        if self._mean_shape is not None:
-            return batch.frames.ravel(), *self._mean_shape
+        if self._kept is not None:
+            return batch.frames.ravel(), *self._kept
         rest = self.template
         if batch.betas is not None:
             rest = (rest + torch.einsum("vis,ns->nvi", self.directions, batch.betas))[:, None]
@@ -159,10 +172,8 @@ class TrainingContact:
         data, frame, done = self.data, 0, 0
         while done < data.frames:
             last, frame = frame, self._near(done, FIRST_PROPAGATED, FIRST_NEAR).stop - 1
-            place = torch.as_tensor([[frame]], device=data.device)
-            tensors = (data.features[place], data.rest, data.transforms[place], data.ahead[place])
-            batch = Batch(np.array([[frame]]), *tensors)
-            x = skin(data.rest, weights, batch.transforms)
+            batch = data.at(np.array([[frame]]))
+            x = skin(batch.rest, weights, batch.transforms)
             rows, positions, _ = self.posed(batch)
             self.cache.faces[frame] = self.cache.faces[last]  # a good place to begin
             self.cache.requery(frame, self._samples(x[0, 0]), positions[rows[0]])
@@ -194,7 +205,7 @@ class TrainingContact:
         `near` [m].
         """
         first = self.data.first
-        motion = int(np.searchsorted(first, frame, side="right")) - 1
+        motion = int(self.data.motion_of(frame))
         start, stop = max(frame - reach, int(first[motion])), min(frame + reach + 1, int(first[motion + 1]))
         moved = np.linalg.norm(self._marks[start:stop] - self._marks[frame], axis=2).max(axis=1)
         far = (start + np.flatnonzero(moved > near)).tolist()

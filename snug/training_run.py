@@ -172,14 +172,11 @@ class TrainingRun:
         """What must be the same for a run to be the same run."""
         trainer, digest = self.trainer, hashlib.sha256()
         taught = trainer.targets.fingerprint() if trainer.targets else _bytes(trainer.data.ahead)
-        # Coordinates that were predicted are round-off's too, and in the checkpoint.
-        features = trainer.data.features[:, : len(trainer.network.input_mean)]
-        weights = trainer.dressed.weights(trainer.recipe.smoothing)
-        for part in (_bytes(features), _bytes(trainer.data.rest), taught, _bytes(weights)):
+        past = [_bytes(trainer.past.frames)] if trainer.past else []
+        data, weights = trainer.data, trainer.dressed.weights(trainer.recipe.smoothing)
+        for part in (_bytes(data.features), _bytes(data.rest), taught, _bytes(weights), *past):
             digest.update(part)
         digest.update(trainer.dressed.cloth.Dm_inverse.tobytes())
-        if trainer.supervision:
-            digest.update(np.round(trainer.supervision.mean.cpu().numpy(), 4).tobytes())
         return {
             "kind": trainer.kind,
             "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},

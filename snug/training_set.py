@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,9 @@ from snug.dressed_body import DressedBody
 from snug.recipe import Recipe
 from snug.skinning import joint_transforms
 
-STD_FLOOR = 0.05  # an input that hardly moved in training must not explode on a motion where it does
+# Spread below which an input's is not taken for a scale: rotations are numbers up to 1 in size, and one that
+# hardly moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
+STD_FLOOR = 0.2
 CONSTANT = 1e-5  # spread below which an input did not move at all, but for rounding
 
 
@@ -32,7 +34,7 @@ class Batch:
     rest: Tensor  # (N, 1, V, 3) or (V, 3) [m], the unposed garment
     transforms: Tensor  # (N, T, 24, 3, 4)
     ahead: Tensor  # (N, T, 3) [m]
-    betas: Tensor | None = None  # (N, 10) shape numbers, None on the mean body
+    betas: Tensor | None = None  # (N, S) shape numbers, None on the mean body
 
 
 class TrainingSet:
@@ -50,9 +52,10 @@ class TrainingSet:
         features: str,
         sequences: bool,
         device: torch.device = CPU,
+        shapes: np.ndarray | None = None,
     ) -> None:
         """features: see DressedBody.features; sequences: False for a static network, whose frames need no
-        past.
+        past. shapes: (M, S) shape numbers, one row for each motion; None: all on the mean body.
         """
         rates = {float(motion.fps) for motion in motions}
         if len(rates) != 1:
@@ -64,11 +67,14 @@ class TrainingSet:
         self._ends_in_shape = features in ("motion", "pose_shape")
         self.names = [motion.name for motion in motions]
         self.first = np.cumsum([0, *(len(motion.poses) for motion in motions)])
-        self.features = torch.cat([dressed.features(m, recipe, kind=features) for m in motions]).to(device)
-        self.transforms = torch.cat([dressed.transforms(m.poses) for m in motions]).to(device)
+        self.shapes = shapes
+        worn = list(zip(motions, [None] * len(motions) if shapes is None else shapes))
+        inputs = [dressed.features(motion, recipe, betas, kind=features) for motion, betas in worn]
+        self.features = torch.cat(inputs).to(device)
+        self.transforms = torch.cat([dressed.transforms(m.poses, betas) for m, betas in worn]).to(device)
         self.ahead = torch.cat([_ahead(dressed.pelvis(m)) for m in motions]).to(device)
         self.rest = dressed.rest().to(device)
-        self._shapes: _Shapes | None = None
+        self._rest_directions: Tensor | None = None
         self.window = recipe.window if sequences else 1
         self.starts = np.concatenate(
             [
@@ -83,9 +89,13 @@ class TrainingSet:
     def frames(self) -> int:
         return int(self.first[-1])
 
+    def motion_of(self, frames: Any) -> Any:
+        """Places of the motions that row numbers belong to."""
+        return np.searchsorted(self.first, frames, side="right") - 1
+
     def where(self, frame: int) -> str:
         """A row number in words a user can look up."""
-        motion = int(np.searchsorted(self.first, frame, side="right")) - 1
+        motion = int(self.motion_of(frame))
         return f"motion {self.names[motion]!r} frame {frame - self.first[motion]}"
 
     def input_statistics(self) -> tuple[np.ndarray, np.ndarray]:
@@ -102,47 +112,50 @@ class TrainingSet:
             mean[-shapes:], std[-shapes:] = 0.0, self.recipe.shape_range / np.sqrt(3.0)
         return mean, std
 
-    def batch(self, windows: np.ndarray, betas: np.ndarray | None) -> Batch:
-        """Windows (N,) as tensors, each on a body of its own shape, betas (N, 10), or all on the mean
-        body.
-        """
-        frames = self.starts[windows][:, None] + np.arange(self.window)
+    def at(self, frames: np.ndarray) -> Batch:
+        """Rows (N, T), those of a line from one motion, as tensors; each motion on its own body."""
         rows = torch.as_tensor(frames, device=self.device)
-        features, transforms = self.features[rows], self.transforms[rows]
+        batch = Batch(frames, self.features[rows], self.rest, self.transforms[rows], self.ahead[rows])
+        if self.shapes is None:
+            return batch
+        return self._dressed(batch, self.shapes[self.motion_of(frames[:, 0])])
+
+    def batch(self, windows: np.ndarray, betas: np.ndarray | None = None) -> Batch:
+        """Windows (N,) as tensors, each on the body of its motion, or of a shape of its own, betas (N, S)."""
+        batch = self.at(self.starts[windows][:, None] + np.arange(self.window))
         if betas is None:
-            return Batch(frames, features, self.rest, transforms, self.ahead[rows])
-        self._shapes = self._shapes or _Shapes(self.dressed, self.device)
+            return batch
+        reposed = _reposed(self.dressed, batch.transforms, torch.as_tensor(betas, device=self.device))
+        batch = self._dressed(replace(batch, transforms=reposed), betas)
+        assert batch.betas is not None
+        repeated = batch.betas[:, None].expand(-1, self.window, -1)
+        inputs = torch.cat([batch.features[..., : -betas.shape[1]], repeated], -1)
+        return replace(batch, features=inputs)
+
+    def _dressed(self, batch: Batch, betas: np.ndarray) -> Batch:
+        """With the unposed garments of shapes (N, S)."""
         shapes = torch.as_tensor(betas, dtype=torch.float32, device=self.device)
-        repeated = shapes[:, None].expand(-1, self.window, -1)
-        features = torch.cat([features[..., : -shapes.shape[1]], repeated], -1)
-        rest = (self.rest + torch.einsum("ns,svi->nvi", shapes, self._shapes.rest_directions))[:, None]
-        transforms = self._shapes.reposed(transforms, torch.as_tensor(betas, device=self.device))
-        return Batch(frames, features, rest, transforms, self.ahead[rows], shapes)
+        if self._rest_directions is None:
+            self._rest_directions = self.dressed.rest_directions().to(self.device)
+        rest = self.rest + torch.einsum("ns,svi->nvi", shapes, self._rest_directions)
+        return replace(batch, rest=rest[:, None], betas=shapes)
 
 
-class _Shapes:
-    """What turns poses of the mean body into those of other bodies."""
+def _reposed(dressed: DressedBody, transforms: Tensor, betas: Tensor) -> Tensor:
+    """The same poses on other skeletons: rotations are read back from the transforms of the mean body.
 
-    def __init__(self, dressed: DressedBody, device: torch.device) -> None:
-        self.rest_directions = dressed.rest_directions().to(device)  # (10, V, 3)
-        body = dressed.body
-        self.joints = torch.as_tensor(body.joint_template, device=device)  # float64 until the chain is done
-        self.joint_directions = torch.as_tensor(body.joint_directions, device=device)  # (24, 3, 10)
-        self.parents = dressed.parents
-        self.above = torch.tensor([max(parent, 0) for parent in dressed.parents], device=device)
-
-    def reposed(self, transforms: Tensor, betas: Tensor) -> Tensor:
-        """The same poses on other skeletons: rotations are read back from the transforms of the mean body.
-
-        transforms (N, T, 24, 3, 4) float32, betas (N, 10) float64.
-        """
-        joints = (self.joints + torch.einsum("jis,ns->nji", self.joint_directions, betas))[:, None]
-        world = transforms[..., :3].double()
-        relative = world[:, :, self.above].transpose(-1, -2) @ world
-        relative[:, :, 0] = world[:, :, 0]
-        home = (-joints[..., 0, :]).expand(*transforms.shape[:2], 3)
-        joints = joints.expand(*transforms.shape[:2], *joints.shape[-2:])
-        return joint_transforms(relative, joints, self.parents, home).float()
+    transforms (N, T, 24, 3, 4) float32, betas (N, 10) float64.
+    """
+    body, device = dressed.body, betas.device
+    template = torch.as_tensor(body.joint_template, device=device)  # float64 until the chain is done
+    directions = torch.as_tensor(body.joint_directions, device=device)  # (24, 3, 10)
+    joints = (template + torch.einsum("jis,ns->nji", directions, betas))[:, None]
+    world = transforms[..., :3].double()
+    relative = world[:, :, [max(parent, 0) for parent in dressed.parents]].transpose(-1, -2) @ world
+    relative[:, :, 0] = world[:, :, 0]
+    home = (-joints[..., 0, :]).expand(*transforms.shape[:2], 3)
+    joints = joints.expand(*transforms.shape[:2], *joints.shape[-2:])
+    return joint_transforms(relative, joints, dressed.parents, home).float()
 
 
 def _ahead(pelvis: np.ndarray) -> Tensor:

@@ -69,9 +69,7 @@ class Validator:
         for first, end in zip(self.data.first[:-1], self.data.first[1:]):
             # One long window, or, for a static network, windows of one frame: it has no inertia.
             rows = np.arange(first, end).reshape((1, -1) if self.trainer.how.sequences else (-1, 1))
-            data = self.data
-            batch = Batch(rows, data.features[rows], data.rest, data.transforms[rows], data.ahead[rows])
-            total += float(torch.stack(list(self._terms(batch).values())).sum())
+            total += float(torch.stack(list(self._terms(self.data.at(rows)).values())).sum())
         return self.trainer.group.agreed(total / self.data.frames)
 
     def _terms(self, batch: Batch) -> dict[str, Tensor]:

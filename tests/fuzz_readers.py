@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from cmu_clips import amc_frame, cmu_like
 from motion_forms import bvh
-from report_folder import all_rows, declaration
+from report_folder import SCENES, all_rows, declaration
 
 from benchmarks.json_file import ResultsError
 from benchmarks.results import RunFolder
@@ -157,6 +157,11 @@ def results_csv() -> bytes:
     return Path("results.csv").read_bytes()
 
 
+def frame_energies_csv() -> bytes:
+    lines = [f"{SCENES[0]},{m},0,{k / 10},{k + 1}e-3,.5" for m in ("snug", "pbns") for k in range(4)]
+    return "\n".join(["scene,method,seed,seconds,strain,total", *lines, ""]).encode()
+
+
 def run_json() -> bytes:
     said = {"preset": "smoke", "stages": [{"name": "cells", "seconds": 1.0}], "earlier": []}
     RunFolder(".").write_config(declaration(all_rows(), **said, started="2030-01-02T03:04:05+00:00"))
@@ -197,8 +202,8 @@ def read_header(path: Path) -> None:
     TrainedModel.load(path.with_suffix(".safetensors"))
 
 
-def read_rows(path: Path) -> None:
-    """results.csv, or run.json, beside a whole one of the other; up to the tables of the report."""
+def read_rows(path: Path, name: str = "results.csv") -> None:
+    """That file of a run beside whole other ones; up to the tables of the report."""
     from reports.build import read_run
     from reports.document import document
     from reports.tables import make_tables
@@ -206,10 +211,17 @@ def read_rows(path: Path) -> None:
     folder = RunFolder(path.parent / "run")
     folder.write_rows(all_rows())
     folder.config_path.write_bytes(Path("run.json").read_bytes())
-    place = folder.rows_path if path.suffix == ".csv" else folder.config_path
-    place.write_bytes(path.read_bytes())
+    (folder.path / name).write_bytes(path.read_bytes())
     run = read_run(folder)
     json.dumps(document(run, make_tables(run), [], []), allow_nan=False)
+
+
+def read_config(path: Path) -> None:
+    read_rows(path, "run.json")
+
+
+def read_frames(path: Path) -> None:
+    read_rows(path, "frame_energies.csv")
 
 
 # --- mutations ---------------------------------------------------------------------------------------------
@@ -294,8 +306,9 @@ READERS: tuple[Reader, ...] = (
            (ModelFileError,), bytes_of),
     Reader("model's header", ".json", model_header, read_header, (ModelFileError,), values_of),
     Reader("results.csv", ".csv", results_csv, read_rows, (ResultsError,), bytes_of),
-    Reader("run.json", ".json", run_json, read_rows, (ResultsError,), bytes_of),
-    Reader("values of run.json", ".json", run_json, read_rows, (ResultsError,), values_of),
+    Reader("frame_energies.csv", ".csv", frame_energies_csv, read_frames, (ResultsError,), bytes_of),
+    Reader("run.json", ".json", run_json, read_config, (ResultsError,), bytes_of),
+    Reader("values of run.json", ".json", run_json, read_config, (ResultsError,), values_of),
 )  # fmt: skip
 
 

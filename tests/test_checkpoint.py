@@ -62,7 +62,7 @@ def asked_after(steps):
         ("snug", replace(DEFAULT, mixed=2.0)),
         ("snug", PAPER),
         ("pbns", PLAIN),
-        ("dynamic", replace(DYNAMIC, pca_components=6, pretraining=3)),
+        ("dynamic", replace(DYNAMIC, pretraining=3)),
         ("supervised", SUPERVISED),
         ("santesteban2019", SANTESTEBAN2019),
         ("tailornet", TAILORNET),

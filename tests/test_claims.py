@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 from report_folder import SCENES, row, run_of
 
+from benchmarks.methods import METHODS
+from reports.by_frame import share_of_frames, with_shares
 from reports.claims import BEFORE, CLAIMS, counts, findings, judged, with_before
 from reports.layout import table_blocks
 from reports.paper import PRINTED
 from reports.tables import make_tables
-from snug.recipes import TRAININGS
 
 
 def told(rows):
@@ -27,7 +31,7 @@ def seeds(method, values, metric="energy/strain", scene="tshirt/kick", **more):
 
 
 def test_every_method_of_a_claim_is_one_that_can_be_run():
-    known = {*TRAININGS, "simulation"}
+    known = {entry.name for entry in METHODS}
     assert {name for claim in CLAIMS for name in (claim.lower, claim.higher)} <= known
     assert len({(claim.metric, claim.lower, claim.higher) for claim in CLAIMS}) == len(CLAIMS)
 
@@ -183,3 +187,42 @@ def test_the_papers_numbers_stand_below_its_own_columns():
     assert dict(made["energies"].references) == PRINTED["energies"]
     assert made["energies"].references[1][1]["energy/strain"] == "0.064"
     assert dict(made["curvature"].references) == PRINTED["curvature"]
+
+
+def frame_table(**methods):
+    """Lines of frame_energies.csv: method -> strain of the frames of seeds 0 and 1 of one scene."""
+    lines = [
+        ("tshirt/kick", method, seed, 0.1 * frame, strain)
+        for method, of_seeds in methods.items()
+        for seed, strains in enumerate(of_seeds)
+        for frame, strain in enumerate(strains)
+    ]
+    return pd.DataFrame(lines, columns=["scene", "method", "seed", "seconds", "strain"])
+
+
+def test_the_share_of_frames_with_more_energy_is_counted_scene_by_scene_and_seed_by_seed():
+    rows = seeds("snug", (1.0, 1.0)) + seeds("pbns", (1.0, 1.0)) + seeds("supervised", (1.0, 1.0))
+    run = run_of(rows)
+    frames = frame_table(
+        snug=[[1, 1, 9, 3], [1, 1, 1]], pbns=[[2, 2, 2, 3, 5], [2, 2, np.nan]], other=[[0.0]]
+    )
+    made = with_shares(run.frame, frames, "strain", "snug", "pbns")
+    own = made[made["metric"] == share_of_frames("strain").name]
+    found = {(line.method, line.seed): line.value for line in own.itertuples()}
+    assert found == {("snug", 0): 25.0, ("snug", 1): 0.0, ("pbns", 0): 50.0, ("pbns", 1): 100.0}
+    assert set(own["unit"]) == {"%"} and own["usable"].all() and len(made) == len(run.frame) + 4
+    assert len(with_shares(run.frame, frames, "inertia", "snug", "pbns")) == len(run.frame)
+
+
+@pytest.mark.parametrize(("snug", "verdict"), [(1.0, "holds"), (3.0, "does not hold")])
+def test_a_claim_of_frames_is_judged_by_the_share_of_them(snug, verdict):
+    rows = seeds("snug", (1.0, 1.1)) + seeds("pbns", (1.2, 1.15))
+    run = run_of(rows)
+    claim = share_of_frames("strain").name, "snug", "pbns"
+    assert claim not in {(f.claim.metric, f.claim.lower, f.claim.higher) for f in judged(run)}
+    ten = [snug] * 9 + [2.5]
+    frames = frame_table(snug=[ten, ten[::-1]], pbns=[[2.0] * 10] * 2)
+    (line,) = (f for f in judged(replace(run, frames=frames)) if f.claim.metric == claim[0])
+    assert (line.claim.lower, line.claim.higher, line.verdict) == (*claim[1:], verdict)
+    assert line.one.value == pytest.approx(10.0 if verdict == "holds" else 100.0)
+    assert line.claim.relation == "< in most frames" and "%" in line.metric.heading

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import json
 import os
 import random
 import signal
@@ -11,6 +13,7 @@ import threading
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -19,11 +22,14 @@ pytest.importorskip("distributed")
 from cluster_by_hand import PATH, Cluster, cluster, finish, write
 
 from benchmarks import cluster as runner_side
-from benchmarks import cluster_worker, run
+from benchmarks import cluster_worker, execution, run
 from benchmarks.cluster import ClusterExecutor
 from benchmarks.executor import LocalExecutor
+from benchmarks.plan import PlanError
 from benchmarks.results import RunFolder, digest_of_file
+from benchmarks.source import digest
 from benchmarks.tasks.task import Outcome, RunStopped
+from snug.tensor_file import read_tensors
 
 
 class Bar:
@@ -100,8 +106,10 @@ def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path
 def test_failures_are_values_and_a_batch_stays_together(two, folder):
     large = 2 * runner_side.PIECE // 8 + 5  # numbers: more than two pieces
     batch = [write("one"), write("bad", how="raise"), write("large", count=large)]
-    found = together(folder, two.address, batch, [write("dies", how="die")], [write("after")])
-    assert found["large"].result["memo"] == ["one", "large"] and found["after"].result["memo"] == ["after"]
+    others = [[write("dies", how="die")], *([write(name)] for name in "abc")]  # two of these in one process
+    found = together(folder, two.address, batch, *others)
+    assert found["large"].result["memo"] == ["one", "large"]
+    assert all(found[name].result["memo"] == [name] for name in "abc")
     assert found["bad"].reason == "ValueError: broken on purpose"
     assert found["dies"].status == "out-of-memory" and "SIGKILL" in found["dies"].reason
     expected = np.random.default_rng(0).random(large)
@@ -129,6 +137,54 @@ def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
     monkeypatch.setattr(Bar, "update", lambda self, units=1: told.append(units))
     together(folder, two.address, [write("one", units=7), write("two", units=5, seconds=1.0)])
     assert 7 in told
+
+
+@pytest.mark.slow
+def test_a_run_on_clusters_of_one_and_two_is_that_of_this_machine(tmp_path, monkeypatch):
+    """Bit for bit, but for times: ground truth, a network, frames, metrics."""
+    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    words = ["--preset", "smoke", "--suite", "garments", "--split", "validation"]
+    words += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
+    assert run.main([*words, "-o", str(tmp_path / "0")]) == 0
+    for workers in (1, 2):
+        there = tmp_path / f"cluster{workers}"
+        there.mkdir()
+        with cluster(there, workers) as started:
+            words_there = [*words, "-o", str(tmp_path / str(workers)), "--scheduler", started.address]
+            assert run.main(words_there) == 0
+    kept = contents(tmp_path / "0")
+    assert {kind for kind, *_ in kept} >= {"start", "data", "network", "cell", "metrics", "quasi-static"}
+    assert contents(tmp_path / "1") == contents(tmp_path / "2") == kept
+
+
+def contents(folder: Path) -> dict[tuple[str, ...], str]:
+    """Task, and file or number -> digest, without times, of all that a run keeps."""
+    found = {}
+    for path in folder.glob("cache/**/*.json"):
+        entry = json.loads(path.read_text())
+        kind = path.relative_to(folder / "cache").parts[0]
+        if kind in ("batch", "repeat", "windows"):
+            continue  # times alone, or with them
+        if kind == "metrics":
+            found[kind, path.stem, "result"] = digest(entry["outcome"]["result"])
+        for name in entry["files"]:
+            for array, values in arrays(folder / name).items():
+                if not array.endswith("frame_seconds"):
+                    found[kind, name, array] = digest(np.asarray(values).tobytes())
+    return found
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    if path.suffix == ".safetensors":
+        return {name: tensor.numpy() for name, tensor in read_tensors(path)[0].items()}
+    if path.suffix != ".vtkhdf":
+        return dict(np.load(path)) if path.suffix == ".npz" else {"": np.load(path)}
+    found: dict[str, np.ndarray] = {}
+    with h5py.File(path) as file:
+        file.visititems(
+            lambda name, node: found.update({name: node[()]}) if isinstance(node, h5py.Dataset) else None
+        )
+    return found
 
 
 # --- what is refused ---------------------------------------------------------------------------------------
@@ -175,6 +231,13 @@ def test_a_scheduler_that_does_not_answer_is_refused_in_one_line(tmp_path, monke
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert run.main([*words, "tcp://127.0.0.1:1"]) == 2
     assert "pip install" in capsys.readouterr().err and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(("option", "value"), [("device", "cuda"), ("rollout", ["mine=out.npz"])])
+def test_what_a_cluster_cannot_do_is_refused(option, value):
+    plain = {"scheduler": "tcp://127.0.0.1:1", "device": "cpu", "rollout": []}
+    with pytest.raises(PlanError, match=f"--{option}.*leave out --scheduler"):
+        run.choose_scheduler(argparse.Namespace(**plain | {option: value}))
 
 
 # --- what dies ---------------------------------------------------------------------------------------------

@@ -88,3 +88,4 @@ def test_who_has_no_past_or_wants_none_remembers_nothing(kind, recipe):
 
 def test_nothing_is_remembered_where_each_window_has_another_body():
     assert made(replace(RECIPE, shape_range=1.0)).hidden_states is None and made().hidden_states is not None
+    assert made(replace(RECIPE, shape_range=1.0, shape_of="clip", mixed=1.0)).hidden_states is not None

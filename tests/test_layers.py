@@ -20,6 +20,7 @@ ALLOWED = {
     "reports": (
         "reports",
         "benchmarks.results",
+        "benchmarks.frame_energies",
         "reference_sim.trajectory",
         "reference_sim.array_file",
         "reference_sim.point_cache",

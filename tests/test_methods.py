@@ -11,6 +11,7 @@ import pytest
 from tasks_by_hand import InProcess, dressed_scene, small_scene
 from test_cell_tasks import NoLog, plan_of
 
+from benchmarks import frame_energies
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.cache import Cache
 from benchmarks.method import Method
@@ -28,6 +29,8 @@ from benchmarks.tasks.cell import Cell, built
 from benchmarks.tasks.metrics import measured
 from reference_sim import Trajectory
 from reference_sim.array_file import read_arrays
+from snug.loss import static_terms
+from snug.recipes import RECIPES
 
 SIZES = {"frames": 16, "settle_frames": 4, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 SIZES["least_seconds"] = 0.01
@@ -234,22 +237,32 @@ def test_a_warm_started_solver_goes_on_from_skinning_and_has_its_time_on_the_clo
     assert warm.frame_fields["iterations"].tolist() == [0] + [1] * (scenes[BODY].frames - 1)
 
 
-def test_printed_bending_is_simulated_and_judged_by_the_scenes_own():
+@pytest.mark.parametrize(
+    ("exchange", "places"), [("springs", [0]), ("printed-bending", [1]), ("pbns-springs", [0, 1])]
+)
+def test_another_material_is_simulated_and_judged_by_the_scenes_own(exchange, places):
     scene = small_scene("hanging_sheet", cells=4, frames=5)
-    entry = find_method("simulation-printed-bending")
+    entry = find_method(f"simulation-{exchange}")
     made = entry.make(models=None, seed=0)
     made.prepare(scene)
     own, declared = made.scene.energies, scene.energies
-    k = scene.cloth.material.bending_stiffness
-    assert [term.name for term in own] == [term.name for term in declared] == ["strain", "bending", "gravity"]
-    assert (own[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
-    assert own[0] is declared[0] and own[2] is declared[2] and np.array_equal(made.scene.start, scene.start)
-    group = SceneRollOuts(scene)
-    group.roll_outs.append(RollOut(group, entry, made.run(), suites=("validation",)))
+    assert [term.name for term in declared] == ["strain", "bending", "gravity"]
+    assert [mine is theirs for mine, theirs in zip(own, declared)] == [k not in places for k in range(3)]
+    trained = list(static_terms(scene.cloth, RECIPES[exchange]).values())
+    for place in places:  # the very energies that the recipe of that name trains on
+        assert type(own[place]) is type(trained[place])
+        assert np.array_equal(own[place].stiffness, trained[place].stiffness)
+    if exchange == "printed-bending":
+        k = scene.cloth.material.bending_stiffness
+        assert (own[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
+    assert np.array_equal(made.scene.start, scene.start)
+    group, trajectory = SceneRollOuts(scene), made.run()
+    assert trajectory.status == "converged"
+    group.roll_outs.append(RollOut(group, entry, trajectory, suites=("validation",)))
     values = measured(group.roll_outs[0], ("energy",))[0]
-    x = group.roll_outs[0].positions
-    judged = np.mean([declared[1].value_and_gradient(frame)[0] for frame in x[2:]])
-    assert values["energy/bending"] == pytest.approx(judged, rel=1e-9)
+    term = declared[places[0]]
+    judged = np.mean([term.value_and_gradient(frame)[0] for frame in trajectory.positions[2:]])
+    assert values[f"energy/{term.name}"] == pytest.approx(judged, rel=1e-9)
     # No uncertainty of the reference and no approximation of it: a variant that stands beside its base.
     assert group.reference is None and group.find(role="reference-variant") is None
     assert (entry.role, entry.base) == ("ablation", "simulation")
@@ -263,6 +276,27 @@ def test_every_method_has_the_whole_protocol(tmp_path):
     assert Method().quasi_static() is None
     with pytest.raises(NotImplementedError):
         Method().batch(2)
+
+
+def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks(run, rows, scenes, tmp_path):
+    folder, scene = run[1].cache.folder, scenes[BODY]
+    assert not folder.frame_energies_path.is_file()
+    frame_energies.write(folder, rows)
+    columns, lines = frame_energies.read(folder.frame_energies_path)
+    assert columns == ["scene", "method", "seed", "seconds", *scene.terms, "total"]
+    kept = {entry.name for entry in DRESSED_METHODS if entry.role in ("reference", "baseline", "network")}
+    assert {line[1] for line in lines} == kept and {line[0] for line in lines} == {BODY}
+    means = {
+        (row.method, row.metric): row.value for row in rows if (row.suite, row.scene) == ("garments", BODY)
+    }
+    for method in kept:
+        own = np.array([line[3:] for line in lines if line[1] == method])
+        assert own[:, 0] == pytest.approx(scene.dt * np.arange(scene.warm_up, scene.frames), abs=1e-4)
+        for place, term in enumerate(columns[4:], start=1):
+            assert own[:, place].mean() == pytest.approx(means[method, f"energy/{term}"], rel=1e-4, abs=1e-9)
+    other = dataclasses.replace(rows[0], suite="speed")
+    frame_energies.write(folder, [other])  # nothing takes part any more
+    assert not folder.frame_energies_path.is_file()
 
 
 def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_metrics():

@@ -10,18 +10,20 @@ import pytest
 from tasks_by_hand import small_scene
 
 from benchmarks.methods import METHODS, find_method
+from benchmarks.metric import RollOut
 from benchmarks.metrics import body as body_metrics
 from benchmarks.metrics import declared, find_metric, training_distance
 from benchmarks.metrics.body import inside_itself
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
     boundary_mask,
+    curvature_change,
     curvature_error,
     curvature_series,
     histogram_distance,
     mean_curvature,
 )
-from benchmarks.metrics.energy import energy_series
+from benchmarks.metrics.energy import accelerations, correlation_with_body, energy_series
 from benchmarks.metrics.geometry import distance_rms, hem_drift, own_part_depth, penetration
 from benchmarks.metrics.intersections import intersecting, intersecting_share
 from benchmarks.metrics.shape import area_change, dihedral_angle, edge_change
@@ -103,6 +105,37 @@ def test_curvature_error_sees_moved_wrinkles_where_the_difference_of_means_does_
     assert curvature_error(flat, still)[0] == pytest.approx(still.means()[0], rel=1e-9)
 
 
+def test_wrinkles_that_stay_have_no_change_and_those_that_travel_have_nearly_all_of_it():
+    cells, frames = 40, 20
+    i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
+
+    def waves(phases: np.ndarray, depth: float) -> np.ndarray:
+        height = depth * np.sin(0.2 * np.pi * i + phases[:, None, None])
+        frames = np.broadcast_arrays(0.01 * i, height, 0.01 * j)
+        return np.stack(frames, -1).reshape(len(phases), -1, 3)
+
+    def change(positions: np.ndarray) -> float:
+        return curvature_change(curvature_series(positions, faces))
+
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    fixed = waves(np.zeros(frames), 0.004)
+    fixed[1::2] = fixed[1::2] @ turn.T + 3.0
+    assert change(fixed) < 1e-9
+    phases = 2.0 * np.pi * np.arange(frames) / frames
+    travelling = change(waves(phases, 0.004))
+    assert 0.9 < travelling <= 1.0 + 1e-9
+    assert change(waves(phases, 0.002)) == pytest.approx(travelling, abs=0.02)  # how deep is not asked
+    assert change(waves(phases, 0.0)) is None  # flat
+
+
+def test_change_of_wrinkles_is_the_part_of_all_deviations_that_is_in_time():
+    # Two vertices keep 1 and 3, two of twice their area swap: of 1 + 1 + 2 + 2 about the mean of 2 the last.
+    h = np.array([[1.0, 3.0, 1.0, 3.0], [1.0, 3.0, 3.0, 1.0]])
+    area = np.array([1.0, 1.0, 2.0, 2.0]) * [[0.5], [1.5]]
+    assert curvature_change(CurvatureSeries(h, area)) == pytest.approx(4.0 / 6.0)
+
+
 def test_distance_is_the_length_of_a_shift():
     x = np.random.default_rng(0).normal(size=(4, 7, 3))
     shift = np.array([0.03, 0.0, 0.04]) * np.arange(4)[:, None, None]
@@ -126,6 +159,30 @@ def test_penetration_counts_every_vertex_and_measures_depth():
     assert found.depth[1] == pytest.approx([0.5, 1.25, 0, 1.5])
 
 
+def test_inertia_follows_the_body_where_the_cloth_is_shaken_as_the_body_is():
+    random, masses = np.random.default_rng(2), np.array([1.0, 3.0, 1.0, 2.0])
+    jumps, others = np.abs(random.normal(size=(2, 30)))
+
+    def shaken(sizes):
+        """(T,V,3) of a cloth that moves as one, by second differences of these sizes."""
+        path = np.concatenate([[0.0, 0.0], np.cumsum(np.cumsum(sizes))])
+        return path[:, None, None] * [0.6, 0.0, 0.8] + np.arange(4.0)[:, None]
+
+    def correlation(positions, **scene):
+        cloth = SimpleNamespace(masses=masses)
+        scene = SimpleNamespace(**{"dt": 0.1, "cloth": cloth, "warm_up": 2, "kept": None} | scene)
+        group = SimpleNamespace(scene=scene, kept=lambda make: shaken(jumps))
+        roll_out = RollOut(group, None, SimpleNamespace(positions=positions))
+        return correlation_with_body(roll_out)
+
+    assert accelerations(shaken(jumps), masses, 0.1)[2:] == pytest.approx(100.0 * jumps)
+    assert correlation(shaken(3.0 * jumps + 0.2)) == pytest.approx(1.0)
+    assert correlation(shaken(4.0 - jumps)) == pytest.approx(-1.0)
+    assert correlation(shaken(others)[:20]) == pytest.approx(np.corrcoef(others[:18], jumps[:18])[0, 1])
+    assert correlation(shaken(0.0 * jumps)) is None and correlation(shaken(jumps)[:4]) is None
+    assert correlation(shaken(jumps), kept=np.arange(3)) is None  # frames are left out: no second difference
+
+
 def test_energies_of_a_rigid_acceleration_are_known_by_hand():
     scene = small_scene("hanging_sheet")
     heights = np.array([0.5, 0.6, 0.7, 0.8, 0.9])
@@ -136,6 +193,7 @@ def test_energies_of_a_rigid_acceleration_are_known_by_hand():
     longer, shorter = energy_series(scene, [positions, positions[:3]])
     mass = scene.cloth.masses.sum()
     inertia = 0.5 * mass * 25.0 * scene.dt**2
+    assert accelerations(positions, scene.cloth.masses, scene.dt)[2:] == pytest.approx([5.0] * 3, rel=1e-9)
     assert longer["inertia"] == pytest.approx([0, 0, inertia, inertia, inertia], rel=1e-9)
     height = (scene.cloth.masses * rest[:, 1]).sum() / mass
     assert longer["gravity"] == pytest.approx(mass * 9.81 * (height - heights), rel=1e-12)

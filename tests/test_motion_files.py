@@ -1,14 +1,12 @@
-"""Motions of strangers: one motion in many forms, its vertical axis, its glitches, and damaged files."""
+"""Motions of strangers: one motion in many forms, its vertical axis, its glitches. Damage: test_fuzz.py."""
 
 import re
-import time
-import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from cmu_clips import amc_frame, write_clip
-from motion_forms import TO_Z_UP, Y_UP, bvh, of_root, write_forms
+from motion_forms import TO_Z_UP, Y_UP, of_root, write_forms
 from scipy.spatial.transform import Rotation
 
 from snug.motion import Motion, MotionError, place, transition
@@ -28,10 +26,12 @@ def write(path, motion, turn=Y_UP, **changes):
 
 
 def refused(path, words, **reading):
-    with pytest.raises(MotionError, match=words) as caught:
+    """Whether reading the file is refused in one line that names it and holds a match of the words."""
+    with pytest.raises(MotionError) as caught:
         load_motions(path, reading=Reading(**reading))
-    assert path.name in str(caught.value) and "\n" not in str(caught.value)
-    return str(caught.value)
+    said = str(caught.value)
+    assert re.search(words, said), said
+    return path.name in said and "\n" not in said and len(said) < 500
 
 
 def angles(poses, others):
@@ -64,7 +64,7 @@ class TestForms:
 
     def test_a_file_of_poses_alone_needs_a_rate_and_stays_in_place(self, tmp_path):
         np.save(tmp_path / "poses.npy", KICK.poses.reshape(-1, 72))
-        refused(tmp_path / "poses.npy", "no frame rate; give --motion-fps N")
+        assert refused(tmp_path / "poses.npy", "no frame rate; give --motion-fps N")
         motion = read_motion(tmp_path / "poses.npy", Reading(fps=30.0))
         assert (motion.translations == 0).all() and "the root stays" in motion.source
 
@@ -86,7 +86,7 @@ class TestForms:
         ],
     )
     def test_what_is_no_motion_is_refused(self, tmp_path, changes, words):
-        refused(write(tmp_path / "clip.npz", KICK, **changes), words)
+        assert refused(write(tmp_path / "clip.npz", KICK, **changes), words)
 
     @pytest.mark.parametrize(
         ("arrays", "words"),
@@ -112,13 +112,13 @@ class TestForms:
     def test_arrays_that_are_wrong(self, tmp_path, arrays, words):
         path = tmp_path / "clip.npz"
         np.savez(path, **arrays)
-        refused(path, words)
+        assert refused(path, words)
 
     @pytest.mark.parametrize("content", [b"", b"not a zip file at all", b"PK\x03\x04 broken"])
     def test_what_is_no_archive(self, tmp_path, content):
         path = tmp_path / "clip.npz"
         path.write_bytes(content)
-        refused(path, "give an .npz motion file")
+        assert refused(path, "give an .npz motion file")
 
     def test_rotations_that_are_none_are_refused(self, tmp_path):
         path, rest = tmp_path / "clip.npz", {"trans": KICK.translations, "fps": 30.0}
@@ -126,18 +126,18 @@ class TestForms:
         quaternions = Rotation.from_rotvec(KICK.poses.reshape(-1, 3)).as_quat().reshape(-1, 24, 4)
         matrices[7, 5] *= 1.1
         np.savez(path, rotations=matrices, **rest)
-        refused(path, "frame 7, joint 5 is no rotation matrix")
+        assert refused(path, "frame 7, joint 5 is no rotation matrix")
         matrices[7, 5] = np.diag([1.0, 1.0, -1.0])
         np.savez(path, rotations=matrices, **rest)
-        refused(path, "frame 7, joint 5 is no rotation matrix")
+        assert refused(path, "frame 7, joint 5 is no rotation matrix")
         np.savez(path, quaternions=quaternions, **rest)
-        refused(path, "name the array 'quaternions_xyzw'")
+        assert refused(path, "name the array 'quaternions_xyzw'")
         quaternions[3, 2] *= 1.1
         np.savez(path, quaternions_xyzw=quaternions, **rest)
-        refused(path, "frame 3, joint 2 is no unit quaternion")
+        assert refused(path, "frame 3, joint 2 is no unit quaternion")
 
     def test_a_rate_is_said_once(self, tmp_path):
-        refused(write(tmp_path / "clip.npz", KICK), "states 30 .* says 60", fps=60.0)
+        assert refused(write(tmp_path / "clip.npz", KICK), "states 30 .* says 60", fps=60.0)
         assert read_motion(write(tmp_path / "clip.npz", KICK), Reading(fps=30.0)).fps == 30.0
         assert read_motion(write_clip(tmp_path, [amc_frame(1)]), Reading(fps=60.0)).fps == 60.0
 
@@ -164,18 +164,18 @@ class TestUpAxis:
 
     def test_a_body_on_its_back_is_refused(self, tmp_path):
         walk = make_motion("walk")
-        refused(
+        assert refused(
             write(tmp_path / "y.npz", walk),
             "with z up the body lies .* along y in 100 %.*--motion-up y",
             up="z",
         )
-        refused(write(tmp_path / "z.npz", walk, TO_Z_UP), "with y up .* --motion-up z", up="y")
+        assert refused(write(tmp_path / "z.npz", walk, TO_Z_UP), "with y up .* --motion-up z", up="y")
         for up in ("y", "z"):
             path = write(tmp_path / "clip.npz", walk, TO_Z_UP if up == "z" else Y_UP)
             assert f"{up} up as given" in read_motion(path, Reading(up=up)).source
         camera, side = np.diag([1.0, -1.0, -1.0]), np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
-        refused(write(tmp_path / "camera.npz", walk, camera), "neither along y nor along z: along -y")
-        refused(write(tmp_path / "side.npz", walk, side), "neither along y nor along z: along x")
+        assert refused(write(tmp_path / "camera.npz", walk, camera), "neither along y nor along z: along -y")
+        assert refused(write(tmp_path / "side.npz", walk, side), "neither along y nor along z: along x")
 
     @pytest.mark.parametrize("turn", [Y_UP, TO_Z_UP], ids=["y up", "z up"])
     def test_a_fall_passes_and_a_crawl_has_to_be_told(self, tmp_path, turn):
@@ -196,7 +196,7 @@ class TestUpAxis:
         crawl = Rotation.from_euler("x", 90, degrees=True).as_matrix()
         away = np.stack((np.zeros(60), np.zeros(60), np.linspace(0, 1.5, 60)), axis=1)
         crawling = Motion("crawl", np.zeros((60, 24, 3)), away @ crawl)
-        refused(
+        assert refused(
             write(tmp_path / "crawl.npz", crawling, turn @ crawl),
             "lowest joint moves by 1.5 m|stands neither",
         )
@@ -211,7 +211,7 @@ class TestGlitches:
 
     def test_a_joint_that_jumps_is_named_or_mended(self, tmp_path):
         path = write(tmp_path / "clip.npz", self.spoiled())
-        refused(path, "right_elbow jumps in frames 18-22; give --repair")
+        assert refused(path, "right_elbow jumps in frames 18-22; give --repair")
         motion = read_motion(path, Reading(repair=True))
         assert "repaired: right_elbow jumps in frames 18-22" in motion.source
         error = angles(motion.poses, read_motion(write(tmp_path / "whole.npz", KICK), Reading()).poses)
@@ -229,7 +229,7 @@ class TestGlitches:
         trans[-1, 1] = np.inf
         np.savez(tmp_path / "clip.npz", trans=trans, fps=30.0, **{form: array})
         named = "left_knee is not finite in frames 5-6, the root's path is not finite in frames 39-39"
-        refused(tmp_path / "clip.npz", f"{named}; give --repair")
+        assert refused(tmp_path / "clip.npz", f"{named}; give --repair")
         motion = read_motion(tmp_path / "clip.npz", Reading(repair=True))
         assert f"repaired: {named}" in motion.source
         np.testing.assert_array_equal(motion.translations[-1], KICK.translations[-2])
@@ -243,7 +243,7 @@ class TestGlitches:
         poses = still.poses.copy()
         poses[at, JOINT["neck"]] = [0.0, 2.6, 0.0]
         path = write(tmp_path / "clip.npz", replace(KICK, poses=poses))
-        refused(path, "neck jumps in frames")
+        assert refused(path, "neck jumps in frames")
         whole = read_motion(write(tmp_path / "whole.npz", still), Reading())
         assert angles(read_motion(path, Reading(repair=True)).poses, whole.poses).max() < 1e-7
 
@@ -251,80 +251,17 @@ class TestGlitches:
         trans = KICK.translations.copy()
         trans[11] += [1.0, 0.0, 0.0]
         path = write(tmp_path / "clip.npz", replace(KICK, translations=trans))
-        refused(path, "the root's path jumps in frames 9-13")
+        assert refused(path, "the root's path jumps in frames 9-13")
         mended = read_motion(path, Reading(repair=True)).translations
         assert np.abs(mended - KICK.translations).max() < 0.05
         trans[11:] += [9.0, 0.0, 0.0]
         path = write(tmp_path / "clip.npz", replace(KICK, translations=trans))
-        refused(path, "path jumps after frame .* cut the clip", repair=True)
+        assert refused(path, "path jumps after frame .* cut the clip", repair=True)
 
     def test_too_many_are_not_mended(self, tmp_path):
         noise = np.random.default_rng(0).normal(0.0, 1.5, KICK.poses.shape)
         path = write(tmp_path / "clip.npz", replace(KICK, poses=noise))
-        message = refused(path, "of the frames .* check frame rate and units", repair=True)
-        assert len(message) < 500
-        refused(write(tmp_path / "nan.npz", KICK, trans=np.full((40, 3), np.nan)), "not finite in any frame")
-
-
-class TestDamagedFiles:
-    """Seeded damage of whole files: each is read, or refused in one line, and soon."""
-
-    def damaged(self, content: bytes, draw: np.random.Generator) -> bytes:
-        at, kind = int(draw.integers(len(content))), draw.integers(6)
-        other = int(draw.integers(len(content)))
-        first, last = sorted((at, other))
-        if kind == 0:
-            return content[:at]
-        if kind == 1:
-            return content[:first] + content[min(last, first + 200) :]
-        if kind == 2:
-            return content[:at] + content[first : first + 100] + content[at:]
-        if kind == 3:
-            return content[:at] + bytes(draw.integers(0, 256, 4, dtype=np.uint8)) + content[at + 4 :]
-        lines = content.split(b"\n")
-        at = int(draw.integers(len(lines)))
-        if kind == 4:
-            return b"\n".join(lines[:at] + lines[at + 1 :])
-        words = lines[at].split()
-        if words:
-            odd = (b"nan", b"-1", b"1e308", b"99999999999", b"0", b"{", b"root", b"1e-320")
-            words[int(draw.integers(len(words)))] = odd[int(draw.integers(len(odd)))]
-        return b"\n".join([*lines[:at], b" ".join(words), *lines[at + 1 :]])
-
-    def contents(self, folder, form):
-        """The file that is damaged, and the file that is then read."""
-        few = KICK.cut(0, 4)
-        if form in ("amc", "asf"):
-            clip = write_clip(folder, [amc_frame(k, root=(0, 17, 0, 0, 0, 0)) for k in (1, 2, 3)])
-            return (clip if form == "amc" else folder / "07.asf"), clip
-        path = folder / f"clip.{form}"
-        if form == "bvh":
-            path.write_text(bvh(few.poses, few.translations, 30.0))
-        else:
-            (source,) = (
-                f
-                for f in write_forms(folder, few)
-                if f.name == {"npz": "joints.npz", "pkl": "pickled.pkl"}[form]
-            )
-            path.write_bytes(source.read_bytes())
-        return path, path
-
-    @pytest.mark.parametrize("form", ["npz", "pkl", "bvh", "amc", "asf"])
-    def test_a_damaged_file_is_refused_in_one_line(self, tmp_path, form):
-        draw = np.random.default_rng(7)
-        target, path = self.contents(tmp_path, form)
-        load_motions(path, reading=Reading(repair=True))
-        whole, refusals = target.read_bytes(), 0
-        for _ in range(100):
-            target.write_bytes(self.damaged(whole, draw))
-            clock = time.perf_counter()
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("error")
-                    load_motions(path, reading=Reading(repair=bool(draw.integers(2))))
-            except MotionError as error:
-                refusals += 1
-                assert "\n" not in str(error) and len(str(error)) < 900
-                assert path.stem.split("_")[0] in str(error)
-            assert time.perf_counter() - clock < 5.0
-        assert refusals > 30
+        assert refused(path, "of the frames .* check frame rate and units", repair=True)
+        assert refused(
+            write(tmp_path / "nan.npz", KICK, trans=np.full((40, 3), np.nan)), "not finite in any frame"
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from report_folder import FRAMES, mesh, row, run_of, sheet, write_model
 
 from benchmarks.results import RunFolder
@@ -13,6 +14,7 @@ from reports import (
     pictures,
     render,
     roll_outs,
+    shapes,
     stability,
     styles,
     training,
@@ -257,6 +259,39 @@ def test_errors_are_drawn_against_the_vertices_that_scenes_declare(tmp_path, mon
     (line,) = figure.axes[0].get_lines()
     assert list(line.get_xdata()) == [500.0, 2000.0] and list(line.get_ydata()) == [5.0, 20.0]
     assert figures.against_vertices(tmp_path, run_of(rows[2:])) == []
+
+
+def shaped(method, metric, values, **more):
+    rows = [row(f"shapes/{place}", method, metric, value, suite="shapes", garment="tshirt", **more)
+            for place, value in enumerate(values)]  # fmt: skip
+    return rows
+
+
+def test_energies_are_drawn_and_listed_against_the_shape(tmp_path, monkeypatch):
+    rows = shaped("simulation", "body/shape", (0.0, 6.0, 4.0), unit="1")
+    rows += shaped("simulation", "energy/total", (0.3, 0.5, 0.4))
+    rows += shaped("snug", "energy/total", (0.35, 0.8, 0.6)) + shaped(
+        "snug", "energy/strain", (0.1, 0.4, 0.2)
+    )
+    (figure,) = drawn_by(monkeypatch, shapes.against_shape, tmp_path, run_of(rows))
+    lines = {tuple(line.get_ydata()) for line in figure.axes[0].get_lines()}
+    assert lines == {(0.3, 0.4, 0.5), (0.35, 0.6, 0.8)} and len(figure.axes) == 2
+    labels = [label.get_text() for label in figure.axes[0].get_xticklabels()]
+    assert all(list(line.get_xdata()) == [0, 1, 2] for line in figure.axes[0].get_lines())
+    assert [float(label) for label in labels] == [0.0, 4.0, 6.0]
+
+    (made,) = shapes.shapes(run_of(rows))
+    names = [column.name for column in made.columns]
+    assert names == ["scene", "shape", "method", "above", "energy/total", "energy/strain"]
+    found = {(line[0], line[2]): line for line in made.rows}
+    assert list(found)[:4] == [(s, m) for s in ("other shapes", "shapes/0") for m in ("simulation", "snug")]
+    together = found["other shapes", "snug"]
+    assert together[3] == pytest.approx(0.7 - 0.45) and together[4].value == pytest.approx(0.7)
+    assert found["shapes/2", "snug"][1] == 4.0 and found["shapes/2", "snug"][3] == pytest.approx(0.2)
+    assert found["shapes/2", "simulation"][3] is None and found["shapes/2", "simulation"][5] is None
+
+    one = [r for r in rows if r.scene == "shapes/0"]
+    assert shapes.shapes(run_of(one)) == shapes.against_shape(tmp_path, run_of(one)) == []
 
 
 def test_histograms_hold_every_vertex_once(tmp_path, monkeypatch):

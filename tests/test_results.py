@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from benchmarks import frame_energies
 from benchmarks.results import COLUMNS, FORMAT, ResultsError, Row, RunFolder, replacing, with_provenance
 
 ROWS = [
@@ -175,3 +176,38 @@ def test_the_module_is_light():
     code = "import sys, benchmarks.results; print({'numpy', 'torch', 'pandas'} & set(sys.modules))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert answer.stdout.strip() == "set()", answer.stderr
+
+
+HEAD = "scene,method,seed,seconds,strain,total\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "line 1: the columns should be scene,method,seed,seconds and energies"),
+        ("scene,method,seed,seconds\n", "line 1: the columns"),
+        (HEAD.replace("total", "strain"), "energies, each once"),
+        (HEAD + "kick,snug,0,0.1,1\n", "line 2: 6 cells are due"),
+        (
+            HEAD + "kick,snug,0,0.1,1,2\nkick,snug,0,0.2,high,2\n",
+            "line 3: column strain: 'high' is no number",
+        ),
+        (HEAD + "kick,snug,.5,0.1,1,2\n", "line 2: column seed: '.5' is no number"),
+        (HEAD + "kick,snug,0,0.1,inf,2\n", "line 2: column strain: 'inf' is no number"),
+        (HEAD + "kick,sn\xff", "not readable as CSV in UTF-8"),
+    ],
+)
+def test_energies_of_frames_that_are_broken_are_refused_by_line_and_column(tmp_path, text, word):
+    path = RunFolder(tmp_path).frame_energies_path
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(ResultsError, match=word) as refused:
+        frame_energies.read(path)
+    assert str(path) in str(refused.value)
+
+
+def test_an_energy_that_a_scene_does_not_have_is_not_a_number(tmp_path):
+    path = RunFolder(tmp_path).frame_energies_path
+    path.write_text(HEAD + "kick,snug,2,0.1,,2.5\n")
+    columns, ((scene, method, seed, seconds, strain, total),) = frame_energies.read(path)
+    assert (scene, method, seed, seconds, total) == ("kick", "snug", 2, 0.1, 2.5) and strain != strain
+    assert columns[4:] == ["strain", "total"]

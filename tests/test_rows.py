@@ -221,14 +221,14 @@ def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_
     plan = dataclasses.replace(plan_of(None), cells=(cell,), motions=motions)
     schedule = Schedule(plan)
     there = {"commit": "c", "preset": "p", "hardware": "there"}
-    learned = {"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0, "steps": 60, "frames": 90}
-    trained = Outcome(result=learned, origin=there)
+    result = {"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0, "steps": 60, "frames": 90}
+    trained = Outcome(result=result, origin=there)
     outcomes = {
         ("cell", cell.name): RAN, ("metrics", cell.name): Outcome(result={"energy/strain": 1.0}),
         schedule.network(plan.networks[0]).id: trained,
         ("data", "tshirt-walk/simulation"): Outcome(seconds=3.0, origin=there | {"hardware": "elsewhere"}),
         ("data", "tshirt-run/simulation"): Outcome(seconds=4.0, origin=there),
-        ("data", "tshirt-run/fast-lbfgs-10"): Outcome(seconds=5.0, origin=there),
+        ("data", "tshirt-run/fast-lbfgs-10"): Outcome(seconds=5.0),
     }  # fmt: skip
     rows = rows_of(plan, (), outcomes)
     machines = {row.metric: row.hardware for row in rows}

@@ -205,7 +205,7 @@ def test_a_damaged_file_is_made_anew_with_all_that_was_made_from_it(tmp_path):
 def test_a_network_that_learned_without_a_failed_simulation_is_another(tmp_path):
     plan = plan_of(tmp_path, motions=Motions(train=("walk", "run")))
     schedule = Schedule(plan)
-    lost = schedule.data("run", "tshirt").id
+    lost = schedule.data("run", "tshirt", find_method("simulation")).id
     assert lost in schedule.network(Network("supervised", 0, "tshirt")).reads
     assert schedule.network(Network("snug", 0, "tshirt")).reads == ()
 
@@ -337,14 +337,14 @@ def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
     killed = Outcome("failed", "killed", failed=True)
     network = Schedule(plan).network(Network("supervised", 0, "tshirt")).id
     for id, outcome in (
-        (("start", "tshirt-kick"), Outcome()), (("data", "tshirt-walk"), Outcome()),
-        (("data", "tshirt-run"), lost), (network, Outcome()), (("cell", cell.name), killed),
+        (("start", "tshirt-kick"), Outcome()), (("data", "tshirt-walk/simulation"), Outcome()),
+        (("data", "tshirt-run/simulation"), lost), (network, Outcome()), (("cell", cell.name), killed),
     ):  # fmt: skip
         found[id] = cache.keep(by_id[id], outcome, found)
     runner = Runner(tasks_of(plan), Cache(RunFolder(tmp_path)))
     (row,) = rows_of(plan, runner.tasks, runner.known())
     assert (row.method, row.status, row.reason) == ("supervised", "failed", "killed")
-    assert runner.outcomes["data", "tshirt-run"].reason == "far away"
+    assert runner.outcomes["data", "tshirt-run/simulation"].reason == "far away"
     assert found_of(plan).state == "failed"
 
 

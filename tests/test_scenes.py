@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,11 +14,13 @@ from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.cache import dependencies
 from benchmarks.clips import clip, joint_speeds
 from benchmarks.methods import find_method
+from benchmarks.metrics import body_shape
 from benchmarks.plan import network_of
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.run import main
 from benchmarks.scenes import FURTHER, GARMENT_SCENES, SCENES, all_scenes
 from benchmarks.scenes.free_fall import exact_fall
+from benchmarks.scenes.further import SHAPES, shapes
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
 from benchmarks.schedule import Schedule
@@ -50,11 +53,72 @@ def test_the_terms_are_those_of_the_descriptions():
 def test_scene_names_are_unique_and_a_dressed_scene_needs_assets():
     scenes = all_scenes(["walk", "run"], ["twist_stop"])
     worn = sum(2 * (1 if garment.dynamic else 3) for garment in GARMENT_SCENES)  # whole, and as a clip
-    assert len(scenes) == len(SCENES) + worn + len(FURTHER) + 1  # one long
+    shaped = 1 + SHAPES  # the mean body and others
+    assert len(scenes) == len(SCENES) + worn + len(FURTHER) + shaped + 1  # one long
     assert scenes["tshirt/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
     assert scenes["tshirt/walk"].dressed and not scenes["flag"].dressed
     with pytest.raises(ValueError, match="needs assets"):
         dressed_scene("walk").build()
+
+
+def test_unseen_shapes_are_drawn_as_a_training_draws_them_and_once():
+    mean, *others = shapes("kick")
+    drawn = np.array([scene.options["betas"] for scene in others])
+    assert drawn.shape == (SHAPES, 10) and mean.options["betas"] == ()
+    assert 2.9 < np.abs(drawn).max() <= 3.0 and abs(drawn.mean()) < 3 * 3 / 360**0.5
+    assert drawn[0, 0] == pytest.approx(0.18975, abs=1e-5)  # nobody may draw until the numbers please
+    assert [scene.options for scene in shapes("punch", "tunic")] == [s.options for s in (mean, *others)]
+
+
+def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
+    assets = open_assets(TINY, embedded_motions(["punch"]), ["tshirt"])
+    garment, body = assets.garments["tshirt"], assets.body
+    built = {place: shapes("punch")[place].at(TINY).build(assets) for place in (0, 1)}
+    mean, other = built.values()
+    betas = np.array(shapes("punch")[1].options["betas"])
+    for of_rest in ("rest_positions", "Dm_inverse", "areas", "edge_lengths"):
+        assert np.array_equal(getattr(mean.cloth, of_rest), getattr(other.cloth, of_rest))
+        assert np.array_equal(getattr(other.cloth, of_rest), getattr(garment.cloth(), of_rest))
+    assert mean.dressed.betas is None and np.array_equal(other.dressed.betas, betas)
+    motion = other.dressed.motion
+    assert np.array_equal(other.obstacle.at(3), body.vertices(motion.poses, motion.translations, betas)[3])
+    assert other.origin_heights[2] == body.joints(betas)[0, 1] + motion.translations[2, 1]
+
+    starts = []
+
+    def simulated(cloth, energies, *, start, frames, obstacle, **rest):
+        starts.append((start, obstacle.at(0)))
+        return SimpleNamespace(frames=frames, positions=np.stack([start] * frames))
+
+    monkeypatch.setattr("benchmarks.scenes.dressed_body.simulate", simulated)
+    assert other.start.shape == (len(garment.rest_positions), 3)
+    unposed = body.vertices(np.zeros((1, 24, 3)), np.zeros((1, 3)), betas)[0]
+    for vertices, posed in starts[:1]:  # the way to the first pose begins in the T-pose, but for the root
+        apart = np.linalg.norm(vertices[:, None] - posed[None, ::9], axis=2).min(1)
+        wanted = garment.rest_for(body, betas)[:, None] - unposed[None, ::9]
+        assert apart == pytest.approx(np.linalg.norm(wanted, axis=2).min(1), abs=1e-9)
+
+
+def test_how_far_a_shape_is_from_the_mean_is_said_once():
+    def of(role, betas):
+        entry = SimpleNamespace(role=role)
+        scene = SimpleNamespace(dressed=SimpleNamespace(betas=betas))
+        return body_shape.measure(SimpleNamespace(entry=entry, scene=scene))
+
+    assert of("reference", np.array([3.0, 0.0, -4.0])) == {"body/shape": 5.0}
+    assert of("reference", None) == {"body/shape": 0.0} and of("network", None) == {}
+
+
+def test_shapes_are_asked_for_by_name_or_by_the_largest_preset():
+    def scenes(*words):
+        return [cell.scene.name for cell in planned("--methods", "simulation", *words).cells]
+
+    every = [scene.name for scene in shapes("kick")]
+    assert scenes("--suite", "shapes") == every and scenes("--scenes", "shapes/*") == every
+    assert not {*scenes(), *scenes("--suite", "garments")} & set(every)
+    assert set(every) <= set(scenes("--preset", "paper"))
+    cells = planned("--suite", "shapes", "--methods", "snug*").cells
+    assert {c.suites for c in cells} == {("shapes",)} and "snug-shapes" in {c.method for c in cells}
 
 
 def test_the_sheet_is_a_square_without_slivers():

@@ -11,11 +11,12 @@ from dressing import swaying, tube_dress
 
 from reference_sim.surface_walk import triangle_adjacency
 from snug.contact import ContactCache
+from snug.motion_augmentation import mixed_for
 from snug.recipe import DEFAULT
 from snug.skeleton import JOINT
 from snug.skinning import skin
 from snug.trainer import Trainer
-from snug.training_contact import FIRST_NEAR, FIRST_PROPAGATED, NEAR, PROPAGATED
+from snug.training_contact import FIRST_NEAR, FIRST_PROPAGATED, MARKED, NEAR, PROPAGATED
 
 MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
 PLAIN = replace(DEFAULT, mixed=0.0)
@@ -43,10 +44,10 @@ def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
     )
     trainer = made()
     monkeypatch.setattr(ContactCache, "requery", requery)
-    assert trainer.contact is not None and trainer.contact._mean_shape is not None
+    assert trainer.contact is not None and trainer.contact._kept is not None
     anchors, patch = trainer.contact.cache, trainer.contact.patch
     at_rest = ContactCache(patch, 1).faces[0]
-    body = trainer.contact._mean_shape[0]
+    body = trainer.contact._kept[0]
     for frame in range(41):  # marks are not all vertices: some move a little more than twice FIRST_NEAR
         near = [
             other
@@ -108,6 +109,25 @@ def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
         pelvis = body.joints(own)[0] + motion.translations[frame]
         expected = whole[contact.patch.body_vertices] - pelvis
         assert np.allclose(np.asarray(positions)[row], expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("kernels", [True, False])
+def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
+    recipe = replace(DEFAULT, mixed=3.0, shape_range=3.0, shape_of="clip")
+    trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=recipe, kernels=kernels)
+    contact, data, body = trainer.contact, trainer.data, trainer.dressed.body
+    assert contact is not None and data.shapes is not None and (contact._kept is not None) == kernels
+    clips = [*MOTIONS, *mixed_for(MOTIONS, recipe, vertices=trainer.dressed.vertices, seed=0)]
+    for place in (1, 2, 3):
+        motion, own, first = clips[place], data.shapes[place], data.first[place]
+        batch = data.at(first + np.array([[3, 4, 5]]))
+        rows, positions, _ = contact.posed(batch)
+        whole = body.vertices(motion.poses[3:6], motion.translations[3:6], betas=own)[
+            :, contact.patch.body_vertices
+        ]
+        pelvis = body.joints(own)[0] + motion.translations[3:6, None]
+        assert np.allclose(np.asarray(positions)[rows], whole - pelvis, atol=1e-4)
+        assert np.allclose(contact._marks[first + 3 : first + 6], (whole - pelvis)[:, ::MARKED], atol=1e-4)
 
 
 def propagated(motions, frame, monkeypatch):

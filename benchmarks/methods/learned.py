@@ -65,6 +65,7 @@ _LABELS = {
     "noise-alone": "first states of noise, none remembered",
     "window6": "windows of 6",
     "window12": "windows of 12",
+    "shapes": "trained on body shapes",
     "springs": "springs instead of StVK",
 }
 

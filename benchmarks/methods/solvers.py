@@ -137,13 +137,21 @@ SOLVERS = (
     ),
     # A variant of the physics, set beside its base: a "reference-variant" would be read as an uncertainty of
     # the reference, and a "solver" as an approximation of it.
-    MethodEntry(
-        name="simulation-printed-bending",
-        label="Simulation, printed bending",
-        description="the reference with hinges as the paper prints them, not scaled: some 3 times as stiff",
-        module="benchmarks.methods.printed_bending",
-        role="ablation",
-        base="simulation",
+    *(
+        MethodEntry(
+            name=f"simulation-{exchange}",
+            label=f"Simulation, {exchange.replace('-', ' ')}",
+            description=f"the reference with {words}",
+            module="benchmarks.methods.other_material",
+            options={"exchange": exchange},
+            role="ablation",
+            base="simulation",
+        )
+        for exchange, words in (
+            ("printed-bending", "hinges as the paper prints them, not scaled: some 3 times as stiff"),
+            ("springs", "springs on the edges in place of StVK's membrane, those of recipe springs"),
+            ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),
+        )
     ),
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",

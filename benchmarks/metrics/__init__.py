@@ -27,7 +27,13 @@ MODULES = (
     "time_error",
     "cost",
 )
-WHERE_NAMED = ("extrapolation", "roll_out", "mesh", "training")  # measured only in scenes that name them
+WHERE_NAMED = (
+    "extrapolation",
+    "roll_out",
+    "mesh",
+    "body_shape",
+    "training",
+)  # measured only in scenes that name them
 
 
 def names_of(chosen: Sequence[str] | None) -> tuple[str, ...]:

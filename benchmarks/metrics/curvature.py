@@ -12,6 +12,13 @@ The paper reports a "mean curvature error" without a definition. Ours, at each f
     sum_i A_i | H_i - H_i^ref | / sum_i A_i      over interior vertices, A_i of the reference,
 averaged over frames. The difference of the two area-weighted means is given beside it: it is blind
 to where the wrinkles are, as vertex-by-vertex errors are not.
+
+Whether wrinkles stay the same while the body moves ("the same despite the significant change in body
+pose", the paper says of PBNS) is told by
+    sum_ti A_i | H_ti - median_t H_ti | / sum_ti A_i | H_ti - mean H |      with A_i the mean over frames,
+the part of all spread of curvature that is in time: 0 where each vertex keeps its own, at most 1. It does
+not depend on how deep wrinkles are. It does not tell why they change: skinning alone gives the part that
+the joints make of wrinkles that stay, a simulation has swing and history too, and a flicker counts as well.
 """
 
 from __future__ import annotations
@@ -28,6 +35,7 @@ if TYPE_CHECKING:
     from ..metric import RollOut
 
 Floats = NDArray[np.float64]
+FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
 METRICS = (
     Metric(
@@ -47,11 +55,19 @@ METRICS = (
         name="curvature/mean_difference", unit="1/m", title="Difference of means", table="curvature",
         definition="area-weighted mean of H less that of the reference",
     ),
+    Metric(
+        name="curvature/change", unit="1", title="Change of wrinkles", table="curvature",
+        definition="mean |H - median of the vertex over frames| over mean |H - mean of all|, by area: the "
+        "part of the spread of curvature that is in time; 0 where wrinkles stay the same, at most 1",
+    ),
 )  # fmt: skip
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    return {"curvature/mean": float(roll_out.kept(series_of).means()[roll_out.judged].mean())}
+    judged = roll_out.kept(series_of).part(roll_out.judged)
+    found = {"curvature/mean": float(judged.means().mean())}
+    change = curvature_change(judged)
+    return found if change is None else found | {"curvature/change": change}
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
@@ -155,6 +171,20 @@ def curvature_error(series: CurvatureSeries, reference: CurvatureSeries) -> Floa
 def _weighted(values: Floats, weights: Floats) -> Floats:
     total = weights.sum(1)
     return np.divide((values * weights).sum(1), total, out=np.zeros(len(total)), where=total > 0.0)
+
+
+def curvature_change(series: CurvatureSeries) -> float | None:
+    """The part of all spread of curvature that is in time [1], 0 to 1; None where H is the same everywhere.
+
+    A vertex's absolute deviations are least about its own median, so the quotient is at most 1.
+    """
+    h, area = series.curvature, series.area.mean(0)
+    whole = float(area.sum())
+    mean = float((h @ area).mean()) / whole if whole > 0.0 else 0.0
+    spread = float((np.abs(h - mean) @ area).mean())
+    if spread <= FLAT * np.sqrt(whole):
+        return None
+    return float((np.abs(h - np.median(h, axis=0)) @ area).mean()) / spread
 
 
 def histogram_distance(series: CurvatureSeries, reference: CurvatureSeries) -> Floats:

@@ -3,6 +3,11 @@
 Each method is judged on its own history: inertia compares a frame with the two before it in the same
 trajectory, and contact planes are searched at the method's own positions. A frame before the third has no
 two before it; it counts as moving freely, hence inertia 0 there. Means are over the frames after the warm-up.
+
+"Sudden motion changes naturally produce peaks in the inertial term", the paper says. `inertia/correlation` is
+Pearson's between two root mean square accelerations by mass, each the square root of an inertia: the
+method's, and that of the garment that the body's joints move alone. It says whether the one peaks where the
+other does, not how high.
 """
 
 from __future__ import annotations
@@ -15,7 +20,7 @@ from numpy.typing import NDArray
 
 from reference_sim.energies.gravity import Gravity
 
-from ..metric import Metric
+from ..metric import Metric, skinned
 from .step import own_terms
 
 if TYPE_CHECKING:
@@ -44,6 +49,11 @@ METRICS = (
             "the margin, contact planes searched at the method's own positions; mean over frames"),
     _energy("total", "sum of all terms that the scene declares, and inertia"),
     _energy("*", "energy of that term, mean over frames", "{}"),
+    Metric(
+        name="inertia/correlation", unit="1", title="Inertia with the body's",
+        definition="correlation over frames of the square roots of two inertias: the method's, and that of "
+        "the garment skinned to the poses, which is the body's acceleration where the garment lies",
+    ),
 )  # fmt: skip
 
 
@@ -96,7 +106,9 @@ def _terms_at(
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Means over the judged frames [J per frame]."""
     found = energies(roll_out)
-    return {f"energy/{term}": float(series[roll_out.judged].mean()) for term, series in found.items()}
+    means = {f"energy/{term}": float(series[roll_out.judged].mean()) for term, series in found.items()}
+    correlation = correlation_with_body(roll_out)
+    return means if correlation is None else means | {"inertia/correlation": correlation}
 
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
@@ -110,3 +122,31 @@ def energies(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
 
 def _of_all(group: SceneRollOuts) -> list[dict[str, NDArray[np.float64]]]:
     return energy_series(group.scene, group.positions)
+
+
+def correlation_with_body(roll_out: RollOut) -> float | None:
+    """Of the method's accelerations with the body's; None without a body, where frames of the motion are left
+    out, or where one of them does not vary.
+    """
+    group = roll_out.group
+    bare = group.kept(skinned)
+    if bare is None or group.scene.kept is not None:
+        return None
+    frames = roll_out.judged_beside(bare)
+    masses = group.scene.cloth.masses
+    own, body = (accelerations(x, masses, group.scene.dt)[frames] for x in (roll_out.positions, bare))
+    if len(own) < 3 or min(np.ptp(size) / size.max(initial=1e-300) for size in (own, body)) < 1e-9:
+        return None
+    return float(np.corrcoef(own, body)[0, 1])
+
+
+def accelerations(
+    positions: NDArray[np.float64], masses: NDArray[np.float64], dt: float
+) -> NDArray[np.float64]:
+    """(T,) root mean square by mass of the second difference of positions (T,V,3) [m] [m/s^2]; the first two
+    are 0. Half the whole mass times dt^2 times its square is the inertia energy.
+    """
+    found = np.zeros(len(positions))
+    squared = (np.diff(positions, 2, axis=0) ** 2).sum(2)
+    found[FIRST_FULL_FRAME:] = np.sqrt(squared @ masses / masses.sum()) / dt**2
+    return found

@@ -59,7 +59,13 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     ladder = [roll_out, *(found for found in finer if found is not None)]
     if len(ladder) < 4:
         return {}
-    return time_errors([energy.measure(one) | curvature.measure(one) for one in ladder])
+    return time_errors([_quantities(one) for one in ladder])
+
+
+def _quantities(one: RollOut) -> dict[str, float]:
+    """Energies [J] and mean curvature [1/m]."""
+    found = energy.measure(one) | curvature.measure(one)
+    return {name: value for name, value in found.items() if name in _QUANTITIES or name.startswith("energy/")}
 
 
 def time_errors(ladder: list[dict[str, float]]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..presets import PRESETS
 from ..registry import DeclarationError, by_name
 from ..scene import Scene
-from .further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, there_and_back
+from .further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 
 SHEET = ("sheet_cells", "sheet_frames")
 
@@ -123,6 +123,7 @@ def all_scenes(
     motions, dynamic = list(motions), list(dynamic_motions)
     first = worn[0].garment
     long = [there_and_back(motion, first) for motion in motions[:1]]
+    shaped = [scene for motion in motions[:1] for scene in shapes(motion, first)]
     chosen = {False: list(dict.fromkeys((*motions, *dynamic))), True: dynamic}
     dressed = [
         scenes.scene(motion, part)
@@ -130,4 +131,4 @@ def all_scenes(
         for motion in chosen[scenes.dynamic]
         for part in ("whole", "clip")
     ]
-    return by_name("scene", (*SCENES, *dressed, *long, *further_scenes(first)))
+    return by_name("scene", (*SCENES, *dressed, *long, *shaped, *further_scenes(first)))

@@ -27,25 +27,35 @@ HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of th
 SHORT = 0.25  # share of a motion's frames that is left out at most
 
 
-def build(scene: Scene, assets: Assets, *, settle_frames: int, warm_up_frames: int) -> BuiltScene:
+def build(
+    scene: Scene,
+    assets: Assets,
+    *,
+    settle_frames: int,
+    warm_up_frames: int,
+    betas: tuple[float, ...] = (),
+) -> BuiltScene:
     """The built scene of a garment and a motion, or of the clip of it.
 
-    warm_up_frames: at the beginning, not judged; fewer where the motion is short.
+    warm_up_frames: at the beginning, not judged; fewer where the motion is short. betas: see shape_of, which
+    says what is raised.
     """
     body, garment = assets.body, assets.garments[scene.garment]
+    shape = shape_of(body, betas, scene.name)
     motion = assets.motion(scene.motion, scene.part)
     before = assets.before(scene.motion, scene.part)
 
     def settle() -> np.ndarray:
         if before is None:
-            return settled(cloth, energies, assets, garment, motion, settle_frames)
-        start = settled(cloth, energies, assets, garment, before, settle_frames)
-        return moved_along(cloth, energies, body, garment, before.followed_by(motion.cut(0, 1)), start)
+            return settled(cloth, energies, assets, garment, motion, settle_frames, shape)
+        start = settled(cloth, energies, assets, garment, before, settle_frames, shape)
+        return moved_along(cloth, energies, body, garment, before.followed_by(motion.cut(0, 1)), start, shape)
 
     cloth = garment.cloth()
-    handles = garment.body_transported(body, motion.poses, motion.translations)
+    handles = garment.body_transported(body, motion.poses, motion.translations, shape)
     energies = declared_energies(cloth)
-    obstacle = Obstacle(assets.posed_body(motion), body.faces, rest_positions=body.shaped())
+    # Which faces a vertex may touch is a matter of the body that the garment was made for.
+    obstacle = Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped())
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
@@ -54,11 +64,22 @@ def build(scene: Scene, assets: Assets, *, settle_frames: int, warm_up_frames: i
         frames=motion.frames,
         settle=settle,
         obstacle=obstacle,
-        origin_heights=body.joints()[0, 1] + motion.translations[:, 1],
-        dressed=Dressed(body, garment, motion, before=before),
+        origin_heights=body.joints(shape)[0, 1] + motion.translations[:, 1],
+        dressed=Dressed(body, garment, motion, shape, before=before),
         warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )
+
+
+def shape_of(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | None:
+    """The shape (S,) of which betas are the first coefficients, the others being zero; None, the mean,
+    without any. Raises ValueError for a body with fewer shapes.
+    """
+    if not betas:
+        return None
+    if body.shape_count < len(betas):
+        raise ValueError(f"the body has {body.shape_count} shapes, {scene} needs {len(betas)}")
+    return np.pad(betas, (0, body.shape_count - len(betas)))
 
 
 def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
@@ -67,9 +88,10 @@ def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
 
 
 def settled(
-    cloth: Cloth, energies: tuple[Energy, ...], assets: Assets, garment: Garment, motion: Motion, frames: int
-) -> np.ndarray:
-    """Positions (V,3) [m] of the cloth at rest on the body in the motion's first pose.
+    cloth: Cloth, energies: tuple[Energy, ...], assets: Assets, garment: Garment, motion: Motion, frames: int,
+    betas: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Positions (V,3) [m] of the cloth at rest on the body of that shape in the motion's first pose.
 
     Raises RuntimeError when the simulation of the approach did not stay finite.
     """
@@ -82,11 +104,11 @@ def settled(
     approach = transition(t_pose, first, frames)
     poses = np.concatenate([approach, np.repeat(first[None], int(HOLD * frames), axis=0)])
     translations = np.repeat(motion.translations[:1], len(poses), axis=0)
-    # The garment, still in its rest shape, goes where the root takes a body in T-pose: a rigid motion.
-    root = body.transforms(t_pose[None], translations[:1])[0, 0]
-    start = cloth.rest_positions @ root[:, :3].T + root[:, 3]
+    # The garment, unposed on that body, goes where the root takes a body in T-pose: a rigid motion.
+    root = body.transforms(t_pose[None], translations[:1], betas)[0, 0]
+    start = garment.rest_for(body, betas) @ root[:, :3].T + root[:, 3]
     way = replace(motion, poses=poses, translations=translations)
-    return _simulated(cloth, energies, body, garment, way, start, "come to rest in the first pose")[-1]
+    return _simulated(cloth, energies, body, garment, way, start, betas, "come to rest in the first pose")[-1]
 
 
 def moved_along(
@@ -96,22 +118,24 @@ def moved_along(
     garment: Garment,
     motion: Motion,
     start: np.ndarray,
+    betas: np.ndarray | None = None,
 ) -> np.ndarray:
     """Positions and velocities (2,V,3) at the motion's last frame, from start (V,3) [m] at rest in its first.
 
     Raises RuntimeError when the simulation did not stay finite.
     """
-    positions = _simulated(cloth, energies, body, garment, motion, start, "reach the first frame of the clip")
+    aim = "reach the first frame of the clip"
+    positions = _simulated(cloth, energies, body, garment, motion, start, betas, aim)
     return np.stack([positions[-1], (positions[-1] - positions[-2]) * motion.fps])
 
 
 def _simulated(
     cloth: Cloth, energies: tuple[Energy, ...], body: Body, garment: Garment, motion: Motion,
-    start: np.ndarray, aim: str,
+    start: np.ndarray, betas: np.ndarray | None, aim: str,
 ) -> np.ndarray:  # fmt: skip
     """Positions (T,V,3) [m] of every frame of the motion. Raises RuntimeError, with what it did not."""
-    posed = body.vertices(motion.poses, motion.translations)
-    handles = garment.body_transported(body, motion.poses, motion.translations)
+    posed = body.vertices(motion.poses, motion.translations, betas)
+    handles = garment.body_transported(body, motion.poses, motion.translations, betas)
     trajectory: Trajectory = simulate(
         cloth, energies, dt=1.0 / motion.fps, frames=motion.frames, start=start,
         obstacle=Obstacle(posed, body.faces, rest_positions=body.shaped()),

@@ -5,6 +5,7 @@ Their metrics leave costs out, so nothing here is timed and several run side by 
 
 from __future__ import annotations
 
+from random import Random
 from typing import Any
 
 from ..presets import Dependence
@@ -74,6 +75,33 @@ OUT_OF_DISTRIBUTION = (
     ),
 )  # fmt: skip
 SMALL = (ORDINARY, "out_of_distribution/walk_x4", "out_of_distribution/long")  # what the smallest preset does
+
+
+SHAPES, SHAPE_SEED = 12, 2022  # of body shapes that no training has drawn
+
+
+def shapes(motion: str, garment: str = "tshirt") -> list[Scene]:
+    """The liveliest part of a motion on the mean body, and on others drawn as a training draws them.
+
+    The garment's rest state stays that of the mean body, in training, simulation and metrics alike.
+    """
+    random = Random(SHAPE_SEED)
+    drawn = {str(place): tuple(random.uniform(-3, 3) for _ in range(10)) for place in range(1, SHAPES + 1)}
+    return [
+        Scene(
+            name=f"shapes/{name}",
+            description=f"{motion} (its liveliest part) on "
+            + (f"body shape {name} of {SHAPES} unseen ones" if betas else "the mean body"),
+            module="benchmarks.scenes.dressed_body",
+            sizes=("settle_frames", "warm_up_frames"),
+            options={"betas": betas},
+            garment=garment,
+            motion=motion,
+            part="clip",
+            metrics=("energy", "geometry", "body_shape"),
+        )
+        for name, betas in {"mean": (), **drawn}.items()
+    ]
 
 
 FRAME_RATE = 30

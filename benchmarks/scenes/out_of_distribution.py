@@ -18,11 +18,9 @@ from snug.motion_library import make_motion
 from snug.skeleton import JOINT, axis_angles, rotation_matrices
 
 from ..scene import BuiltScene, Dressed, Scene
-from .dressed_body import declared_energies, settled
+from .dressed_body import declared_energies, settled, shape_of
 
 if TYPE_CHECKING:
-    from snug.body import Body
-
     from ..assets import Assets
 
 ORDINARY = 44  # frames of the walk that the others are compared with
@@ -43,11 +41,12 @@ def build(
 ) -> BuiltScene:
     """The walk after `change`, one of CHANGES, with these options.
 
-    betas: the first shape coefficients, the others being zero. material: factors on the material, of the
-    simulator and of the energies that are measured. Raises ValueError for a body with fewer shapes.
+    betas: see dressed_body.shape_of, which says what is raised. material: factors on the material, of the
+    simulator and of the energies that are measured.
     """
     body, garment = assets.body, assets.garments[scene.garment]
-    motion, shape = CHANGES[change](make_motion(scene.motion), **options), _shape(body, betas, scene.name)
+    motion = CHANGES[change](make_motion(scene.motion), **options)
+    shape = shape_of(body, betas, scene.name)
     changed = {name: factor * getattr(garment.material, name) for name, factor in (material or {}).items()}
     cloth = garment.cloth(replace(garment.material, **changed))
     energies = declared_energies(cloth)
@@ -73,14 +72,6 @@ def build(
         glitch=GLITCH if change in ("root_jumps", "limb_flips") else None,
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )
-
-
-def _shape(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | None:
-    if not betas:
-        return None
-    if body.shape_count < len(betas):
-        raise ValueError(f"the body has {body.shape_count} shapes, {scene} needs {len(betas)}")
-    return np.pad(betas, (0, body.shape_count - len(betas)))
 
 
 def ordinary(walk: Motion) -> Motion:

@@ -15,9 +15,6 @@ from .task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
     from reference_sim import Trajectory
-    from snug.motion import Motion
-
-    from ..assets import Assets
 
 # With this time step [s] and no velocities inertia weighs a thousandth of what it weighs in a frame: a hem
 # that swings once in a second comes within 3 % of its static place, and there is still one minimum to go to.
@@ -114,7 +111,8 @@ class SimulateClips(Task):
 
     scene: that of any motion in the garment; entry: the method that simulates; motions: those that are mixed.
     clips: a name of all of them; part: number of these: those that `part` + 1 mixed frames for each given one
-    have, and `part` have not. Only clips that are whole and converged are kept, and taught.
+    have, and `part` have not; swinging: see snug.recipes.Simulated. Only clips that are whole and converged
+    are kept, and taught.
     """
 
     kind = "clips"
@@ -126,16 +124,23 @@ class SimulateClips(Task):
     motions: tuple[str, ...]
     clips: str
     part: int
+    swinging: bool = False
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import numpy as np
+
+        from snug.motion_augmentation import shared_clips
 
         assets, run, garment = context.assets, context.folder, self.scene.garment
         assert assets is not None
         kept: dict[str, Any] = {}
         left_out: dict[str, str] = {}
-        clips = shared_clips_of(assets, garment, self.motions, self.part + 1)
-        for clip in clips[len(shared_clips_of(assets, garment, self.motions, self.part)) :]:
+        vertices = len(assets.garments[garment].rest_positions)
+        before, clips = (
+            shared_clips(assets.named(self.motions), share, vertices=vertices, swinging=self.swinging)
+            for share in (self.part, self.part + 1)
+        )
+        for clip in clips[len(before) :]:
             own = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
             scene = replace(self.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(own)
             try:
@@ -155,14 +160,6 @@ class SimulateClips(Task):
         context.tell(self.units)
         result = {"clips": list(kept), "left_out": left_out}
         return Outcome(result=result, files=(run.relative(path),))
-
-
-def shared_clips_of(assets: Assets, garment: str, motions: tuple[str, ...], share: int) -> list[Motion]:
-    """`share` frames of mixed clips for each frame of these motions, for the networks of a garment."""
-    from snug.motion_augmentation import shared_clips
-
-    vertices = len(assets.garments[garment].rest_positions)
-    return shared_clips(assets.named(motions), share, vertices=vertices)
 
 
 def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Trajectory:

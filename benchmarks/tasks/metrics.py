@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..frame_energies import SECONDS
 from ..metric import Estimate, RollOut, SceneRollOuts
 from ..metrics import find_metric, modules, names_of
 from ..registry import load
@@ -55,6 +56,9 @@ class MeasureCell(Task):
             roll_out.training_poses = _training_poses(self.training, context)
         metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)
         path = self.cell.curves(folder)
+        if curves:
+            curves[SECONDS] = np.array(roll_out.trajectory.times[: len(roll_out.positions)], dtype=float)
+            curves[SECONDS][: roll_out.scene.warm_up] = np.nan
         write_curves(path, curves, roll_out.trajectory.frames)
         context.tell(self.units)
         return Outcome(status, reason, result=metrics, files=(folder.relative(path),))
@@ -145,7 +149,8 @@ def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | No
         given = assets.named(training.motions)
         vertices = len(assets.garments[training.garment].rest_positions)
         mixed = mixed_for(given, how.recipe, vertices=vertices, seed=training.seed)
-        mixed += shared_clips(given, how.simulated.mixed if how.simulated else 0, vertices=vertices)
+        if said := how.simulated:
+            mixed += shared_clips(given, said.mixed, vertices=vertices, swinging=said.swinging)
         context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
     return context.memo[training.id]
 

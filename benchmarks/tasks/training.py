@@ -140,7 +140,11 @@ class TrainNetwork(Task):
         if twice := sorted(found.keys() & set(self.motions)):
             raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
         vertices = len(assets.garments[self.garment].rest_positions)
-        clips = shared_clips(assets.named(self.motions), len(self.clips), vertices=vertices)
+        said = self.chosen.simulated if self.chosen else None
+        clips = shared_clips(
+            assets.named(self.motions), len(self.clips), vertices=vertices,
+            swinging=said is not None and said.swinging,
+        )  # fmt: skip
         return [clip for clip in clips if clip.name in found], found
 
     @staticmethod

@@ -55,7 +55,7 @@ class CompareWindows(Task):
         model = TrainedModel.load(training.path(context.folder))
         how = find_kind(model.kind)
         context.tell(self.units)
-        if not (model.steps and how.physics and how.sequences and how.supervision is None):
+        if not (model.steps and how.physics and how.sequences):
             return Outcome()
         dressed = DressedBody(assets.body, assets.garments[training.garment])
         try:

@@ -14,16 +14,20 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor, nn
 
+from snug.fast_network import run_linear
 from snug.regressor import Regressor
 
 if TYPE_CHECKING:
     from snug.frame_plan import FramePlan
 
-WIDTH, DEPTH = 32, 4
-
 
 class PoseSpaceDeformation(nn.Module):
     """features (N, T, D) -> offsets (N, T, V, 3) [m]; the state is always None. Called as a Regressor is."""
+
+    widths: tuple[int, ...] = (32,) * 4
+    activation: type[nn.Module] = nn.ReLU
+    constant = False  # whether there is a deformation in every pose
+    closed_form = False
 
     def __init__(
         self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
@@ -34,19 +38,21 @@ class PoseSpaceDeformation(nn.Module):
         self.input_std: Tensor
         self.register_buffer("input_mean", torch.zeros(inputs))
         self.register_buffer("input_std", torch.ones(inputs))
-        widths = [inputs, *[WIDTH] * DEPTH]
-        layers = [layer for a, b in pairwise(widths) for layer in (nn.Linear(a, b), nn.ReLU())]
+        sizes = pairwise((inputs, *self.widths))
+        layers = [layer for a, b in sizes for layer in (nn.Linear(a, b), self.activation())]
         self.activations = nn.Sequential(*layers)
-        # The deformation matrix, (32, V, 3) flattened.
-        self.offsets = nn.Linear(WIDTH, 3 * vertices, bias=False)
+        # The deformation matrix, (width, V, 3) flattened.
+        self.offsets = nn.Linear(self.widths[-1], 3 * vertices, bias=self.constant)
         if zero_last_layer:
-            nn.init.zeros_(self.offsets.weight)
+            for parameter in self.offsets.parameters():
+                nn.init.zeros_(parameter)
 
     normalise_by = Regressor.normalise_by
 
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
         normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
-        flat = self.offsets(self.activations(normalised)) * self.output_scale  # (N, T, 3V)
+        hidden = self.activations(normalised)
+        flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), None
 
     def lay_out(self, plan: FramePlan) -> None:
@@ -54,7 +60,7 @@ class PoseSpaceDeformation(nn.Module):
         x = plan.normalised(self)
         for layer in self.activations:
             if isinstance(layer, nn.Linear):
-                x = plan.linear(layer, x, rectified=True)
+                x = plan.linear(layer, x, self.activation)
         plan.offsets(self, (self.offsets, x))
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> None:

@@ -59,5 +59,5 @@ class FitAndWrinkles(nn.Module):
         """`forward` for one frame."""
         x = plan.normalised(self)
         first, _, drape = self.fit
-        shape = plan.linear(first, slice(x.stop - SHAPES, x.stop), rectified=True)
+        shape = plan.linear(first, slice(x.stop - SHAPES, x.stop), nn.ReLU)
         plan.offsets(self, (drape, shape), (self.offsets, plan.gru(self.gru, x)))

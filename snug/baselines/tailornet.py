@@ -57,7 +57,7 @@ class _Perceptron(nn.Module):
     def lay_out(self, plan: FramePlan, x: slice) -> tuple[nn.Linear, slice]:
         """The last layer, and the place of what it reads, from numbers at x."""
         for layer in (self.first, self.second):
-            x = plan.linear(layer, x, rectified=True)
+            x = plan.linear(layer, x, nn.ReLU)
         return self.last, x
 
 

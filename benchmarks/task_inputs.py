@@ -1,0 +1,96 @@
+"""What decides a task: the inputs and modules by which the cache knows it again."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from snug.recipe import TERMS
+
+from . import provenance
+from .method import MethodEntry
+from .plan import Plan
+from .results import digest_of_file
+from .scene import Scene
+from .source import digest
+
+ASSETS = "benchmarks.assets"
+
+
+class TaskInputs:
+    """Of the tasks of one plan: by machine, body, garment, motion, scene and method."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan, self.preset = plan, plan.preset
+
+    def machine(self, device: str = "cpu") -> dict[str, Any]:
+        """Times of another machine are not reused. device: of what trains; nothing else uses another."""
+        facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
+        names = ("processor", "cores", "python", "accelerator")
+        return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
+
+    @cached_property
+    def _hardware(self) -> dict[str, Any]:
+        return provenance.hardware(self.plan.device)
+
+    def of_scene(self, scene: Scene, *modules: str) -> dict[str, Any]:
+        """inputs and modules of a task that builds the scene; what is measured in it is no part of it."""
+        said = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
+        del said["metrics"], said["counterpart"]
+        inputs = self.machine() | {"scene": said}
+        modules = (*modules, *modules_behind(scene))
+        if not scene.dressed:
+            return {"inputs": inputs, "modules": modules}
+        inputs |= self.of_body(scene.garment) | {"motion": self.motion(scene.motion)}
+        if scene.part == "clip":
+            inputs["clip_frames"] = self.preset.clip_frames
+        return {"inputs": inputs, "modules": (*modules, ASSETS)}
+
+    def of_body(self, garment: str) -> dict[str, Any]:
+        """What the assets are made from."""
+        sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
+        own: dict[str, Any] = {}
+        if self.plan.body:
+            own["body"] = self.plan.body.digest
+        if self.plan.garment and garment == self.plan.garment.file.name:
+            own["own garment"] = self.plan.garment.inputs
+        return {"assets": sizes} | own
+
+    def motion(self, name: str) -> str:
+        """Of a file its content; an embedded one is made by code, looked at by itself."""
+        files = self.plan.motions.files
+        return f"{name} {digest(files[name])}" if name in files else name
+
+    def simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:
+        """inputs and modules of a task that builds the scene, with those of the method."""
+        return {
+            "inputs": of_scene["inputs"] | {"method": declared(entry)},
+            "modules": (*of_scene["modules"], *modules_behind(entry)),
+        }
+
+
+def declared(entry: Any) -> dict[str, Any]:
+    """What a scene, a method or a case declares, but for the words about it; of files their content."""
+    fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
+    kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
+    said = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
+    if isinstance(entry, MethodEntry):
+        said["files"] = {path: digest_of_file(Path(path)) for path in said["files"]}
+    return said
+
+
+def modules_behind(entry: Any) -> tuple[str, ...]:
+    """Of a scene or a method: its module, and what declares it where that is outside."""
+    return tuple(dict.fromkeys(filter(None, (entry.module, entry.declared_in))))
+
+
+def modules_of(terms: Iterable[str]) -> tuple[str, ...]:
+    """Modules of energies that a recipe names beside the usual ones: they are found by name, not imported."""
+    if set(terms) <= set(TERMS):
+        return ()
+    from reference_sim.energies import MODULE_OF
+
+    return tuple(f"reference_sim.energies.{module}" for module in sorted(set(MODULE_OF.values())))
