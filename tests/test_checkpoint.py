@@ -216,7 +216,7 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     out = tmp_path / "small.safetensors"
     words = ["--vertices", "200", "--steps", "8", "-o", str(out), "--resume"]
     library = [swaying(20), swaying(16, name="held")]
-    monkeypatch.setattr(module, "_motions", lambda options: (library[:1], library[1:]))
+    monkeypatch.setattr(module, "_motions", lambda options, data: (library[:1], library[1:]))
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
     assert module.main(words) == 130
     assert "step 1 of 8" in capsys.readouterr().err
@@ -252,7 +252,7 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
 def test_garments_are_trained_one_after_another_and_those_that_ended_stay(tmp_path, monkeypatch, capsys):
     from snug import train as module
 
-    monkeypatch.setattr(module, "_motions", lambda options: ([swaying(20)], []))
+    monkeypatch.setattr(module, "_motions", lambda options, data: ([swaying(20)], []))
     words = ["--vertices", "200", "--steps", "3", "-o", str(tmp_path / "mine.safetensors"), "--resume"]
     words += ["--garment", "tshirt", "--garment", "tunic"]
     asked = iter([False, False, False, True])  # in the first step of the second

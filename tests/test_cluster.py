@@ -243,13 +243,15 @@ def test_what_a_cluster_cannot_do_is_refused(option, value):
 # --- what dies ---------------------------------------------------------------------------------------------
 
 
-def test_an_interrupt_ends_what_the_cluster_does_and_leaves_the_cluster(two, folder, tmp_path):
+def test_an_interrupt_ends_what_the_cluster_does_and_leaves_the_cluster(two, folder, tmp_path, request):
     mark = tmp_path / "mark"
 
     def interrupt():
         until(lambda: len(lines(mark)) == 2)
         os.kill(os.getpid(), signal.SIGINT)
 
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     threading.Thread(target=interrupt).start()
     with pytest.raises(KeyboardInterrupt):
         together(folder, two.address, *([write(f"{n}", seconds=60.0, mark=str(mark))] for n in range(4)))

@@ -74,7 +74,7 @@ def report(request, tmp_path_factory):
             write_mesh(run.trajectory_path(scene, method), *sheet(0.1), fields)
     read, problems = build.read_run(run), []
     made = make_tables(read)
-    build.typeset(run, document(read, made, build.draw(run, read, problems), problems))
+    build.typeset(run, document(read, made, build.draw(run, read, [], problems), problems))
     assert not problems
     found = pdfium.PdfDocument(run.report_path)
     yield found

@@ -385,7 +385,7 @@ def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
     assert "say of which files by --motions" in capsys.readouterr().err
     np.savez(tmp_path / "a.npz", poses=np.zeros((9, 72)), trans=np.zeros((9, 3)))
     validating = ["--validation", "kick", "--validation", "bow"]
-    training, validation = _motions(parse(validating))
+    training, validation = _motions(parse(validating), None)
     assert [motion.name for motion in validation] == ["bow", "kick"]
     assert {motion.name for motion in training} == set(TRAIN) - {"bow"}
     assert main(["--validation", "dance_turn", "-o", str(out)]) == 2  # a test motion
