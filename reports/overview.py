@@ -15,16 +15,18 @@ from reports.table import Cell, Column, Table, metric_column, table
 ROWS = 8
 WORN = ("energy/total", "energy/strain", "curvature/error", "penetration/vertices")
 STEPS = ("gap/energy", "step/distance")
+LEARNED = ("network", "ablation")
 BEST_BY = ("step/distance", "gap/energy", "curvature/error", "energy/total")
 
 
 def leads(run: Run, rows: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
     """The reference, the network, the best of other networks in these rows, and the first baseline; of those
-    in `among` alone where that is given.
+    in `among` alone where that is given. Changed networks are networks where a run has no others.
     """
     usable = set(rows[rows["usable"]]["method"])
     have = usable if among is None else usable & set(among)
-    others = [name for name in run.with_role("network") if name in have and not run.methods[name].base]
+    learned = [name for name in run.with_role(*LEARNED) if name in have]
+    others = [name for name in learned if not run.methods[name].base] or learned
     own = NETWORK if NETWORK in others else next(iter(others), "")
     best = _best(run, rows, [name for name in others if name != own])
     baseline = next((name for name in run.with_role("baseline") if name in have), "")

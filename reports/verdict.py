@@ -10,7 +10,7 @@ from reports.data import Run
 from reports.means import Mean, mean_of, pair, shared_scenes, value_of
 from reports.narrative import fronts, unbroken
 from reports.numbers import number, with_spread
-from reports.overview import leads
+from reports.overview import LEARNED, leads
 from reports.pareto import TIME, WHOLE, indistinct
 from reports.significance import within_uncertainty
 
@@ -42,7 +42,7 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     scenes = shared_scenes(rows, names, TOTAL)
     found = {name: mean_of(rows, name, TOTAL, scenes) for name in names}
     means = {name: mean for name, mean in found.items() if mean is not None}
-    own = next((name for name in means if run.methods[name].role == "network"), "")
+    own = next((name for name in means if run.methods[name].role in LEARNED), "")
     if not own or run.reference not in means:
         return ""
     one, other = means.pop(own), means.pop(run.reference)

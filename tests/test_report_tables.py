@@ -364,6 +364,16 @@ def test_page_one_shows_the_network_the_best_of_others_and_a_baseline():
     assert leads(run, run.worn, ["pbns", "simulation"]) == ["simulation", "pbns"]
 
 
+def test_changed_networks_are_networks_where_a_run_has_no_others():
+    rows = on_two_scenes("snug-springs", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
+    changed = [dataclasses.replace(r, role="ablation", base="snug") for r in rows[:2]] + rows[2:]
+    run = run_of(changed)
+    assert leads(run, run.worn) == ["simulation", "snug-springs"]
+    assert "5.00 J, is above the simulation's, 3.75" in near(changed)
+    both = run_of(changed + on_two_scenes("snug", 1.0, 9.0))
+    assert leads(both, both.worn) == ["simulation", "snug"]
+
+
 def test_the_table_of_page_one_stays_short():
     many = [row(scene, f"mine-{k}", "energy/total", 1.0 + k) for k in range(20) for scene in SCENES]
     made = make_tables(run_of([*all_rows(), *many]))["overview"]
