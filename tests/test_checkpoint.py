@@ -64,7 +64,9 @@ def asked_after(steps):
         ("pbns", PLAIN),
         ("dynamic", replace(DYNAMIC, pretraining=3)),
         ("supervised", SUPERVISED),
-        ("santesteban2019", SANTESTEBAN2019),
+        pytest.param(
+            "santesteban2019", SANTESTEBAN2019, marks=pytest.mark.slow
+        ),  # its GRU of 1500 takes half a minute
         ("tailornet", TAILORNET),
     ],
     ids=["mixed", "paper", "pbns", "dynamic", "supervised", "santesteban2019", "tailornet"],
