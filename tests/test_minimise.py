@@ -299,8 +299,8 @@ def test_a_factorisation_used_again_saves_others_and_ends_in_a_minimum(case):
     fresh = minimise(potential, x0)
     again = minimise(potential, x0, reuse=True, observe=kept.append)
     assert_minimum(potential, x0, again)
-    # Of 20 and more; round-off alone makes it two more or less.
-    assert again.factorisations < fresh.factorisations - 1 and again.iterations > again.factorisations
+    # 16 or 18 of 20 where the sheet hangs: that much is round-off.
+    assert again.factorisations <= 0.9 * fresh.factorisations and again.iterations > again.factorisations
     assert len(kept) <= again.iterations + 1  # every step that was kept is an iteration
     assert (np.diff([potential.value(x) for x in kept]) <= 1e-12 * abs(again.energy)).all()
 
