@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from snug.motion import Motion
 
 LONGEST = 1_000_000  # frames of a sequence
-MIXING_SEED = 0  # of mixed clips: the same ones for every data set
 
 
 def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
@@ -123,7 +122,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
 def choose_motions(options: argparse.Namespace, *, dynamic: bool) -> dict[str, Motion]:
     """Name -> motion of each sequence. Raises ValueError for names that come twice, and for none."""
     from snug import motion_library as library
-    from snug.motion_augmentation import FRAMES, mixed_motions
+    from snug.motion_augmentation import FRAMES, SHARED_SEED, mixed_motions
     from snug.motion_files import load_motions
 
     reading, given = reading_of(options), list[Any]()
@@ -133,7 +132,7 @@ def choose_motions(options: argparse.Namespace, *, dynamic: bool) -> dict[str, M
     count = len(given) if options.sequences is None else options.sequences
     if more := max(0, count - len(given)):
         turn, lifted = DEFAULT.mixed_turn, DEFAULT.mixed_lift
-        given += mixed_motions(given, more * FRAMES, turn=turn, lifted=lifted, seed=MIXING_SEED)
+        given += mixed_motions(given, more * FRAMES, turn=turn, lifted=lifted, seed=SHARED_SEED)
     if not 0 <= options.first < count:
         raise PlanError(f"--from {options.first}: give a whole number below {count}, that of the sequences")
     motions: dict[str, Motion] = by_name("motion", given[:count])

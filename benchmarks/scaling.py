@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .json_file import read_json
+from .cache import read_entry
 from .results import ResultsError, RunFolder, replacing
 
 if TYPE_CHECKING:
@@ -86,8 +86,8 @@ def measured(folder: RunFolder, kinds: Sequence[str] = ()) -> list[Measured]:
             continue
         timed = issubclass(own, cell.CellTask | microbenchmark.RunMicrobenchmark)
         for path in sorted((folder.cache / kind).rglob("*.json")):
-            entry = read_json(path)
-            if not entry["outcome"]["failed"]:
+            entry = read_entry(path)
+            if entry and not entry["outcome"]["failed"]:
                 files = (folder.path / name for name in entry["files"])
                 size = sum(file.stat().st_size for file in files if file.is_file()) / MEGABYTE
                 found.append(Measured(own.stage, float(entry["outcome"]["seconds"]), size, timed))

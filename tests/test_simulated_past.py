@@ -68,6 +68,9 @@ def test_the_past_of_another_motion_is_not_its_own_and_what_is_not_simulated_has
     assert terms["distance"].flatten().bool().tolist() == [True, True, False]  # 17: not simulated
     with pytest.raises(TargetError, match=r"no simulated trajectory.*'other'"):
         SimulatedPast(data, motions, {motions[0].name: known[motions[0].name]})
+    known["other"][5, 7, 1] = np.nan
+    with pytest.raises(TargetError, match="'other' is not finite at frame 5"):
+        SimulatedPast(data, motions[:2], known)
 
 
 def turning(rate=1.5, frames=20, heading=0.0):
