@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from snug.garments import Garment
     from snug.motion import Motion
 
-    from .presets import Preset
+    from .request.presets import Preset
 
 
 @dataclass(frozen=True)

@@ -11,20 +11,20 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import outside
 from .methods import find_method
-from .plan import Motions, Plan
-from .presets import find_preset
 from .registry import DeclarationError
+from .request import outside
+from .request.plan import Motions, Plan
+from .request.presets import find_preset
 from .results import RunFolder
 from .scenes import SCENES, find_scene, of_garment
 from .tasks.cell import Cell
 from .timing import one_thread
 
 if TYPE_CHECKING:
-    from .executor import LocalExecutor
-    from .runner import Runner
-    from .schedule import Schedule
+    from .runner.executor import LocalExecutor
+    from .runner.loop import Runner
+    from .runner.schedule import Schedule
     from .tasks.task import Task
 
 PROGRAM = "benchmarks.check"
@@ -106,10 +106,10 @@ def check(
 ) -> Iterator[tuple[str, bool]]:
     """Lines on each entry in each scene, and whether they are fine. Writes into the folder."""
     from .assets import embedded_motions, open_assets
-    from .cache import Cache
-    from .executor import LocalExecutor
-    from .runner import Runner
-    from .schedule import Schedule
+    from .runner.cache import Cache
+    from .runner.executor import LocalExecutor
+    from .runner.loop import Runner
+    from .runner.schedule import Schedule
 
     plan = plan_of(declared, folder)
     for entry in declared["methods"]:

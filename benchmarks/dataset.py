@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from snug.garment_file import add_garment_options
 from snug.motion_options import add_motion_options
 
-from .run_options import Parser
+from .request.options import Parser
 from .timing import one_thread
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _build(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from .build_dataset import build
+    from .datasets.build import build
     from .tasks.task import RunStopped
 
     try:
@@ -137,8 +137,8 @@ def _told(found: DataSet) -> int:
 def _verify(options: argparse.Namespace, words: Sequence[str]) -> int:
     from snug.dataset import MISSING, DataSet
 
-    from .cache import damaged
     from .results import RunFolder
+    from .runner.cache import damaged
 
     found = DataSet.read(options.folder)
     folder, wrong = RunFolder(found.folder), 0
@@ -170,7 +170,7 @@ def _list(options: argparse.Namespace, words: Sequence[str]) -> int:
 
 
 def _merge(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from .merge_datasets import merge
+    from .datasets.join import merge
 
     return _told(merge([Path(folder) for folder in options.folders], Path(options.out)))
 

@@ -10,9 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .one_scene import plan_of_scene, words_of_scene
-from .plan import Plan, PlanError
-from .run_options import Parser, add_scene_options
+from .request.one_scene import plan_of_scene, words_of_scene
+from .request.options import Parser, add_scene_options
+from .request.plan import Plan, PlanError
 from .timing import one_thread
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def plan_of(options: argparse.Namespace) -> Plan:
 
 def built(plan: Plan) -> tuple[BuiltScene, Assets | None]:
     """The scene of the plan, made. Raises ValueError where a garment or a motion cannot be."""
-    from .execution import assets_of
+    from .runner.execution import assets_of
 
     assets = assets_of(plan) if plan.garments else None
     return plan.scenes[0].build(assets), assets

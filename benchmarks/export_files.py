@@ -18,7 +18,7 @@ from .methods import find_method
 
 if TYPE_CHECKING:
     from .assets import Assets
-    from .plan import Plan
+    from .request.plan import Plan
     from .scene import BuiltScene, Dressed
 
 FINGERS = 30  # joints of SMPL-H's hands, which a garment never meets

@@ -17,11 +17,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from .cache import read_entry
-from .execution import OF_TRAINING
 from .performance.microbenchmark import SUITE
+from .request.options import Parser
 from .results import ResultsError, Row, RunFolder, digest_of_file
-from .run_options import Parser
+from .runner.cache import read_entry
+from .runner.execution import OF_TRAINING
 
 PROGRAM = "benchmarks.merge"
 EXAMPLES = """examples:

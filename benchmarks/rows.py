@@ -11,9 +11,9 @@ from typing import Any
 from .methods import find_method
 from .metric import Metric
 from .metrics import declared, find_metric
-from .plan import Plan, network_of
+from .request.plan import Plan, network_of
 from .results import REFERENCE_TOLERANCE, Row, as_right
-from .schedule import Schedule
+from .runner.schedule import Schedule
 from .tasks.cell import Cell
 from .tasks.task import Outcome, Task, TaskId
 

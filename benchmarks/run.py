@@ -19,21 +19,21 @@ from pathlib import Path
 from snug.garment_file import demand_a_file, garment_file
 from snug.motion_options import reading_of
 
-from . import outside
-from .cache import DEFAULT_ONLY, STATES
 from .methods import METHODS
 from .performance.microbenchmark import SUITE
-from .plan import Motions, OwnBody, OwnGarment, Plan, PlanError
-from .presets import find_preset
 from .provenance import usable_cores
 from .registry import DeclarationError
+from .request import outside
+from .request.options import PROGRAM, make_parser
+from .request.plan import Motions, OwnBody, OwnGarment, Plan, PlanError
+from .request.presets import find_preset
+from .request.roles import choose_motions
+from .request.selection import MEASURED, Request, choose, choose_suites, names_no_motion
 from .results import ResultsError, RunFolder, digest_of_file
-from .roles import choose_motions
-from .roll_out_option import RollOutError
-from .roll_out_option import parse as parse_roll_out
-from .run_options import PROGRAM, make_parser
+from .roll_outs.option import RollOutError
+from .roll_outs.option import parse as parse_roll_out
+from .runner.cache import DEFAULT_ONLY, STATES
 from .scenes import GARMENT_SCENES, all_scenes
-from .selection import MEASURED, Request, choose, choose_suites, names_no_motion
 from .tasks.task import RunStopped
 from .timing import one_thread
 
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = make_parser().parse_args(words)
         if options.list:
-            from .listing import listing
+            from .request.listing import listing
 
             print(listing())
             return 0
@@ -62,15 +62,15 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
     """Run the plan, or say what would be run; returns the exit status."""
     for motion in plan.motions.files.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
-    from .lock import HeldError, held
+    from .runner.lock import HeldError, held
 
     try:
         if dry_run:
-            from .dry_run import describe
+            from .runner.dry_run import describe
 
             print(describe(plan))
             return 0
-        from .execution import check_roll_outs, execute
+        from .runner.execution import check_roll_outs, execute
 
         check_roll_outs(plan)
         with held(plan.folder):
@@ -242,7 +242,7 @@ def choose_scheduler(options: argparse.Namespace) -> str:
         )
     if options.rollout:
         raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
-    from .cluster import check_scheduler
+    from .runner.cluster import check_scheduler
 
     check_scheduler(options.scheduler)
     return options.scheduler

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .cache import read_entry
 from .results import ResultsError, RunFolder, replacing
+from .runner.cache import read_entry
 
 if TYPE_CHECKING:
     import numpy as np

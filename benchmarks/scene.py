@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from snug.motion import Motion
 
     from .assets import Assets
-    from .presets import Preset
+    from .request.presets import Preset
 
 
 @dataclass(frozen=True, kw_only=True)

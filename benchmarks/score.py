@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from .one_scene import plan_of_scene
-from .plan import Plan
+from .request.one_scene import plan_of_scene
+from .request.options import Parser, add_scene_options
+from .request.plan import Plan
+from .request.selection import stored_cells
 from .results import RunFolder
-from .roll_out_option import RollOutOption, Stated, checked_ms
+from .roll_outs.option import RollOutOption, Stated, checked_ms
 from .run import carry_out
-from .run_options import Parser, add_scene_options
-from .selection import stored_cells
 from .tasks.cell import Cell
 from .timing import one_thread
 

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .plan import PlanError
+from .request.options import Parser
+from .request.plan import PlanError
 from .results import ResultsError, RunFolder, replacing
-from .run_options import Parser
 from .timing import THREADS
 
 PROGRAM = "benchmarks.speedup"

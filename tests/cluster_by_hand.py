@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.cache import Cache
-from benchmarks.cluster import ClusterExecutor
-from benchmarks.executor import Executor
 from benchmarks.results import RunFolder
-from benchmarks.runner import Runner
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.cluster import ClusterExecutor
+from benchmarks.runner.executor import Executor
+from benchmarks.runner.loop import Runner
 from benchmarks.tasks.task import Outcome, Task
 
 TESTS = Path(__file__).resolve().parent

@@ -30,8 +30,8 @@ from report_folder import SCENES, all_rows, declaration
 
 from benchmarks.json_file import ResultsError
 from benchmarks.results import RunFolder
-from benchmarks.roll_out_files import read_roll_out
-from benchmarks.roll_out_option import RollOutError
+from benchmarks.roll_outs.files import read_roll_out
+from benchmarks.roll_outs.option import RollOutError
 from reference_sim import Trajectory, TrajectoryError
 from reference_sim.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.cloth import Cloth, MeshError

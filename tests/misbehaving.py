@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.executor import LocalExecutor
 from benchmarks.method import Method
+from benchmarks.runner.executor import LocalExecutor
 from reference_sim.trajectory import Trajectory
 
 

@@ -6,7 +6,7 @@ import dataclasses
 import time
 
 from benchmarks.assets import Assets
-from benchmarks.presets import Preset, find_preset
+from benchmarks.request.presets import Preset, find_preset
 from benchmarks.results import RunFolder
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment

@@ -10,10 +10,10 @@ import time
 import pytest
 from test_cell_tasks import finish, plan_of
 
-from benchmarks.dry_run import describe
 from benchmarks.results import RunFolder
 from benchmarks.rows import rows_of
-from benchmarks.schedule import tasks_of
+from benchmarks.runner.dry_run import describe
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS, STRESS_TESTS
 
@@ -109,7 +109,7 @@ def test_every_case_has_an_identity_of_its_own(tmp_path):
 def test_a_stress_test_depends_on_how_it_is_checked_and_on_the_body_that_it_reads_but_not_on_the_others(
     tmp_path,
 ):
-    from benchmarks.cache import dependencies
+    from benchmarks.runner.cache import dependencies
 
     tasks = {task.name: dependencies(task) for task in tasks_of(plan_of(tmp_path, cases=STRESS_TESTS))}
     for found in tasks.values():

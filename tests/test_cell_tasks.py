@@ -13,18 +13,19 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import execution, run
-from benchmarks.cache import Cache
-from benchmarks.dry_run import describe
-from benchmarks.executor import LocalExecutor
+from benchmarks import run
 from benchmarks.methods import find_method
-from benchmarks.plan import Plan
-from benchmarks.presets import find_preset
+from benchmarks.request.plan import Plan
+from benchmarks.request.presets import find_preset
 from benchmarks.results import Row, RunFolder
 from benchmarks.rows import clock_costs, rows_of
-from benchmarks.runner import Runner
+from benchmarks.runner import execution
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.dry_run import describe
+from benchmarks.runner.executor import LocalExecutor
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES as DECLARED
-from benchmarks.schedule import tasks_of
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.task import Outcome, failure
 
@@ -106,7 +107,7 @@ def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_pat
 @pytest.mark.parametrize("scene", ["hanging_sheet", "sheet_on_sphere"])
 def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
     """Modules that the process loaded are among the source that its entry in the cache is known by."""
-    from benchmarks.cache import dependencies
+    from benchmarks.runner.cache import dependencies
 
     plan = plan_of(tmp_path, "newton-1", scene=scene)
     loaded = outcome_of(plan).result["modules"]
@@ -380,7 +381,7 @@ def test_a_dry_run_tells_what_is_there(tmp_path):
 
 HANGING = """
 import time
-from benchmarks.process import IsolatedProcess
+from benchmarks.runner.process import IsolatedProcess
 if __name__ == "__main__":
     with IsolatedProcess() as process:
         process.call(print, "begun", seconds=60)

@@ -21,13 +21,14 @@ pytest.importorskip("distributed")
 
 from cluster_by_hand import PATH, Cluster, cluster, finish, write
 
-from benchmarks import cluster as runner_side
-from benchmarks import cluster_worker, execution, run
-from benchmarks.cluster import ClusterExecutor
-from benchmarks.executor import LocalExecutor
-from benchmarks.plan import PlanError
+from benchmarks import run
+from benchmarks.request.plan import PlanError
 from benchmarks.results import RunFolder, digest_of_file
-from benchmarks.source import digest
+from benchmarks.runner import cluster as runner_side
+from benchmarks.runner import cluster_worker, execution
+from benchmarks.runner.cluster import ClusterExecutor
+from benchmarks.runner.executor import LocalExecutor
+from benchmarks.runner.source import digest
 from benchmarks.tasks.task import Outcome, RunStopped
 from snug.tensor_file import read_tensors
 
@@ -192,12 +193,12 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
 
 def test_a_worker_with_other_software_is_left_out_in_one_line(two, folder, monkeypatch, capsys):
     own = cluster_worker.software_of
-    other = {"package numpy": "numpy 1.0", "benchmarks/executor.py": "0"}
+    other = {"package numpy": "numpy 1.0", "benchmarks/runner/executor.py": "0"}
     monkeypatch.setattr(cluster_worker, "software_of", lambda task: own(task) | other)
     with pytest.raises(RunStopped, match="can be used") as stopped:
         together(folder, two.address, [write("one")])
     assert "package numpy: numpy 2" in str(stopped.value) and "numpy 1.0 here" in str(stopped.value)
-    assert "benchmarks/executor.py" in str(stopped.value) and list(folder.path.iterdir()) == []
+    assert "benchmarks/runner/executor.py" in str(stopped.value) and list(folder.path.iterdir()) == []
     said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("left out: worker tcp:")]
     assert len(said) == 2
 

@@ -10,7 +10,7 @@ from meshes import box, patch
 from tasks_by_hand import small_scene
 
 from benchmarks.assets import open_assets
-from benchmarks.presets import find_preset
+from benchmarks.request.presets import find_preset
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import of_garment
 from benchmarks.scenes.long_motion import there_and_back

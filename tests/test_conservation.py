@@ -12,12 +12,12 @@ from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import conservation
 from benchmarks.metrics.conservation import law_series
-from benchmarks.plan import Plan
-from benchmarks.presets import find_preset
+from benchmarks.request.plan import Plan
+from benchmarks.request.presets import find_preset
 from benchmarks.rows import rows_of_cell
+from benchmarks.runner.schedule import Schedule
 from benchmarks.scene import Dressed
 from benchmarks.scenes import find_scene
-from benchmarks.schedule import Schedule
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.task import Outcome
 from reference_sim import simulate

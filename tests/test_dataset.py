@@ -16,7 +16,8 @@ import pytest
 from dressing import tube_dress
 from tasks_by_hand import InProcess
 
-from benchmarks import build_dataset, dataset
+from benchmarks import dataset
+from benchmarks.datasets import build as build_dataset
 from benchmarks.tasks import ground_truth
 from reference_sim.trajectory import Trajectory
 from snug import train as train_command
@@ -176,8 +177,8 @@ def test_halves_of_two_machines_are_the_whole(built, tube, here, tmp_path, monke
 
 def _entry(folder: Path, name: str, change) -> None:
     """Rewrite an entry of the cache as if it had been written so."""
-    from benchmarks.cache import _text, read_entry
-    from benchmarks.source import digest
+    from benchmarks.runner.cache import _text, read_entry
+    from benchmarks.runner.source import digest
 
     path = folder / "cache" / "sequence" / f"tube-{name}" / "simulation.json"
     entry = read_entry(path)

@@ -10,12 +10,12 @@ import pytest
 from benchmarks.assets import Assets
 from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.plan import Motions
-from benchmarks.presets import PRESETS, Dependence, find_preset
+from benchmarks.request.plan import Motions
+from benchmarks.request.presets import PRESETS, Dependence, find_preset
+from benchmarks.request.selection import Request, choose
 from benchmarks.scenes import dependence as module
 from benchmarks.scenes import find_scene
 from benchmarks.scenes.further import DRAPES
-from benchmarks.selection import Request, choose
 from benchmarks.tasks.metrics import measured
 from snug.body import Body
 

@@ -11,7 +11,7 @@ from dressing import swaying, tube_dress
 from benchmarks.assets import open_assets
 from benchmarks.methods.direct_optimisation import ClipInertia, DirectOptimisation
 from benchmarks.metrics.energy import energy_series
-from benchmarks.presets import find_preset
+from benchmarks.request.presets import find_preset
 from benchmarks.scenes import of_garment
 from reference_sim.cloth import Cloth
 from reference_sim.energies import Inertia

@@ -22,8 +22,9 @@ from tasks_by_hand import InProcess
 from test_checkpoint import same_model, short
 from test_trajectory import wave
 
-from benchmarks import execution, run
+from benchmarks import run
 from benchmarks.results import RunFolder
+from benchmarks.runner import execution
 from reference_sim import Trajectory, command
 from reference_sim.array_file import write_array
 from reference_sim.trajectory_writer import ROOM

@@ -11,18 +11,19 @@ import pytest
 from tasks_by_hand import InProcess
 from test_source import forget
 
-from benchmarks import check, metric, metrics, outside, run
+from benchmarks import check, metric, metrics, run
 from benchmarks.contract.methods import CheckMethod
 from benchmarks.method import Method, MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.methods.program import program
-from benchmarks.plan import Motions, Plan
-from benchmarks.presets import find_preset
 from benchmarks.registry import DeclarationError
+from benchmarks.request import outside
+from benchmarks.request.plan import Motions, Plan
+from benchmarks.request.presets import find_preset
 from benchmarks.results import RunFolder
+from benchmarks.runner.schedule import Schedule
+from benchmarks.runner.source import code_of
 from benchmarks.scenes import SCENES, of_garment
-from benchmarks.schedule import Schedule
-from benchmarks.source import code_of
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.metrics import measured
 from benchmarks.tasks.task import Context
@@ -320,7 +321,7 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
     monkeypatch.syspath_prepend(tmp_path / "site")
     with monkeypatch.context() as patch:
         case = dataclasses.replace(run.MEASURED[0], name="membrane/uniaxial")
-        patch.setattr("benchmarks.selection.MEASURED", (case,))
+        patch.setattr("benchmarks.request.selection.MEASURED", (case,))
         assert run.main(["--scenes", "free_fall", option, word, "-o", "out"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and words in error
@@ -607,7 +608,7 @@ def test_the_check_says_what_is_skipped_everywhere(tmp_path):
 @pytest.fixture
 def in_process(monkeypatch):
     monkeypatch.setattr(
-        "benchmarks.executor.LocalExecutor", lambda run, assets, workers: InProcess(run, assets)
+        "benchmarks.runner.executor.LocalExecutor", lambda run, assets, workers: InProcess(run, assets)
     )
 
 

@@ -6,9 +6,9 @@ import dataclasses
 import os
 import signal
 
-from benchmarks import executor
-from benchmarks.executor import LocalExecutor
 from benchmarks.results import RunFolder
+from benchmarks.runner import executor
+from benchmarks.runner.executor import LocalExecutor
 from benchmarks.tasks.task import Outcome, Task
 
 

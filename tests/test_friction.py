@@ -12,7 +12,7 @@ from benchmarks.metrics.conservation import law_series
 from benchmarks.metrics.energy import energy_series
 from benchmarks.metrics.optimality import optimality
 from benchmarks.metrics.step import own_terms, prepare
-from benchmarks.presets import find_preset
+from benchmarks.request.presets import find_preset
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import find_scene
 from reference_sim import Cloth, Material, Obstacle, Potential, Trajectory, simulate

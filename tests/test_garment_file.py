@@ -15,9 +15,9 @@ from other_bodies import lowered, plain_arrays, read_again
 
 from benchmarks import run as run_command
 from benchmarks.assets import embedded_motions, open_assets
-from benchmarks.plan import PlanError
-from benchmarks.presets import find_preset
-from benchmarks.schedule import Schedule
+from benchmarks.request.plan import PlanError
+from benchmarks.request.presets import find_preset
+from benchmarks.runner.schedule import Schedule
 from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
 from snug import check, training
@@ -169,7 +169,7 @@ def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
 
 
 def file_scene(file):
-    from benchmarks.plan import OwnGarment
+    from benchmarks.request.plan import OwnGarment
 
     return OwnGarment(file, ()).scenes.scene("walk")
 

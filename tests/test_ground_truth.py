@@ -11,8 +11,8 @@ from tasks_by_hand import assets_of, context, dressed_scene, training
 from test_cell_tasks import plan_of
 
 from benchmarks.methods import METHODS, find_method
-from benchmarks.plan import Motions, Network
-from benchmarks.schedule import Schedule, tasks_of
+from benchmarks.request.plan import Motions, Network
+from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks import ground_truth
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.ground_truth import SimulateClips

@@ -12,12 +12,13 @@ from tasks_by_hand import InProcess
 from test_cell_tasks import TINY, NoLog, plan_of
 from test_runner import task
 
-from benchmarks import executor, run
-from benchmarks.cache import Cache
+from benchmarks import run
 from benchmarks.results import RunFolder, digest_of_file
 from benchmarks.rows import rows_of
-from benchmarks.runner import Runner
-from benchmarks.schedule import tasks_of
+from benchmarks.runner import executor
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Context, Outcome, RunStopped
 
 QUICK = dataclasses.replace(TINY, least_seconds=0.0)

@@ -30,7 +30,7 @@ ALLOWED = {
 # The referee's solvers are not for the contestants.
 FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate")}
 # A run ends by making the report of the run that it wrote.
-EXCEPTIONS = {("benchmarks/execution.py", "reports.build.build_report")}
+EXCEPTIONS = {("benchmarks/runner/execution.py", "reports.build.build_report")}
 # Headline geometry must not share an error with the physics.
 PURE = ("benchmarks/metrics/curvature.py", "benchmarks/metrics/geometry.py")
 DECLARATION = "benchmarks.metric.Metric"  # name, unit and definition: no physics
@@ -121,7 +121,10 @@ def test_a_planted_import_is_found(path, source):
     [
         ("snug/a.py", "from reference_sim import Cloth\nfrom . import body"),
         ("snug/baselines/a.py", "from ..loss import f\nimport torch"),
-        ("benchmarks/execution.py", "def f():\n    import torch\n    from reports.build import build_report"),
+        (
+            "benchmarks/runner/execution.py",
+            "def f():\n    import torch\n    from reports.build import build_report",
+        ),
         ("reports/a.py", "from benchmarks.results import RunFolder\nfrom .tables import f"),
         ("reports/a.py", "def f():\n    from reference_sim.trajectory import Trajectory"),
         ("benchmarks/metrics/geometry.py", "if TYPE_CHECKING:\n    from reference_sim import Obstacle"),

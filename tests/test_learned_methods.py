@@ -9,10 +9,10 @@ from tasks_by_hand import assets_of, context, training
 
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
-from benchmarks.presets import PRESETS, find_preset
+from benchmarks.request.presets import PRESETS, find_preset
+from benchmarks.request.suites import SUITES
 from benchmarks.results import RunFolder, model_path
 from benchmarks.run import make_parser, make_plan
-from benchmarks.suites import SUITES
 from snug.recipe import TERMS
 from snug.recipes import ABLATIONS, RECIPES, TRAININGS
 from snug.trained_model import TrainedModel

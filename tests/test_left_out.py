@@ -13,7 +13,7 @@ import pytest
 from meshes import patch
 
 from benchmarks.assets import embedded_motions, open_assets
-from benchmarks.presets import find_preset
+from benchmarks.request.presets import find_preset
 from benchmarks.scenes import SCENES, of_garment
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Inertia, StretchStVK
@@ -23,7 +23,7 @@ CELL = """
 import sys
 from pathlib import Path
 from benchmarks.methods import find_method
-from benchmarks.presets import find_preset
+from benchmarks.request.presets import find_preset
 from benchmarks.scenes import SCENES
 scene = next(scene for scene in SCENES if scene.name == sys.argv[1]).at(find_preset("smoke")).build()
 for name in sys.argv[2].split(","):
@@ -36,7 +36,7 @@ DRESSED = """
 import dataclasses, pickle, sys
 from pathlib import Path
 from benchmarks.methods import find_method
-from benchmarks.presets import find_preset
+from benchmarks.request.presets import find_preset
 from benchmarks.scenes import of_garment
 assets, body, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
 assets = dataclasses.replace(assets, motions={"kick": motion}, bodies={"kick": body})

@@ -14,11 +14,11 @@ from benchmarks.methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts, skinned
 from benchmarks.metrics import roll_out as metric
 from benchmarks.metrics.roll_out import cloth_energy
+from benchmarks.request.selection import PRESETS
 from benchmarks.results import model_path
 from benchmarks.scenes import find_scene, long_motion
 from benchmarks.scenes.further import there_and_back
 from benchmarks.scenes.long_motion import ENDS, EVERY, FRAMES, LOOP_BLEND
-from benchmarks.selection import PRESETS
 from benchmarks.tasks.cell import judge
 from benchmarks.timing import Reading
 from snug.motion_library import make_motion

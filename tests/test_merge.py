@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks import merge as command
-from benchmarks.cache import Cache
 from benchmarks.merge import MergeError, joined_rows
 from benchmarks.results import Row, RunFolder, digest_of_file
+from benchmarks.runner.cache import Cache
 from benchmarks.tasks.task import Outcome, Task
 
 CONFIG = {
@@ -127,7 +127,7 @@ def test_runs_of_other_inputs_are_refused_by_name(folder, tmp_path, changes, inp
 
 def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path, monkeypatch, capsys):
     one = folder("one", [row("energy/total", 1.0)])
-    monkeypatch.setattr("benchmarks.cache.code_of", lambda *_: {"benchmarks/json_file.py": "other"})
+    monkeypatch.setattr("benchmarks.runner.cache.code_of", lambda *_: {"benchmarks/json_file.py": "other"})
     two = folder("two", [row("energy/total", 1.0, seed=1)], cells=("other",))
     assert command.main([str(one), str(two), "-o", str(tmp_path / "both")]) == 2
     assert "cell other: another benchmarks/json_file.py in" in capsys.readouterr().err

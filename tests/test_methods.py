@@ -13,18 +13,18 @@ from test_cell_tasks import NoLog, plan_of
 
 from benchmarks import frame_energies
 from benchmarks.assets import embedded_motions, open_assets
-from benchmarks.cache import Cache
 from benchmarks.method import Method
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.plan import Motions
-from benchmarks.presets import find_preset
+from benchmarks.request.plan import Motions
+from benchmarks.request.presets import find_preset
 from benchmarks.results import RunFolder
 from benchmarks.rows import rows_of
-from benchmarks.runner import Runner
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
-from benchmarks.schedule import tasks_of
 from benchmarks.tasks.cell import Cell, built
 from benchmarks.tasks.metrics import measured
 from reference_sim import Trajectory

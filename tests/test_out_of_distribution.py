@@ -12,15 +12,15 @@ from benchmarks.assets import Assets
 from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import extrapolation
-from benchmarks.plan import Motions, Plan
-from benchmarks.presets import find_preset
+from benchmarks.request.plan import Motions, Plan
+from benchmarks.request.presets import find_preset
+from benchmarks.request.selection import Request, choose
+from benchmarks.request.suites import CHEAP
 from benchmarks.results import RunFolder, model_path
 from benchmarks.rows import rows_of_cell
+from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import find_scene, out_of_distribution
 from benchmarks.scenes.further import ORDINARY, OUT_OF_DISTRIBUTION, SMALL
-from benchmarks.schedule import Schedule, tasks_of
-from benchmarks.selection import Request, choose
-from benchmarks.suites import CHEAP
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.metrics import measured
 from benchmarks.tasks.task import Context, Outcome

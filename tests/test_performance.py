@@ -15,7 +15,7 @@ import pytest
 from dressing import swaying, tube_dress
 
 import snug.training
-from benchmarks import execution, provenance, run, speedup
+from benchmarks import provenance, run, speedup
 from benchmarks.methods import find_method
 from benchmarks.metrics import find_metric
 from benchmarks.performance import convergence, garment, inference, left_out, sheet, training_step
@@ -23,12 +23,13 @@ from benchmarks.performance.convergence import HELD_OUT
 from benchmarks.performance.metrics import METRICS, PROCESS_MEMORY
 from benchmarks.performance.microbenchmark import Microbenchmark, Settings
 from benchmarks.performance.registry import MICROBENCHMARKS
-from benchmarks.plan import Motions, Plan, PlanError
-from benchmarks.presets import find_preset
+from benchmarks.request.plan import Motions, Plan, PlanError
+from benchmarks.request.presets import find_preset
+from benchmarks.request.selection import MEASURED, Request, choose, choose_suites
 from benchmarks.results import RunFolder
 from benchmarks.rows import described, rows_of
-from benchmarks.schedule import tasks_of
-from benchmarks.selection import MEASURED, Request, choose, choose_suites
+from benchmarks.runner import execution
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Outcome
 from reports.convergence import convergence_curve
 from reports.data import run_data

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from benchmarks.process import IsolatedProcess, WorkerDied
+from benchmarks.runner.process import IsolatedProcess, WorkerDied
 
 
 def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():

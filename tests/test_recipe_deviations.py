@@ -9,11 +9,11 @@ from dataclasses import fields
 import pytest
 
 from benchmarks.methods import find_method
-from benchmarks.plan import Motions, PlanError
-from benchmarks.presets import find_preset
-from benchmarks.roles import choose_motions
-from benchmarks.run_options import EXAMPLES
-from benchmarks.selection import Request, choose
+from benchmarks.request.options import EXAMPLES
+from benchmarks.request.plan import Motions, PlanError
+from benchmarks.request.presets import find_preset
+from benchmarks.request.roles import choose_motions
+from benchmarks.request.selection import Request, choose
 from snug.motion_library import TEST, VALIDATION
 from snug.recipe import DEFAULT, Recipe
 from snug.recipe_deviations import DEVIATIONS

@@ -9,9 +9,9 @@ from tasks_by_hand import small_scene
 
 from benchmarks import methods, metrics, run, scenes
 from benchmarks.metric import Metric
-from benchmarks.presets import find_preset
 from benchmarks.registry import DeclarationError
-from benchmarks.source import code_of
+from benchmarks.request.presets import find_preset
+from benchmarks.runner.source import code_of
 
 
 def test_a_name_stands_once(monkeypatch):

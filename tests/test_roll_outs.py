@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from tasks_by_hand import small_scene
 
-from benchmarks.mesh_match import same_topology
 from benchmarks.methods import find_method
 from benchmarks.methods.stored_roll_out import Stored, entry_of
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.roll_out_files import read_roll_out
-from benchmarks.roll_out_option import RollOutError, RollOutOption, Stated, parse
+from benchmarks.roll_outs.files import read_roll_out
+from benchmarks.roll_outs.mesh_match import same_topology
+from benchmarks.roll_outs.option import RollOutError, RollOutOption, Stated, parse
 from benchmarks.tasks.metrics import measured
 from benchmarks.validation.meshes import torus
 from reference_sim import Trajectory

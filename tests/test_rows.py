@@ -10,14 +10,14 @@ from tasks_by_hand import dressed_scene
 from test_cell_tasks import plan_of
 
 from benchmarks import provenance
-from benchmarks.console import remarks, summary
-from benchmarks.execution import RunLog, accepted
 from benchmarks.methods import METHODS, find_method
-from benchmarks.plan import Motions
+from benchmarks.request.plan import Motions
 from benchmarks.results import Row
 from benchmarks.rows import NOT_FALLING, clock_costs, rows_of
+from benchmarks.runner.console import remarks, summary
+from benchmarks.runner.execution import RunLog, accepted
+from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import SCENES
-from benchmarks.schedule import Schedule
 from benchmarks.tasks.cell import Cell, judge
 from benchmarks.tasks.task import Outcome
 from benchmarks.timing import Reading

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from misbehaving import interrupt_at
 
-from benchmarks import methods, run, selection
+from benchmarks import methods, run
 from benchmarks.methods import METHODS
-from benchmarks.plan import Motions, PlanError
-from benchmarks.presets import PRESETS
+from benchmarks.request import selection
+from benchmarks.request.plan import Motions, PlanError
+from benchmarks.request.presets import PRESETS
+from benchmarks.request.suites import SUITES, Extent
 from benchmarks.results import RunFolder
-from benchmarks.suites import SUITES, Extent
 from benchmarks.validation.registry import KNOWN_ANSWERS
 from benchmarks.validation.stress_tests import MAPS, STEPS
 from reference_sim import Trajectory
@@ -140,7 +141,7 @@ def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monk
     (tmp_path / "torn" / "run.json").write_text('{"command": ')
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("benchmarks.execution.execute", lambda plan: pytest.fail("the run was begun"))
+    monkeypatch.setattr("benchmarks.runner.execution.execute", lambda plan: pytest.fail("the run was begun"))
     assert run.main(words) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and hint in err

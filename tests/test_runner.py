@@ -15,16 +15,17 @@ import pytest
 from misbehaving import interrupt_at
 from test_cell_tasks import TINY, NoLog, found_of, of_session, outcome_of, plan_of
 
-from benchmarks import execution, run
-from benchmarks.cache import Cache
-from benchmarks.executor import LocalExecutor
+from benchmarks import run
 from benchmarks.methods import find_method
-from benchmarks.plan import Motions, Network
+from benchmarks.request.plan import Motions, Network
 from benchmarks.results import RunFolder
 from benchmarks.rows import rows_of
-from benchmarks.runner import Runner
+from benchmarks.runner import execution
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.executor import LocalExecutor
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import of_garment
-from benchmarks.schedule import Schedule, tasks_of
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.task import Outcome, Task
 
@@ -33,7 +34,7 @@ WORDS = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall"]
 HOLDING = """
 import sys, time
 from pathlib import Path
-from benchmarks.lock import held
+from benchmarks.runner.lock import held
 with held(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks import scaling
-from benchmarks.cache import Cache
 from benchmarks.results import RunFolder
+from benchmarks.runner.cache import Cache
 from benchmarks.scaling import Costs, Measured, outlook, stage_seconds, study
 from benchmarks.tasks.ground_truth import SimulateMotion
 from benchmarks.tasks.task import Outcome

@@ -11,20 +11,20 @@ import pytest
 from tasks_by_hand import dressed_scene
 
 from benchmarks.assets import embedded_motions, open_assets
-from benchmarks.cache import dependencies
 from benchmarks.clips import clip, joint_speeds
 from benchmarks.methods import find_method
 from benchmarks.metrics import body_shape
-from benchmarks.plan import network_of
-from benchmarks.presets import PRESETS, find_preset
+from benchmarks.request.plan import network_of
+from benchmarks.request.presets import PRESETS, find_preset
+from benchmarks.request.selection import choose_suites
 from benchmarks.run import main
+from benchmarks.runner.cache import dependencies
+from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import FURTHER, GARMENT_SCENES, SCENES, all_scenes
 from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.further import SHAPES, shapes
 from benchmarks.scenes.sheet import square_sheet
 from benchmarks.scenes.sheet_on_sphere import sphere
-from benchmarks.schedule import Schedule
-from benchmarks.selection import choose_suites
 from reference_sim import simulate
 from snug.body import Body
 from snug.motion_library import make_motion
@@ -159,7 +159,7 @@ TRAININGS = {"snug", "snug.recipe", "snug.recipes", "snug.recipe_deviations"}
 def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
     out = tmp_path / "run"
     words = ["--preset", "smoke", "--scenes", "hanging_sheet", "--methods", "simulation,newton-1"]
-    monkeypatch.setattr("benchmarks.execution.RunLog.make_report", lambda self: True)
+    monkeypatch.setattr("benchmarks.runner.execution.RunLog.make_report", lambda self: True)
     assert main([*words, "-o", str(out)]) == 0
     for method in ("simulation", "newton-1"):
         record = json.loads((out / "cache" / "cell" / "hanging_sheet" / f"{method}.json").read_text())

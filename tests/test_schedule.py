@@ -12,11 +12,11 @@ from test_cell_tasks import plan_of
 
 from benchmarks import provenance
 from benchmarks.methods import find_method
-from benchmarks.plan import Motions, Network, OwnGarment
+from benchmarks.request.options import make_parser
+from benchmarks.request.plan import Motions, Network, OwnGarment
 from benchmarks.results import RunFolder, digest_of_file
 from benchmarks.run import choose_garment
-from benchmarks.run_options import make_parser
-from benchmarks.schedule import Schedule, tasks_of
+from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.metrics import _training_poses
 from benchmarks.tasks.task import Context, Task
@@ -36,7 +36,7 @@ def test_the_key_of_a_training_is_that_of_all_it_depends_on(tmp_path, monkeypatc
     plan = plan_of(tmp_path, motions=MOTIONS)
     before = network(plan).key
     assert before and network(plan).key == before
-    monkeypatch.setattr("benchmarks.source._version", lambda package: "another")
+    monkeypatch.setattr("benchmarks.runner.source._version", lambda package: "another")
     assert network(plan).key != before
 
 

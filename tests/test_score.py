@@ -18,13 +18,13 @@ from benchmarks.export_files import _write_obj, write_scene
 from benchmarks.methods import find_method
 from benchmarks.methods.stored_roll_out import entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
-from benchmarks.plan import Motions, Plan, PlanError
-from benchmarks.presets import find_preset
+from benchmarks.request.plan import Motions, Plan, PlanError
+from benchmarks.request.presets import find_preset
 from benchmarks.results import RunFolder
-from benchmarks.roll_out_fit import expected_positions
-from benchmarks.roll_out_option import RollOutOption, Stated
-from benchmarks.schedule import Schedule
-from benchmarks.source import digest
+from benchmarks.roll_outs.fit import expected_positions
+from benchmarks.roll_outs.option import RollOutOption, Stated
+from benchmarks.runner.schedule import Schedule
+from benchmarks.runner.source import digest
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.metrics import measured
 from reference_sim import Trajectory
@@ -44,7 +44,7 @@ def no_processes():
     """Every task is run in this process: none is begun, and nothing is compiled again."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "benchmarks.execution.LocalExecutor", lambda folder, assets, _: InProcess(folder, assets)
+            "benchmarks.runner.execution.LocalExecutor", lambda folder, assets, _: InProcess(folder, assets)
         )
         yield
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import selection
-from benchmarks.plan import Motions, PlanError
-from benchmarks.presets import find_preset
-from benchmarks.roles import choose_motions
-from benchmarks.selection import Request, choose
+from benchmarks.request import selection
+from benchmarks.request.plan import Motions, PlanError
+from benchmarks.request.presets import find_preset
+from benchmarks.request.roles import choose_motions
+from benchmarks.request.selection import Request, choose
 from benchmarks.validation.stress_tests import MAPS
 
 SMOKE = find_preset("smoke")

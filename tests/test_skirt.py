@@ -10,7 +10,7 @@ from tasks_by_hand import context, dressed_scene
 
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.methods import find_method
-from benchmarks.presets import find_preset
+from benchmarks.request.presets import find_preset
 from benchmarks.results import RunFolder
 from benchmarks.tasks.ground_truth import SimulateQuasiStatic
 from reference_sim import Trajectory

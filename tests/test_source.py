@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks import source
 from benchmarks.methods import METHODS
 from benchmarks.metrics import MODULES
 from benchmarks.performance.registry import MICROBENCHMARKS
+from benchmarks.runner import source
+from benchmarks.runner.source import code_of, data_of, digest, packages_of
 from benchmarks.scenes import FURTHER, SCENES
-from benchmarks.source import code_of, data_of, digest, packages_of
 
 FILES = {
     "reference_sim/__init__.py": "from .cloth import Cloth\n",
@@ -143,8 +143,9 @@ def test_training_does_not_hang_on_the_solver():
 def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
     """A line more in one of them makes nothing stale."""
     lists = {f"benchmarks/{name}" for name in (
-        "scenes/__init__.py", "methods/__init__.py", "methods/solvers.py", "methods/learned.py", "presets.py",
-        "selection.py", "suites.py", "plan.py", "schedule.py", "validation/registry.py",
+        "scenes/__init__.py", "methods/__init__.py", "methods/solvers.py", "methods/learned.py",
+        "request/presets.py", "request/selection.py", "request/suites.py", "request/plan.py",
+        "runner/schedule.py", "validation/registry.py",
     )}  # fmt: skip
     lists.add("snug/recipes.py")
     names = ("cell", "ground_truth", "training", "training_windows", "metrics", "case", "microbenchmark")
@@ -153,7 +154,8 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
     modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets"]
     modules += [f"benchmarks.metrics.{name}" for name in MODULES]
     assert {name: found for name in modules if (found := lists & set(code_of(name)))} == {}
-    lists -= {"benchmarks/presets.py", "benchmarks/scenes/__init__.py"}  # a shirt of preset quick is measured
+    # A shirt of preset quick is measured.
+    lists -= {"benchmarks/request/presets.py", "benchmarks/scenes/__init__.py"}
     assert not any(lists & set(code_of(benchmark.module)) for benchmark in MICROBENCHMARKS)
 
 

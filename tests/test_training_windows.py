@@ -13,11 +13,11 @@ from tasks_by_hand import training as training_task
 
 from benchmarks.assets import Assets
 from benchmarks.methods import find_method
-from benchmarks.plan import Motions, Plan
-from benchmarks.presets import find_preset
+from benchmarks.request.plan import Motions, Plan
+from benchmarks.request.presets import find_preset
+from benchmarks.request.selection import Request, choose
 from benchmarks.results import RunFolder
-from benchmarks.schedule import tasks_of
-from benchmarks.selection import Request, choose
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Context, Outcome
 from benchmarks.tasks.training_windows import CompareWindows, _loss, both_losses
 from snug.recipe import DEFAULT

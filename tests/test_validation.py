@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.plan import Motions
-from benchmarks.presets import find_preset
-from benchmarks.selection import Request, choose
+from benchmarks.request.plan import Motions
+from benchmarks.request.presets import find_preset
+from benchmarks.request.selection import Request, choose
 from benchmarks.validation.case import Case
 from benchmarks.validation.fitted_order import fitted_order
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..source import code_of, digest
+from ..runner.source import code_of, digest
 
 if TYPE_CHECKING:
     from ..scene import BuiltScene

@@ -19,9 +19,9 @@ from reference_sim.array_file import read_arrays
 
 from ..export_files import write_for_program
 from ..method import MethodEntry
-from ..process import WorkerDied
 from ..registry import DeclarationError
-from ..roll_out_option import Stated
+from ..roll_outs.option import Stated
+from ..runner.process import WorkerDied
 from ..scene import BuiltScene
 from .stored_roll_out import Stored
 

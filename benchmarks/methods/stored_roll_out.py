@@ -11,9 +11,9 @@ import numpy as np
 from reference_sim import Trajectory
 
 from ..method import Method, MethodEntry
-from ..roll_out_files import StoredRollOut, read_roll_out
-from ..roll_out_fit import fitted
-from ..roll_out_option import MODULE, RollOutError, RollOutOption, Stated, digest_of
+from ..roll_outs.files import StoredRollOut, read_roll_out
+from ..roll_outs.fit import fitted
+from ..roll_outs.option import MODULE, RollOutError, RollOutOption, Stated, digest_of
 from ..scene import BuiltScene
 
 

@@ -11,7 +11,7 @@ from snug.garment_kinds import TSHIRT
 from ..assets import embedded_motions, open_assets
 from ..methods.simulation import Simulation
 from ..metrics.geometry import DEEP, penetration
-from ..presets import find_preset
+from ..request.presets import find_preset
 from ..scene import BuiltScene
 from ..scenes import of_garment
 from .microbenchmark import Settings

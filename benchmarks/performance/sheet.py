@@ -14,7 +14,7 @@ from reference_sim import Cloth, Material, Potential, Result
 from reference_sim.energies import BendHinge, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import Minimiser, make_minimiser
 
-from ..memory import peak_memory
+from ..runner.memory import peak_memory
 from .microbenchmark import Settings
 
 FRAMES = 30

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..presets import find_preset
+from ..request.presets import find_preset
 from .learning import dressed_body, training_motions
 from .microbenchmark import Settings
 

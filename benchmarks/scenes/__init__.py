@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from ..presets import PRESETS
 from ..registry import DeclarationError, by_name
+from ..request.presets import PRESETS
 from ..scene import Scene
 from .further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 

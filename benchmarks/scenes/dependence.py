@@ -17,7 +17,7 @@ from . import dressed_body
 
 if TYPE_CHECKING:
     from ..assets import Assets
-    from ..presets import Dependence
+    from ..request.presets import Dependence
 
 WARM_UP = 2  # it starts at rest, and few frames are simulated
 

@@ -11,8 +11,8 @@ from reference_sim import Cloth, Material, MeshError, Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
 from reference_sim.mesh_io import read_mesh, to_metres_y_up
 
-from ..roll_out_files import StoredRollOut, read_roll_out
-from ..roll_out_option import RollOutError, RollOutOption, digest_of
+from ..roll_outs.files import StoredRollOut, read_roll_out
+from ..roll_outs.option import RollOutError, RollOutOption, digest_of
 from ..scene import BuiltScene, Scene
 
 FPS = 30.0  # where neither the file nor the user says another rate

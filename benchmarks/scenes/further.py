@@ -8,7 +8,7 @@ from __future__ import annotations
 from random import Random
 from typing import Any
 
-from ..presets import Dependence
+from ..request.presets import Dependence
 from ..scene import Scene
 
 WALK = "walk"  # a training motion: what breaks here breaks next to what was learned

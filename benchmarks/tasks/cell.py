@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..memory import peak_memory
 from ..method import Method, MethodEntry
 from ..results import RunFolder
+from ..runner.memory import peak_memory
 from ..scene import BuiltScene, Scene
 from ..timing import Reading, clocked
 from .task import Context, Outcome, Task, TaskId, failure

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..memory import peak_memory
 from ..method import MethodEntry
 from ..performance.microbenchmark import SUITE, Settings
 from ..results import Row, RunFolder
+from ..runner.memory import peak_memory
 from .task import Context, Outcome, Task, TaskId, failure
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..process import WorkerDied
+from ..runner.process import WorkerDied
 
 if TYPE_CHECKING:
     from ..assets import Assets

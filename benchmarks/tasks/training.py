@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..registry import load
 from ..results import RunFolder, model_path
-from ..source import digest
+from ..runner.source import digest
 from .task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What a run will do, decided and checked before anything is created. See benchmarks.selection."""
+"""What a run will do, decided and checked before anything is created. See benchmarks.request.selection."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from snug.recipes import TRAININGS, Training
 
+from ..scene import Scene
+from ..scenes import GARMENT_SCENES, GarmentScenes, of_garment
+from ..tasks.cell import Cell
 from .presets import Preset
-from .scene import Scene
-from .scenes import GARMENT_SCENES, GarmentScenes, of_garment
-from .tasks.cell import Cell
 
 if TYPE_CHECKING:
     from snug.garment_file import GarmentFile
     from snug.motion import Motion
 
-    from .performance.microbenchmark import Microbenchmark
-    from .validation.case import Case
+    from ..performance.microbenchmark import Microbenchmark
+    from ..validation.case import Case
 
 
 class PlanError(ValueError):
@@ -148,8 +148,8 @@ class Plan:
 
     body, garment: own ones; None: the package's. only: states of what the folder holds in which a task is
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
-    metrics: modules of metrics that are not the project's, see benchmarks.outside. scheduler: address of a
-    cluster that does what is not timed; empty: this machine does.
+    metrics: modules of metrics that are not the project's, see benchmarks.request.outside. scheduler: address
+    of a cluster that does what is not timed; empty: this machine does.
     """
 
     preset: Preset

@@ -11,9 +11,9 @@ from typing import Any
 from snug.garment_file import add_garment_options
 from snug.motion_options import add_motion_options
 
+from ..roll_outs.option import HELP as ROLL_OUT_HELP
 from .plan import PlanError
 from .presets import PRESETS
-from .roll_out_option import HELP as ROLL_OUT_HELP
 
 PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:

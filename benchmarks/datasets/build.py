@@ -16,23 +16,23 @@ from snug.garment_file import demand_a_file, is_file_name
 from snug.motion_options import reading_of
 from snug.recipe import DEFAULT
 
-from . import provenance
-from .assets import embedded_motions, open_assets
-from .cache import Cache
-from .execution import executor_of
-from .lock import held
-from .methods import METHODS
-from .plan import Motions, Plan, PlanError
-from .presets import find_preset
-from .registry import by_name
-from .results import RunFolder
-from .roles import FEWEST
-from .run import WORKERS, choose_body, choose_garment, choose_states, split
-from .runner import Runner
-from .scenes import of_garment
-from .schedule import Schedule
-from .tasks.sequence import SimulateSequence
-from .tasks.task import Outcome
+from .. import provenance
+from ..assets import embedded_motions, open_assets
+from ..methods import METHODS
+from ..registry import by_name
+from ..request.plan import Motions, Plan, PlanError
+from ..request.presets import find_preset
+from ..request.roles import FEWEST
+from ..results import RunFolder
+from ..run import WORKERS, choose_body, choose_garment, choose_states, split
+from ..runner.cache import Cache
+from ..runner.execution import executor_of
+from ..runner.lock import held
+from ..runner.loop import Runner
+from ..runner.schedule import Schedule
+from ..scenes import of_garment
+from ..tasks.sequence import SimulateSequence
+from ..tasks.task import Outcome
 
 if TYPE_CHECKING:
     from snug.motion import Motion
@@ -103,7 +103,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
         find_preset("quick"), garment_vertices=options.vertices, frames=LONGEST, settle_frames=options.settle
     )
     if options.scheduler:
-        from .cluster import check_scheduler
+        from ..runner.cluster import check_scheduler
 
         check_scheduler(options.scheduler)
     rest = argparse.ArgumentParser(add_help=False, allow_abbrev=False)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from .performance.microbenchmark import SUITE
-from .results import Row
-from .rows import DECLARED, NOT_FALLING, SPREAD
+from ..performance.microbenchmark import SUITE
+from ..results import Row
+from ..rows import DECLARED, NOT_FALLING, SPREAD
 
 COLUMNS = (
     ("energy/total", "total J"),

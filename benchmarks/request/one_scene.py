@@ -6,9 +6,9 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..run import make_plan
+from .options import add_scene_options, make_parser
 from .plan import Plan, PlanError
-from .run import make_plan
-from .run_options import add_scene_options, make_parser
 
 
 def plan_of_scene(

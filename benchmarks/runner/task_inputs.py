@@ -10,11 +10,11 @@ from typing import Any
 
 from snug.recipe import TERMS
 
-from . import provenance
-from .method import MethodEntry
-from .plan import Plan
-from .results import digest_of_file
-from .scene import Scene
+from .. import provenance
+from ..method import MethodEntry
+from ..request.plan import Plan
+from ..results import digest_of_file
+from ..scene import Scene
 from .source import digest
 
 ASSETS = "benchmarks.assets"

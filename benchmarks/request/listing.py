@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from ..method import MethodEntry
+from ..methods import METHODS
+from ..performance.microbenchmark import SUITE
+from ..performance.registry import MICROBENCHMARKS
+from ..scenes import FURTHER, GARMENT_SCENES, SCENES
+from ..scenes.further import shapes, there_and_back
+from ..validation.registry import CASES
 from . import outside
-from .method import MethodEntry
-from .methods import METHODS
-from .performance.microbenchmark import SUITE
-from .performance.registry import MICROBENCHMARKS
 from .presets import PRESETS, find_preset
-from .scenes import FURTHER, GARMENT_SCENES, SCENES
-from .scenes.further import shapes, there_and_back
 from .selection import default_suites
 from .suites import SUITES
-from .validation.registry import CASES
 
 
 def listing() -> str:

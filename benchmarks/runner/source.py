@@ -23,10 +23,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from .registry import DeclarationError
-from .results import digest_of_file
+from ..registry import DeclarationError
+from ..results import digest_of_file
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("reference_sim", "snug", "benchmarks")
 NO_DATA = (".py", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
 

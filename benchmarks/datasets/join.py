@@ -8,10 +8,10 @@ from pathlib import Path
 
 from snug.dataset import MISSING, DataSet, SimulatedSequence
 
-from .cache import read_entry
-from .merge import MergeError, check_entries, copied, new_folder
-from .results import RunFolder
-from .tasks.sequence import SimulateSequence
+from ..merge import MergeError, check_entries, copied, new_folder
+from ..results import RunFolder
+from ..runner.cache import read_entry
+from ..tasks.sequence import SimulateSequence
 
 
 def merge(paths: Sequence[Path], out: Path) -> DataSet:

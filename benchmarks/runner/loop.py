@@ -11,9 +11,9 @@ from contextlib import AbstractContextManager
 from itertools import groupby
 from typing import Any, Protocol
 
+from ..tasks.task import Outcome, Task, TaskId, failure
 from .cache import Cache, Found
 from .executor import Executor
-from .tasks.task import Outcome, Task, TaskId, failure
 
 BLOCKED = "blocked"  # in the result of a task whose needs had failed
 LEFT_OUT = "not asked for: --only names other states"

@@ -10,21 +10,21 @@ from contextlib import contextmanager
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from . import frame_energies, provenance
+from .. import frame_energies, provenance
+from ..request.plan import Plan, runs
+from ..results import Row, RunFolder, digest_of_file, with_provenance
+from ..roll_outs.option import MODULE
+from ..rows import described, rows_of
+from ..tasks.task import RunStopped, one_line
 from .cache import Cache
 from .console import remarks, summary
 from .executor import Executor, LocalExecutor
-from .plan import Plan, runs
-from .results import Row, RunFolder, digest_of_file, with_provenance
-from .roll_out_option import MODULE
-from .rows import described, rows_of
-from .runner import Runner
+from .loop import Runner
 from .schedule import tasks_of
 from .source import digest
-from .tasks.task import RunStopped, one_line
 
 if TYPE_CHECKING:
-    from .assets import Assets
+    from ..assets import Assets
 
 OF_TRAINING = ("cost/setup", "cost/train")
 KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier run in the folder
@@ -83,7 +83,7 @@ def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executo
 
 def assets_of(plan: Plan) -> Assets:
     """Body, garments and motions of the plan's scenes. Raises ValueError where one cannot be made."""
-    from .assets import embedded_motions, open_assets
+    from ..assets import embedded_motions, open_assets
 
     names = [name for garment in plan.garments for name in plan.motions_of(garment)]
     names += [name for network in plan.networks for name in plan.motions.train_of(network.garment)]

@@ -22,7 +22,7 @@ import numpy as np
 
 from reference_sim.mesh_io import MESH_SUFFIXES, read_mesh, read_sequence
 
-from .roll_out_option import RollOutError
+from .option import RollOutError
 
 PACKED = 1032  # bytes that deflate packs into one at most
 KEYS = {  # of an npz, and of a pickle

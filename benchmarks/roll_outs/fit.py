@@ -14,12 +14,12 @@ import numpy as np
 
 from reference_sim.mesh_io import METRES, UP_AXES, to_metres_y_up
 
+from .files import StoredRollOut
 from .mesh_match import faces_alike, nearest_order, same_topology
-from .roll_out_files import StoredRollOut
-from .roll_out_option import RollOutError, Stated
+from .option import RollOutError, Stated
 
 if TYPE_CHECKING:
-    from .scene import BuiltScene
+    from ..scene import BuiltScene
 
 NEAR = 0.25  # of the cloth's diagonal: from where the scene's cloth is, a first frame lies nearer than that
 BETTER = 0.5  # another unit or axis fits better where its distance is less than so much of the stated one's

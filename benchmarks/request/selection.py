@@ -8,24 +8,24 @@ from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from .method import MethodEntry
-from .methods import METHODS
-from .performance.microbenchmark import SUITE, Microbenchmark
-from .performance.registry import MICROBENCHMARKS
+from ..method import MethodEntry
+from ..methods import METHODS
+from ..performance.microbenchmark import SUITE, Microbenchmark
+from ..performance.registry import MICROBENCHMARKS
+from ..registry import DeclarationError, by_name
+from ..scene import Scene
+from ..scenes import GARMENT_SCENES, all_scenes
+from ..tasks.cell import Cell
+from ..validation.case import METHOD
+from ..validation.registry import CASES
 from .plan import Motions, PlanError
 from .presets import PRESETS, Preset
-from .registry import DeclarationError, by_name
 from .roles import nearest
-from .scene import Scene
-from .scenes import GARMENT_SCENES, all_scenes
 from .suites import SUITE_NAMES, SUITES, Extent, Suite
-from .tasks.cell import Cell
-from .validation.case import METHOD
-from .validation.registry import CASES
 
 if TYPE_CHECKING:
-    from .roll_out_option import RollOutOption
-    from .validation.case import Case
+    from ..roll_outs.option import RollOutOption
+    from ..validation.case import Case
 
 MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
 
@@ -109,7 +109,7 @@ def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> l
     """
     if not roll_outs:
         return []
-    from .methods.stored_roll_out import entry_of
+    from ..methods.stored_roll_out import entry_of
 
     scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
     suites = {name: tuple(dict.fromkeys(s for c in cells if c.scene.name == name for s in c.suites))

@@ -18,10 +18,10 @@ from typing import Any
 
 from snug.recipes import TRAININGS, Training
 
-from .method import MethodEntry
-from .registry import DeclarationError, by_name, demand_that_it_is, load
-from .scene import Scene
-from .source import code_of, find_module, place_of
+from ..method import MethodEntry
+from ..registry import DeclarationError, by_name, demand_that_it_is, load
+from ..runner.source import code_of, find_module, place_of
+from ..scene import Scene
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]*")
 
@@ -37,7 +37,7 @@ class Kind:
     @property
     def entry(self) -> type:
         if self.word == "metrics":  # loads numpy: only for whoever has one
-            from .metric import Metric
+            from ..metric import Metric
 
             return Metric
         return MethodEntry if self.word == "methods" else Scene

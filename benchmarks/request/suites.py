@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .methods import METHODS
-from .methods.equal_data import EQUAL_DATA
-from .methods.learned import LEARNED, RECIPE_DEVIATIONS
+from ..methods import METHODS
+from ..methods.equal_data import EQUAL_DATA
+from ..methods.learned import LEARNED, RECIPE_DEVIATIONS
+from ..scenes import GARMENT_SCENES
+from ..scenes.further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
+from ..scenes.further import SMALL as SMALL_OUT_OF_DISTRIBUTION
 from .plan import Motions
 from .presets import Preset
-from .scenes import GARMENT_SCENES
-from .scenes.further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
-from .scenes.further import SMALL as SMALL_OUT_OF_DISTRIBUTION
 
 
 @dataclass(frozen=True)

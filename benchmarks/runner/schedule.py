@@ -12,25 +12,25 @@ from typing import Any
 
 from snug.recipes import TRAININGS, Simulated
 
+from ..method import MethodEntry
+from ..methods import find_method
+from ..metric import COMPARED_WITH
+from ..metrics import names_of
+from ..performance.microbenchmark import Microbenchmark, Settings
+from ..request.plan import Network, Plan, network_of, runs
+from ..scene import Scene
+from ..scenes import find_scene, of_garment
+from ..tasks.case import RunCase
+from ..tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
+from ..tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
+from ..tasks.metrics import MeasureCell
+from ..tasks.microbenchmark import RunMicrobenchmark
+from ..tasks.task import Task
+from ..tasks.training import LONGEST, TrainNetwork
+from ..tasks.training_windows import SUITE, CompareWindows
 from .cache import dependencies
-from .method import MethodEntry
-from .methods import find_method
-from .metric import COMPARED_WITH
-from .metrics import names_of
-from .performance.microbenchmark import Microbenchmark, Settings
-from .plan import Network, Plan, network_of, runs
-from .scene import Scene
-from .scenes import find_scene, of_garment
 from .source import digest, find_module
 from .task_inputs import ASSETS, TaskInputs, declared, modules_behind, modules_of
-from .tasks.case import RunCase
-from .tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
-from .tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
-from .tasks.metrics import MeasureCell
-from .tasks.microbenchmark import RunMicrobenchmark
-from .tasks.task import Task
-from .tasks.training import LONGEST, TrainNetwork
-from .tasks.training_windows import SUITE, CompareWindows
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 TASKS = "benchmarks.tasks"

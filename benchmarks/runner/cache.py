@@ -16,10 +16,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from .json_file import ResultsError, read_json
-from .results import RunFolder, digest_of_file, replacing
+from ..json_file import ResultsError, read_json
+from ..results import RunFolder, digest_of_file, replacing
+from ..tasks.task import Outcome, Task, TaskId
 from .source import code_of, data_of, digest, packages_of
-from .tasks.task import Outcome, Task, TaskId
 
 STATES = ("finished", "failed", "stale", "missing")
 DEFAULT_ONLY = ("stale", "missing")

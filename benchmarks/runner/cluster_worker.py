@@ -1,6 +1,6 @@
 """What a worker of a cluster does for a run: keeps its files, and does its tasks in processes of their own.
 
-Loads little: what computes is in the tasks' processes. Everything here is called by benchmarks.cluster, in
+Loads little: what computes is in the tasks' processes. Everything here is called by the module cluster, in
 the process of a worker of dask.distributed; `dask_worker` is that worker. A run that asks for nothing any
 more is forgotten.
 """
@@ -19,13 +19,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from . import provenance
+from .. import provenance
+from ..results import RunFolder, digest_of_file
+from ..tasks.cell import CellTask
+from ..tasks.task import Context, Outcome, Task, failure, one_line
+from ..timing import one_thread
 from .cache import software
 from .executor import TaskProcess, begin_tasks
-from .results import RunFolder, digest_of_file
-from .tasks.cell import CellTask
-from .tasks.task import Context, Outcome, Task, failure, one_line
-from .timing import one_thread
 
 PIECE = 8 << 20  # bytes of a file at a time
 WATCH = 1.0  # [s] between looks at what nobody wants any more
@@ -147,7 +147,7 @@ def software_of(task: Task) -> dict[str, str]:
     files = task.cell.entry.files if isinstance(task, CellTask) else ()
     digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
     version = {"package Python": platform.python_version()}
-    return software("benchmarks.cluster", *task.modules) | digests | version
+    return software("benchmarks.runner.cluster", *task.modules) | digests | version
 
 
 def _differences(here: Mapping[str, str], expected: Mapping[str, str]) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 
+from ..request.plan import Plan, runs
+from ..results import RunFolder
+from ..tasks.task import Outcome
 from .cache import STATES, Cache, Found
-from .plan import Plan, runs
-from .results import RunFolder
-from .runner import LEFT_OUT, Runner
+from .loop import LEFT_OUT, Runner
 from .schedule import tasks_of
-from .tasks.task import Outcome
 
 
 def describe(plan: Plan) -> str:

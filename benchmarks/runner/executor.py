@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any, Protocol
 
-from .assets import Assets
+from ..assets import Assets
+from ..results import RunFolder
+from ..tasks.task import Context, Outcome, RunStopped, Task, TaskId, failure, tell_nobody
 from .cache import damaged
 from .process import IsolatedProcess, WorkerDied
-from .results import RunFolder
-from .tasks.task import Context, Outcome, RunStopped, Task, TaskId, failure, tell_nobody
 
 POLL = 0.2  # [s] between looks at the progress
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel

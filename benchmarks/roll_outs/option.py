@@ -98,7 +98,7 @@ _WORDS: dict[str, tuple[str, Callable[[str], Any]]] = {
 
 def digest_of(path: str) -> str:
     """Of all that is read: the file, those of a folder or of a pattern, and the mesh beside a point cache."""
-    from .source import digest, digest_of_file
+    from ..runner.source import digest, digest_of_file
 
     given = Path(path)
     files = sorted(given.iterdir()) if given.is_dir() else sorted(map(Path, glob.glob(path))) or [given]
