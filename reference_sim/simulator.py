@@ -18,6 +18,7 @@ import numpy as np
 from .cloth import Cloth
 from .energies.energy import Energy
 from .minimise import Result
+from .progress import progress_bar
 from .recorder import Recorder
 from .resume import fingerprint, recover
 from .stepper import State, Stepper
@@ -141,6 +142,4 @@ def _checked(value: np.ndarray | None, default: np.ndarray, name: str) -> np.nda
 def _bar(frames: range, label: str | None) -> Iterator[int] | range:
     if label is None:
         return frames
-    from tqdm import tqdm
-
-    return tqdm(frames, desc=label, unit="frame", initial=frames.start, total=frames.stop)
+    return progress_bar(frames, desc=label, unit="frame", initial=frames.start, total=frames.stop)

@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from reference_sim.progress import progress_bar
 from snug.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.trained_model import TrainedModel
 from snug.trainer import Trainer, part_of
@@ -84,13 +85,11 @@ class TrainingRun:
         """Raises TrainingError when training diverges, TensorFileError for a checkpoint of another run, and
         Interrupted when asked to stop.
         """
-        from tqdm import tqdm
-
         trainer = self.trainer
         if self.saving and self.saving.resume and self.saving.path.is_file():
             self._resume(self.saving)
         self._started = self._saved = time.perf_counter()
-        with tqdm(
+        with progress_bar(
             total=trainer.steps, initial=self.done, desc=f"train {trainer.kind}", unit="step",
             disable=not self.progress,
         ) as bar:  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import time
 
 import h5py
 import numpy as np
@@ -24,6 +25,7 @@ from reference_sim.energies import (
     Gravity,
     StretchStVK,
 )
+from reference_sim.progress import progress_bar
 from reference_sim.summary import summary
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
@@ -344,3 +346,12 @@ def test_one_frame_is_the_start_alone():
     cloth = Cloth(SHEET, FACES)
     result = simulate(cloth, terms_of(cloth), frames=1)
     assert result.frames == 1 and (result.positions[0] == SHEET).all() and result.status == "converged"
+
+
+def test_progress_in_a_log_is_a_few_lines(capsys):
+    """A terminal is redrawn ten times a second, which in a file would be a line each."""
+    with progress_bar(total=50, unit="frame") as bar:
+        for _ in range(50):
+            time.sleep(0.01)
+            bar.update()
+    assert 1 <= capsys.readouterr().err.count("\r") <= 3

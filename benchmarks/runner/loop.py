@@ -11,6 +11,8 @@ from contextlib import AbstractContextManager
 from itertools import groupby
 from typing import Any, Protocol
 
+from reference_sim.progress import progress_bar
+
 from ..tasks.task import Outcome, Task, TaskId, failure
 from .cache import Cache, Found
 from .executor import Executor
@@ -190,6 +192,4 @@ class Runner:
 
 
 def _bar(task: Task, total: int) -> Any:
-    from tqdm import tqdm
-
-    return tqdm(total=total, desc=task.stage, unit=task.unit, smoothing=0.05)
+    return progress_bar(total=total, desc=task.stage, unit=task.unit, smoothing=0.05)
