@@ -106,7 +106,9 @@ def crossings(run: Run) -> list[Table]:
             frames = crossing(network, rival)
             total = None if frames is None else network.total(frames)
             rounded = None if frames is None else float(f"{frames:.1e}")
-            lines.append((garment, network.method, rival.method, why[rival.method], rounded, total))
+            times = rival.frame / network.frame if network.frame else None
+            names = (garment, network.method, rival.method, why[rival.method])
+            lines.append((*names, rounded, total, network.before, times))
     columns = (
         Column("garment", "Garment", text=True),
         Column("method", "Network", text=True, method=True),
@@ -114,6 +116,8 @@ def crossings(run: Run) -> list[Table]:
         Column("as_good", "As good by", text=True),
         Column("crossing", "From frames on", digits=2, trim=True),
         Column("total_time", "Total time by then", "s"),
+        Column("before", "Network's before its first frame", "s"),
+        Column("frame_ratio", "Its run time over the network's", digits=2),
     )
     caption = (
         "From how many frames on training pays, against the converged simulation and the fastest solvers "

@@ -8,6 +8,7 @@ printed as a dash.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -29,6 +30,7 @@ BY_SCENE = ("suite", "scene")  # what groups the lines of a table that is not av
 METHOD = Column("method", "Method", text=True, method=True)
 GARMENT, SCENE, SUITE = (Column(name, name.capitalize(), text=True) for name in ("garment", "scene", "suite"))
 REASON = Column("reason", "Reason", text=True)
+BAD = ("failed", "diverged", "timeout", "out-of-memory", "stalled")  # the worst first
 
 
 def make_tables(run: Run) -> dict[str, Table]:
@@ -37,8 +39,7 @@ def make_tables(run: Run) -> dict[str, Table]:
     found = [made for name in names for made in (*by_garment(run, name), *by_scene(run, name))]
     for make in (
         overview, findings, equal_data, ablations, ablation_effects, crossings, speed, shapes, validation,
-        extremes,
-        unfinished, metrics,
+        extremes, endings, unfinished, metrics,
     ):  # fmt: skip
         found += make(run)
     return {made.name: made for made in found}
@@ -195,6 +196,30 @@ def map_points(run: Run) -> dict[str, tuple[float, float]]:
     cases = run.config.get("cases") or {}
     points = {name: case.get("map_point") for name, case in cases.items()}
     return {name: (float(point[0]), float(point[1])) for name, point in points.items() if point}
+
+
+def endings(run: Run) -> list[Table]:
+    """How many cells, checks and stress tests ended how."""
+    ends = ("ok", *BAD, "skipped")
+    lines = [
+        (what, *(counts[end] for end in ends), sum(counts.values())) for what, counts in counted(run).items()
+    ]
+    columns = [Column(name, name.capitalize()) for name in (*ends, "all")]
+    return table("endings", (Column("what", "What", text=True), *columns), lines, "How many ended how.")
+
+
+def counted(run: Run) -> dict[str, Counter[str]]:
+    """Cells, checks and stress tests, those there are -> how many ended how."""
+    cells = run.frame[(run.frame["case"] == "") & (run.frame["method"] != "")]
+    best_first = {"stalled": 0, "ok": 1}  # what has any usable number has run, whatever became of the others
+    cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
+    judged = checks(run)
+    groups = {
+        "cells": cells.drop_duplicates(["suite", "scene", "method", "seed"]),
+        "checks": judged[judged["tolerance"].notna() | (judged["status"] != "ok")],
+        "stress tests": stress_tests(run),
+    }
+    return {what: Counter(rows["status"]) for what, rows in groups.items() if len(rows)}
 
 
 def unfinished(run: Run) -> list[Table]:

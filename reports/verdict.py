@@ -13,11 +13,11 @@ from reports.numbers import number, with_spread
 from reports.overview import LEARNED, leads
 from reports.pareto import TIME, WHOLE, indistinct
 from reports.significance import within_uncertainty
+from reports.tables import BAD
 
 TOTAL, CURVATURE, DISTANCE, SWING = "energy/total", "curvature/error", "distance/rms", "dynamics/amplitude"
 STRAIN = ("motion/strain", "energy/strain")
 MOST = 5  # of failures said on page one
-BAD = ("failed", "diverged", "timeout", "out-of-memory", "stalled")
 
 
 def verdict(run: Run) -> list[tuple[str, str]]:
@@ -93,22 +93,10 @@ def _trust(run: Run, worn: pd.DataFrame, timed: pd.DataFrame) -> str:
 
 def endings(run: Run) -> str:
     """How many cells, checks and stress tests ended how, with every kind that is not ok."""
-    cells = run.frame[(run.frame["case"] == "") & (run.frame["method"] != "")]
-    best_first = {"stalled": 0, "ok": 1}  # what has any usable number has run, whatever became of the others
-    cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
-    ends = cells.drop_duplicates(["suite", "scene", "method", "seed"])["status"]
-    checks = tables.checks(run)
-    groups = {
-        "cells": ends,
-        "checks": checks[checks["tolerance"].notna() | (checks["status"] != "ok")]["status"],
-        "stress tests": tables.stress_tests(run)["status"],
-    }
     words = []
-    for what, statuses in groups.items():
-        counts = statuses.value_counts()
-        found = [f"{counts[name]} {name}" for name in (*BAD, "skipped") if name in counts]
-        if len(statuses):
-            words.append(f"of {len(statuses):,} {what} {', '.join(found) if found else 'all ended well'}")
+    for what, counts in tables.counted(run).items():
+        found = [f"{counts[name]} {name}" for name in (*BAD, "skipped") if counts[name]]
+        words.append(f"of {sum(counts.values()):,} {what} {', '.join(found) if found else 'all ended well'}")
     text = "; ".join(words)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 

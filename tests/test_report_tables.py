@@ -283,6 +283,9 @@ def test_page_one_counts_every_kind_of_ending():
         in said
     )
     assert endings(run_of(rows[:3])) == "Of 1 cells all ended well."
+    table = make_tables(run_of(rows))["endings"]
+    lines = {line[0]: dict(zip([c.name for c in table.columns], line)) for line in table.rows}
+    assert lines["checks"]["failed"] == 1 and lines["checks"]["all"] == 3 and lines["cells"]["timeout"] == 1
     # A metric that is not finite, or off its tolerance, fails no cell that has others.
     rows[:3] = [
         *rows[:3],
@@ -308,7 +311,7 @@ def test_sections_exist_only_for_what_ran():
     content = document(run, made_tables, [], [])
     assert [section["title"] for section in content["sections"]] == ["Findings", "Validation"]
     assert content["definitions"] == content["first"]["verdict"] == content["first"]["blocks"] == []
-    assert set(made_tables) == {"validation", "metrics"}
+    assert set(made_tables) == {"validation", "metrics", "endings"}
     (block,) = content["sections"][1]["blocks"]
     assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
 

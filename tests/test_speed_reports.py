@@ -255,10 +255,11 @@ def test_ablations_are_drawn_where_the_full_recipe_is_not(tmp_path):
 
 def test_every_network_has_its_crossings_in_a_table():
     (table,) = crossings(run_of(all_rows()))
-    found = {line[2]: line[4:] for line in table.rows}
+    found = {line[2]: line[4:6] for line in table.rows}
     assert {line[2]: line[3] for line in table.rows}["lbfgs-20"] == "energy gap"
     assert {line[1] for line in table.rows} == {"snug"}
     assert found["simulation"] == (2000.0, pytest.approx(200.5, rel=1e-3))
+    assert {line[2]: line[6:] for line in table.rows}["simulation"] == (pytest.approx(200.0), 400.0)
     assert found["lbfgs-20"][0] == 13000.0 and set(found) == {"simulation", "lbfgs-20", "lbfgs-5"}
     others = run_of([r for r in all_rows() if "snug" not in r.method])
     assert crossings(others) == [] and summary(others) == []
