@@ -70,7 +70,13 @@ def _block(run: Run, table: Table) -> Block:
         "caption": table.caption,
         "note": remarks_of(table, lines),
         "columns": [
-            {"title": column.title, "unit": column.unit, "left": column.text, "width": width}
+            # A duration is printed with a unit of its own.
+            {
+                "title": column.title,
+                "unit": "" if column.unit == "s" else column.unit,
+                "left": column.text,
+                "width": width,
+            }
             for column, width in zip(columns, _widths(columns))
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],

@@ -78,8 +78,8 @@ def said_below(run: Run, rows: pd.DataFrame, method: str) -> str:
     for metric in BELOW:
         if metric in set(rows[rows["usable"]]["metric"]):
             mean = mean_of(rows, method, metric)
-            words = with_spread(mean.value, mean.spread or None) if mean else number(None)
-            return f"{words} {run.metrics[metric].unit}"
+            words = with_spread(mean.value, mean.spread or None) if mean else ""
+            return f"{words} {run.metrics[metric].unit}" if words else ""
     return ""
 
 

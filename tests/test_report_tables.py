@@ -147,6 +147,13 @@ def test_a_wide_table_goes_on_below_with_its_heads():
 # --- ablations ----------------------------------------------------------------------------------------------
 
 
+def test_a_duration_has_its_own_unit_and_none_over_its_column():
+    run = run_of([row("tshirt/walk", "snug", "cost/train", 160.0, unit="s")])
+    (block,) = table_blocks(run, make_tables(run)["cost"])
+    assert [column["unit"] for column in block["columns"]][1:] == [""]
+    assert [cell["text"] for cell in block["groups"][0]["rows"][0]][1:] == ["2.67 min"]
+
+
 def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
     rows = seeds_of("snug-no-noise", "energy/total", (2.0, 2.2, 2.4))
     rows += seeds_of("snug-window6", "energy/total", (1.0, 1.2, 1.4))
