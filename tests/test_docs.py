@@ -23,7 +23,11 @@ SAID = {"holds": "reproduced", "does not hold": "refuted", "tie": "tie", "cannot
 EXTEND = ROOT / "docs" / "extend.md"
 FILE = re.compile(r"File `([^`]+)`:$")
 SHORT = ("A method", "A scene", "A metric", "A package")
-LONG = ("How to add something", "A program", "A recipe")  # tests/test_doors.py has the like of the first two
+LONG = (
+    "How to add something",
+    "A program",
+    "A recipe",
+)  # tests/test_outside.py: the first two
 
 
 def blocks(text: str) -> Iterator[tuple[str, str, str]]:

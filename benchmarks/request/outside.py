@@ -101,28 +101,28 @@ def home_of(kind: Kind, word: str) -> str | None:
     """
     if word.endswith(".py"):
         return file_of(word)
-    doors = list(metadata.entry_points(group=kind.group, name=word))
-    if not doors:
+    found = list(metadata.entry_points(group=kind.group, name=word))
+    if not found:
         return None
-    if len({door.value for door in doors}) > 1:
-        who = " and by ".join(sorted(_who(door) for door in doors))
+    if len({point.value for point in found}) > 1:
+        who = " and by ".join(sorted(_who(point) for point in found))
         raise DeclarationError(f"entry point {word} of {kind.group} is declared by {who}: rename one")
-    if ":" in doors[0].value:
+    if ":" in found[0].value:
         raise DeclarationError(
-            f"entry point {word} of {_who(doors[0])} is {doors[0].value}: name the module that has "
+            f"entry point {word} of {_who(found[0])} is {found[0].value}: name the module that has "
             f"{kind.tuple_name}, without a colon"
         )
-    return doors[0].value
+    return found[0].value
 
 
-def _who(door: metadata.EntryPoint) -> str:
-    return f"package {door.dist.name} {door.dist.version}" if door.dist else door.value
+def _who(point: metadata.EntryPoint) -> str:
+    return f"package {point.dist.name} {point.dist.version}" if point.dist else point.value
 
 
 def described(kind: Kind) -> list[tuple[str, str]]:
     """(name, words) of each entry point, for a list; none is loaded."""
-    doors = metadata.entry_points(group=kind.group)
-    return sorted((door.name, f"{_who(door)}, module {door.value}") for door in doors)
+    found = metadata.entry_points(group=kind.group)
+    return sorted((point.name, f"{_who(point)}, module {point.value}") for point in found)
 
 
 def file_of(word: str) -> str:
