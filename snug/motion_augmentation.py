@@ -67,7 +67,8 @@ def shared_clips(
     motions: Sequence[Motion], share: int, *, vertices: int, swinging: bool = False
 ) -> list[Motion]:
     """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
-    recipe does. Fewer are the first of more. swinging: those of each share as one snug.swinging_motions.
+    recipe does. Fewer are the first of more. swinging: those of each share, and pieces of the given motions,
+    as one snug.swinging_motions.
     """
     from snug.swinging_motions import swinging_motion
 
@@ -78,7 +79,9 @@ def shared_clips(
     ends = [round(part * given / FRAMES) for part in range(share + 1)]
     parts = [clips[first:end] for first, end in pairwise(ends)]
     return [
-        swinging_motion(part, f"swinging_{number}", seed=number) for number, part in enumerate(parts) if part
+        swinging_motion(part, f"swinging_{number}", seed=number, given=motions)
+        for number, part in enumerate(parts)
+        if part
     ]
 
 

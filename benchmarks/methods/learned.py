@@ -93,6 +93,7 @@ LEARNED = (
     *(_ablation(recipe.name) for recipe in ABLATIONS),
     *(_stored(precision) for precision in ("bf16", "int8")),
     *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
+    *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs", trained="snug-dynamic", pairing_group="snug"),
     *(cleaned(network(kind, label, "")) for kind, label in (("snug", "SNUG"), ("pbns", "PBNS"),
                                                 ("supervised", "Supervised"),
                                                 ("santesteban2019", "Santesteban 2019"),
