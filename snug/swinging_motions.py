@@ -28,9 +28,7 @@ BETWEEN = 16  # frames from one clip to the next
 VERTICAL = np.array([0.0, 1.0, 0.0])
 
 
-def swinging_motion(
-    clips: Sequence[Motion], name: str, *, seed: int, given: Sequence[Motion] = ()
-) -> Motion:
+def swinging_motion(clips: Sequence[Motion], name: str, *, seed: int, given: Sequence[Motion] = ()) -> Motion:
     """All the clips, so changed, as one motion; deterministic for a seed. Some 80 frames for each of 60.
 
     given: motions of which pieces take the place of a share GIVEN of the clips; none: of no clip.
