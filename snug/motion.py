@@ -167,6 +167,25 @@ def turned(motion: Motion, angle: float) -> Motion:
     return replace(motion, poses=poses, translations=translations)
 
 
+def mirrored(motion: Motion) -> Motion:
+    """The motion as a mirror in the plane x = 0 shows it: sides change, turns about y and z change sign."""
+    twin = [JOINT[_other_side(name)] for name in JOINT]
+    return Motion(
+        name=f"{motion.name}_mirrored",
+        poses=motion.poses[:, twin] * [1.0, -1.0, -1.0],
+        translations=motion.translations * [-1.0, 1.0, 1.0],
+        fps=motion.fps,
+        kind=motion.kind,
+        source=motion.source,
+    )
+
+
+def _other_side(name: str) -> str:
+    if name.startswith("left_"):
+        return "right_" + name.removeprefix("left_")
+    return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
+
+
 def joint_speeds(motion: Motion) -> np.ndarray:
     """Angular speed of every joint relative to its parent. -> (T - 1, 24) [rad/s]."""
     rotations = rotation_matrices(motion.poses)

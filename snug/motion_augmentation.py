@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from snug.motion import Motion, arm_clearance
+from snug.motion import Motion, arm_clearance, mirrored
 from snug.recipe import DEFAULT, Recipe
 from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
 
@@ -106,25 +106,6 @@ def mixed_motions(
     random = np.random.default_rng(seed)
     count = max(1, round(frames / FRAMES)) if frames > 0 else 0
     return [_mixed(motions, random, turn, lifted, f"mixed_{number}") for number in range(count)]
-
-
-def mirrored(motion: Motion) -> Motion:
-    """The motion as a mirror in the plane x = 0 shows it: sides change, turns about y and z change sign."""
-    twin = [JOINT[_other_side(name)] for name in JOINT]
-    return Motion(
-        name=f"{motion.name}_mirrored",
-        poses=motion.poses[:, twin] * [1.0, -1.0, -1.0],
-        translations=motion.translations * [-1.0, 1.0, 1.0],
-        fps=motion.fps,
-        kind=motion.kind,
-        source=motion.source,
-    )
-
-
-def _other_side(name: str) -> str:
-    if name.startswith("left_"):
-        return "right_" + name.removeprefix("left_")
-    return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
 
 
 def _mixed(

@@ -14,8 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from snug.motion import Motion, heading, resample, transition, turned
-from snug.motion_augmentation import FRAMES, mirrored
+from snug.motion import Motion, heading, mirrored, resample, transition, turned
 from snug.motions.posture import SPINE_SHARES
 from snug.skeleton import JOINT, axis_angles, rotation_matrices
 
@@ -63,8 +62,8 @@ def _or_piece(clip: Motion, given: Sequence[Motion], random: np.random.Generator
     source = given[int(random.integers(len(given)))]
     if random.random() < 0.5:
         source = mirrored(source)
-    start = int(random.integers(max(1, source.frames - FRAMES + 1)))
-    return source.cut(start, start + FRAMES)
+    start = int(random.integers(max(1, source.frames - clip.frames + 1)))
+    return source.cut(start, start + clip.frames)
 
 
 def _swinging(clip: Motion, random: np.random.Generator) -> Motion:
