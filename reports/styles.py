@@ -62,6 +62,7 @@ KNOWN = {
     "snug+fast-lbfgs": Style("SNUG + fast L-BFGS", "", "X", "--"),
     "snug+newton": Style("SNUG + Newton", "", "P", "-."),
     "snug-dynamic+lbfgs": Style("SNUG, dynamic + L-BFGS", "", "X", "-."),
+    "snug-dynamic+fast-lbfgs": Style("SNUG, dynamic + fast L-BFGS", "", "X", "--"),
     "skinning+lbfgs": Style("Skinning + L-BFGS", "", "X", "-."),
     # So have networks that learn from more or fewer frames.
     "snug-data": Style("SNUG", "", "o"),

@@ -144,17 +144,46 @@ def place(motion: Motion) -> Motion:
     The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second
     percentile of the lower foot's height over all frames is taken for the floor.
     """
-    root = rotation_matrices(motion.poses[:, 0])
-    facing = root[0, :, 2]
-    # A body lying on its back or front has no heading; it keeps the recorded one.
-    heading = np.arctan2(facing[0], facing[2]) if np.hypot(facing[0], facing[2]) > 0.1 else 0.0
-    turn = rotation_matrices(np.array([0.0, -heading, 0.0]))
-    poses = motion.poses.copy()
-    poses[:, 0] = axis_angles(turn @ root)
-    translations = (motion.translations - motion.translations[0]) @ turn.T
+    placed = turned(motion, -heading(motion.poses[0]))
+    poses, translations = placed.poses, placed.translations
     lowest = sole_points(poses, translations)[..., 1].min(axis=1)
     translations[:, 1] -= np.percentile(lowest, 2.0)
     return replace(motion, poses=poses, translations=translations)
+
+
+def heading(pose: np.ndarray) -> float:
+    """Where a pose (24, 3) [rad] faces: the angle [rad] about the vertical from +z towards +x."""
+    facing = rotation_matrices(pose[0])[:, 2]
+    # A body lying on its back or front has no heading; it keeps the recorded one.
+    return float(np.arctan2(facing[0], facing[2])) if np.hypot(facing[0], facing[2]) > 0.1 else 0.0
+
+
+def turned(motion: Motion, angle: float) -> Motion:
+    """The whole motion turned by that angle [rad] about the vertical, beginning above the origin."""
+    turn = rotation_matrices(np.array([0.0, angle, 0.0]))
+    poses = motion.poses.copy()
+    poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
+    translations = (motion.translations - motion.translations[0]) @ turn.T
+    return replace(motion, poses=poses, translations=translations)
+
+
+def mirrored(motion: Motion) -> Motion:
+    """The motion as a mirror in the plane x = 0 shows it: sides change, turns about y and z change sign."""
+    twin = [JOINT[_other_side(name)] for name in JOINT]
+    return Motion(
+        name=f"{motion.name}_mirrored",
+        poses=motion.poses[:, twin] * [1.0, -1.0, -1.0],
+        translations=motion.translations * [-1.0, 1.0, 1.0],
+        fps=motion.fps,
+        kind=motion.kind,
+        source=motion.source,
+    )
+
+
+def _other_side(name: str) -> str:
+    if name.startswith("left_"):
+        return "right_" + name.removeprefix("left_")
+    return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
 
 
 def joint_speeds(motion: Motion) -> np.ndarray:

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from snug.motion import Motion, arm_clearance
+from snug.motion import Motion, arm_clearance, mirrored
 from snug.recipe import DEFAULT, Recipe
 from snug.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
 
@@ -67,7 +67,8 @@ def shared_clips(
     motions: Sequence[Motion], share: int, *, vertices: int, swinging: bool = False
 ) -> list[Motion]:
     """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
-    recipe does. Fewer are the first of more. swinging: those of each share as one snug.swinging_motions.
+    recipe does. Fewer are the first of more. swinging: those of each share, and pieces of the given motions,
+    as one snug.swinging_motions.
     """
     from snug.swinging_motions import swinging_motion
 
@@ -78,7 +79,9 @@ def shared_clips(
     ends = [round(part * given / FRAMES) for part in range(share + 1)]
     parts = [clips[first:end] for first, end in pairwise(ends)]
     return [
-        swinging_motion(part, f"swinging_{number}", seed=number) for number, part in enumerate(parts) if part
+        swinging_motion(part, f"swinging_{number}", seed=number, given=motions)
+        for number, part in enumerate(parts)
+        if part
     ]
 
 
@@ -103,25 +106,6 @@ def mixed_motions(
     random = np.random.default_rng(seed)
     count = max(1, round(frames / FRAMES)) if frames > 0 else 0
     return [_mixed(motions, random, turn, lifted, f"mixed_{number}") for number in range(count)]
-
-
-def mirrored(motion: Motion) -> Motion:
-    """The motion as a mirror in the plane x = 0 shows it: sides change, turns about y and z change sign."""
-    twin = [JOINT[_other_side(name)] for name in JOINT]
-    return Motion(
-        name=f"{motion.name}_mirrored",
-        poses=motion.poses[:, twin] * [1.0, -1.0, -1.0],
-        translations=motion.translations * [-1.0, 1.0, 1.0],
-        fps=motion.fps,
-        kind=motion.kind,
-        source=motion.source,
-    )
-
-
-def _other_side(name: str) -> str:
-    if name.startswith("left_"):
-        return "right_" + name.removeprefix("left_")
-    return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
 
 
 def _mixed(

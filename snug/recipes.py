@@ -139,7 +139,7 @@ TRAININGS = {
     "supervised": Training("supervised", SUPERVISED, Simulated()),
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
     "tailornet": Training("tailornet", TAILORNET, Simulated()),
-    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=6, method="fast-lbfgs-40", swinging=True)),
+    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
     **{
         f"snug-{recipe.name}": Training("snug", recipe)
         for recipe in (PAPER, *ABLATIONS, *with_and_without(DEFAULT, PAPER))

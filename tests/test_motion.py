@@ -10,12 +10,14 @@ from snug.motion import (
     MotionError,
     arm_clearance,
     clear_arms,
+    heading,
     joint_speeds,
     nearest_pose,
     place,
     resample,
     spread_arms,
     transition,
+    turned,
 )
 from snug.motion_library import (
     DYNAMIC_TEST,
@@ -298,6 +300,21 @@ def test_spread_arms_lifts_both_upper_arms_by_the_angle():
     assert spread_arms(hanging, 0.0) is hanging
     close = arm_clearance(hanging).min()
     assert close < ARMS_CLEAR < arm_clearance(clear_arms(hanging)).min()
+
+
+def test_a_turned_motion_faces_that_much_further_round_and_keeps_its_shape():
+    motion = make_motion("walk")
+    around = turned(motion, 2.0)
+    assert heading(around.poses[5]) == pytest.approx(heading(motion.poses[5]) + 2.0)
+    assert heading(turned(around, 2.0).poses[0]) == pytest.approx(heading(motion.poses[0]) + 4.0 - 2 * np.pi)
+    np.testing.assert_array_equal(around.poses[:, 1:], motion.poses[:, 1:])
+    np.testing.assert_array_equal(around.translations[0], 0.0)
+    path = motion.translations - motion.translations[0]
+    np.testing.assert_allclose(around.translations[:, 1], path[:, 1], atol=1e-12)
+    # From +z towards +x: x' = cos x + sin z.
+    np.testing.assert_allclose(
+        around.translations[:, 0], np.cos(2.0) * path[:, 0] + np.sin(2.0) * path[:, 2], atol=1e-12
+    )
 
 
 def test_place_faces_forward_on_the_floor():

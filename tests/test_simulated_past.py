@@ -10,14 +10,14 @@ import torch
 from dressing import swaying, tube_dress
 
 from snug.baselines.supervised import TargetError
-from snug.motion import Motion, joint_speeds
+from snug.motion import Motion, joint_speeds, turned
 from snug.motion_augmentation import mixed_motions, shared_clips
 from snug.motion_inputs import HISTORY, RATED, motion_history, motion_rates
 from snug.recipes import DYNAMIC, TRAININGS
 from snug.rollout import roll_out
 from snug.simulated_past import NEARNESS, SimulatedPast
-from snug.skeleton import axis_angles, rotation_matrices
-from snug.swinging_motions import BETWEEN, HELD, SPEEDS, swinging_motion
+from snug.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.swinging_motions import BETWEEN, FASTEST, HELD, SPEEDS, swinging_motion
 from snug.trained_model import TrainedModel
 from snug.trainer import Trainer
 from snug.training import train
@@ -161,6 +161,29 @@ def test_swinging_motions_turn_stop_and_go_on_without_a_jump():
     fastest = max(np.linalg.norm(np.diff(c.translations, axis=0), axis=1).max() for c in clips)
     assert steps.max() < SPEEDS[1] * fastest + 0.02
     assert motion_rates(motion)[:, 7].std() > 0.3  # the pelvis turns [rad/s]
+
+
+def test_no_body_turns_about_between_two_swinging_clips():
+    still = Motion("still", np.zeros((60, 24, 3)), np.zeros((60, 3)))
+    clips = [turned(still, angle) for angle in (0.0, np.pi, 0.5, -2.5, 1.5)]
+    pelvis = motion_rates(swinging_motion(clips, "swing", seed=1))[:, 7]  # [rad/s] about y
+    assert np.abs(pelvis).max() < 1.01 * np.deg2rad(2 * np.pi * FASTEST)
+
+
+def test_half_of_the_swinging_clips_are_pieces_of_given_motions_and_none_where_none_is_given():
+    clips = [swaying(60, name=f"mixed_{number}") for number in range(60)]
+    poses = np.zeros((90, 24, 3))
+    poses[:, JOINT["left_elbow"], 1] = 1.0
+    given = [Motion("given", poses, np.zeros((90, 3)))]
+
+    def bent(side, **options):
+        elbow = swinging_motion(clips, "swing", seed=2, **options).poses[:, JOINT[f"{side}_elbow"], 1]
+        return float((np.abs(elbow) > 0.999).mean())
+
+    assert bent("left") == bent("right") == 0.0
+    assert bent("left", given=given) > 0.1 < bent("right", given=given)  # mirrored half of the time
+    ways = BETWEEN / 80
+    assert 0.35 < bent("left", given=given) + bent("right", given=given) + 0.5 * ways < 0.65
 
 
 def test_swinging_clips_of_a_share_are_those_of_mixed_clips_and_the_first_of_more():

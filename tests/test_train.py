@@ -12,8 +12,8 @@ from dressing import leaning, swaying, tube_dress
 from reference_sim.energies import StretchStVK
 from snug import trained_model
 from snug.baselines.supervised import TargetError, vertex_loss
-from snug.motion import Motion, arm_clearance
-from snug.motion_augmentation import hung_arms, lap_clearance, mirrored, mixed_for, mixed_motions
+from snug.motion import Motion, arm_clearance, mirrored
+from snug.motion_augmentation import hung_arms, lap_clearance, mixed_for, mixed_motions
 from snug.motion_library import TRAIN, make_motion
 from snug.recipe import DEFAULT, Recipe, RecipeError
 from snug.recipes import PAPER, SUPERVISED

@@ -105,7 +105,7 @@ PRESETS = (
         settle_frames=30,
         steps={
             "snug": 5300,
-            "dynamic": 5300,
+            "dynamic": 8000,
             "supervised": 4000,
             "pbns": 6000,
             "santesteban2019": 1000,
