@@ -201,7 +201,7 @@ def map_points(run: Run) -> dict[str, tuple[float, float]]:
 def endings(run: Run) -> list[Table]:
     """How many cells, checks and stress tests ended how."""
     ends = ("ok", *BAD, "skipped")
-    lines = [
+    lines: list[tuple[Cell, ...]] = [
         (what, *(counts[end] for end in ends), sum(counts.values())) for what, counts in counted(run).items()
     ]
     columns = [Column(name, name.capitalize()) for name in (*ends, "all")]
