@@ -292,6 +292,25 @@ def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folde
 
 
 @pytest.mark.slow
+def test_an_outcome_that_goes_with_its_worker_keeps_nobody_waiting(folder, tmp_path, monkeypatch):
+    killed: list[float] = []
+    take = ClusterExecutor._take
+
+    def taken(self, worker, lane):
+        if not killed:
+            one.workers[0].kill()
+            killed.append(time.monotonic())
+            one.add()
+            until(lambda: worker.address not in self._client.nthreads())
+        take(self, worker, lane)
+
+    monkeypatch.setattr(ClusterExecutor, "_take", taken)
+    with cluster(tmp_path, 1) as one:
+        assert together(folder, one.address, [write("one")])["one"].status == "ok"
+        assert time.monotonic() - killed[0] < 55.0
+
+
+@pytest.mark.slow
 def test_workers_behind_a_nanny_need_a_setting_and_then_come_back(folder, tmp_path):
     with cluster(tmp_path, 0) as none:
         none.add("--nanny")
@@ -338,7 +357,7 @@ def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expec
             runner = start_runner(folder.path, address, seconds=0.3, mark=mark)
             while kills < KILLS and runner.poll() is None:
                 begun = len(lines(mark))
-                until(lambda: len(lines(mark)) > begun or runner.poll() is not None)  # noqa: B023
+                until(lambda: len(lines(mark)) > begun or runner.poll() is not None, 120.0)  # noqa: B023
                 time.sleep(chance.uniform(0.0, 0.6))
                 if runner.poll() is not None:
                     break

@@ -34,7 +34,6 @@ ATTEMPTS = 3  # workers that may die of a task
 LOOK = 2.0  # [s] between looks at which workers there are and how far they are
 FIRST = 5.0  # [s] in which a scheduler answers at first
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
-ANSWER = 60.0  # [s] for an outcome to come once the task has ended
 
 
 class ClusterError(ValueError):
@@ -104,6 +103,7 @@ class ClusterExecutor(LocalExecutor):
 
     def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
         self._waiting.extend((deque(batch), needed) for batch, needed in batches)
+        self._looked = 0.0  # whoever went since the last stage would be asked in vain for half a minute
         try:
             while self._waiting or self._busy() or self._finished:
                 self._look(bar)
@@ -248,7 +248,9 @@ class ClusterExecutor(LocalExecutor):
     def _take(self, worker: _Worker, lane: _Lane) -> None:
         """The outcome of a task that has ended, with its files; then the next of its batch."""
         try:
-            outcome = lane.future.result(timeout=ANSWER)
+            outcome = lane.future.result(timeout=LOOK)
+        except TimeoutError:  # it went with its worker, whose end the next look finds
+            return
         except CancelledError:  # the scheduler died
             self._lose(worker, died=False)
             return
