@@ -135,16 +135,15 @@ def outlook(tasks: Sequence[Measured], workers: int, costs: Costs) -> Outlook:
 
 def stage_seconds(tasks: Iterable[Measured], workers: int, costs: Costs, start: float = 0.0) -> float:
     """[s] until the last result of a stage is written; workers begin at `start`."""
-    free = [start] * workers  # a heap: equal numbers are one
-    runner = 0.0  # the time until which it is busy
-    results: list[tuple[float, float]] = []  # when a task ends, and for how long the runner then has work
-    for task in sorted(tasks, key=lambda task: -task.seconds):
-        begin = heapq.heappop(free)
-        while results and results[0][0] <= max(begin, runner):
+    runner = start  # the time until which it is busy
+    results: list[
+        tuple[float, float]
+    ] = []  # a heap: when a task ends, and for how long the runner then has work
+    for number, task in enumerate(sorted(tasks, key=lambda task: -task.seconds)):
+        if number >= workers:  # who is back first gets the next
             ended, busy = heapq.heappop(results)
             runner = max(runner, ended) + busy
-        runner = max(runner, begin) + costs.handling / 2
-        heapq.heappush(free, runner + task.seconds)
+        runner += costs.handling / 2
         heapq.heappush(results, (runner + task.seconds, costs.taking(task)))
     while results:
         ended, busy = heapq.heappop(results)

@@ -135,6 +135,19 @@ def test_a_file_goes_to_a_worker_once(two, folder, monkeypatch):
     assert len(put) == len(set(put)) and {name for _, name in put} >= {"numbers/first.npy"}
 
 
+def test_a_worker_has_its_next_task_before_results_of_others_are_taken(two, folder, monkeypatch):
+    monkeypatch.setattr(runner_side, "POLL", 1.0)  # both have ended then
+    calls = []
+    for name in ("_take", "_hand"):
+        own = getattr(ClusterExecutor, name)
+        monkeypatch.setattr(
+            ClusterExecutor, name,
+            lambda self, *words, own=own, name=name: (calls.append(name), own(self, *words)),
+        )  # fmt: skip
+    together(folder, two.address, *([write(name)] for name in "abcd"))
+    assert calls == ["_hand", "_hand", *["_take", "_hand"] * 2, *["_take"] * 2]
+
+
 def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
     monkeypatch.setattr(runner_side, "LOOK", 0.1)
     told = []

@@ -222,9 +222,15 @@ class ClusterExecutor(LocalExecutor):
         for worker in list(self._workers.values()):
             for lane in worker.lanes:
                 if self._waiting and self._knows(worker) and not lane.batch:
-                    lane.batch, lane.needed = self._waiting.popleft()
-                    lane.fresh = True
-                    self._hand(worker, lane)
+                    self._go_on(worker, lane)
+
+    def _go_on(self, worker: _Worker, lane: _Lane) -> None:
+        """The next task of its batch to a thread, or the first of another."""
+        if not lane.batch and self._waiting:
+            lane.batch, lane.needed = self._waiting.popleft()
+            lane.fresh = True
+        if lane.batch:
+            self._hand(worker, lane)
 
     def _hand(self, worker: _Worker, lane: _Lane) -> None:
         """The next task of its batch to a thread, once all files that it needs are there."""
@@ -246,7 +252,7 @@ class ClusterExecutor(LocalExecutor):
         lane.fresh = False
 
     def _take(self, worker: _Worker, lane: _Lane) -> None:
-        """The outcome of a task that has ended, with its files; then the next of its batch."""
+        """The outcome of a task that has ended, with its files; then the next task."""
         try:
             outcome = lane.future.result(timeout=LOOK)
         except TimeoutError:  # it went with its worker, whose end the next look finds
@@ -268,8 +274,7 @@ class ClusterExecutor(LocalExecutor):
         outcome = dataclasses.replace(outcome, origin={"hardware": worker.hardware})
         self._finished.append((lane.batch.popleft(), outcome))
         lane.future = None
-        if lane.batch:
-            self._hand(worker, lane)
+        self._go_on(worker, lane)  # at once: it does not wait while results of others are taken
 
     # --- files ---------------------------------------------------------------------------------------------
 
