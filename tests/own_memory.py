@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,15 @@ def own_memory(pid: int | str = "self") -> int:
     except OSError:
         return 0
     return next((int(line.split()[1]) for line in lines if line.startswith("RssAnon")), 0)
+
+
+def children(pid: int) -> list[int]:
+    """Processes that its threads have started."""
+    found: list[int] = []
+    for thread in Path(f"/proc/{pid}/task").glob("*/children"):
+        with suppress(OSError):  # it has just ended
+            found += map(int, thread.read_text().split())
+    return found
 
 
 def slope(samples: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dressing import tube_dress
-from own_memory import needs_proc, own_memory
+from own_memory import children, needs_proc, own_memory
 from tasks_by_hand import InProcess
 
 from benchmarks import dataset
@@ -407,8 +407,7 @@ def test_many_sequences_survive_a_kill_and_take_no_more_memory(tube, tmp_path):
     for most in (MANY // 2, 2 * MANY):
         running = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
         while running.poll() is None and (done := len(list(entries.glob("*/*.json")))) < most:
-            crew = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
-            for pid in (running.pid, *map(int, crew)):
+            for pid in (running.pid, *children(running.pid)):
                 memory.setdefault(pid, []).append((done, own_memory(pid)))
             time.sleep(0.2)
         if running.poll() is None:

@@ -41,8 +41,9 @@ class Add(Task):
         if self.how == "hang":
             signal.pause()
         if self.how == "fill":
-            pieces = [bytearray(50_000) for _ in range(3000)]  # each too small to be mapped by itself
+            pieces: list = [bytearray(50_000) for _ in range(3000)]  # each too small to be mapped by itself
             HELD.append(bytearray(50_000))  # while it is there the heap does not shrink by itself
+            pieces.append(pieces)  # freed only by who looks for circles
             del pieces
         context.tell(1)
         context.memo.setdefault("done", []).append(self.name)

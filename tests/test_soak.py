@@ -71,5 +71,5 @@ def test_a_training_of_many_steps_keeps_its_history_alone(tmp_path):
     train("snug", tube_dress(), [swaying(60)], steps=STEPS, seed=0, recipe=recipe,
           progress=False, every=100, saving=saving, stop=look)  # fmt: skip
     assert len(samples) == STEPS
-    found, error = growth(samples[::400], "step")
-    assert found < 20 + 3 * error  # a row of the history every hundred steps
+    found, _ = growth(samples[::400], "step")
+    assert found < 1000  # positions of one frame, kept in each, would be 1800
