@@ -69,9 +69,10 @@ class Outlook:
 
 def measured(folder: RunFolder, kinds: Sequence[str] = ()) -> list[Measured]:
     """The finished tasks of a run, all or those of these kinds. Raises ResultsError where there are none."""
-    from .tasks import case, cell, ground_truth, metrics, microbenchmark, task, training, training_windows
+    from .tasks import case, cell, ground_truth, metrics, microbenchmark, sequence, task, training
+    from .tasks import training_windows as windows
 
-    modules = (case, cell, ground_truth, metrics, microbenchmark, training, training_windows)
+    modules = (case, cell, ground_truth, metrics, microbenchmark, sequence, training, windows)
     classes = {
         own.kind: own
         for module in modules
@@ -92,12 +93,14 @@ def measured(folder: RunFolder, kinds: Sequence[str] = ()) -> list[Measured]:
                 size = sum(file.stat().st_size for file in files if file.is_file()) / MEGABYTE
                 found.append(Measured(own.stage, float(entry["outcome"]["seconds"]), size, timed))
     if not found:
-        raise ResultsError(f"{folder.cache}: holds no finished task; name the folder of a run")
+        raise ResultsError(f"{folder.cache}: holds no finished task; name the folder of a run or data set")
     return found
 
 
 def study(tasks: Sequence[Measured], copies: int, random: np.random.Generator) -> list[Measured]:
-    """As many tasks as `copies` of the run have, each drawn from those of its stage."""
+    """The tasks of the run, or as many as several copies have, each drawn from those of its stage."""
+    if copies == 1:
+        return list(tasks)
     stages: dict[tuple[str, bool], list[Measured]] = {}
     for task in tasks:
         stages.setdefault((task.stage, task.timed), []).append(task)
@@ -132,16 +135,15 @@ def outlook(tasks: Sequence[Measured], workers: int, costs: Costs) -> Outlook:
 
 def stage_seconds(tasks: Iterable[Measured], workers: int, costs: Costs, start: float = 0.0) -> float:
     """[s] until the last result of a stage is written; workers begin at `start`."""
-    free = [start] * workers  # a heap: equal numbers are one
-    runner = 0.0  # the time until which it is busy
-    results: list[tuple[float, float]] = []  # when a task ends, and for how long the runner then has work
-    for task in sorted(tasks, key=lambda task: -task.seconds):
-        begin = heapq.heappop(free)
-        while results and results[0][0] <= max(begin, runner):
+    runner = start  # the time until which it is busy
+    results: list[
+        tuple[float, float]
+    ] = []  # a heap: when a task ends, and for how long the runner then has work
+    for number, task in enumerate(sorted(tasks, key=lambda task: -task.seconds)):
+        if number >= workers:  # who is back first gets the next
             ended, busy = heapq.heappop(results)
             runner = max(runner, ended) + busy
-        runner = max(runner, begin) + costs.handling / 2
-        heapq.heappush(free, runner + task.seconds)
+        runner += costs.handling / 2
         heapq.heappush(results, (runner + task.seconds, costs.taking(task)))
     while results:
         ended, busy = heapq.heappop(results)
@@ -163,8 +165,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Simulate the runner's schedule on many workers with the task times of a finished run.",
         epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("run_dir", metavar="RUN", help="folder of a finished run")
-    parser.add_argument("--copies", type=int, default=100, help="size of the study, in runs (default 100)")
+    parser.add_argument("run_dir", metavar="RUN", help="folder of a finished run or data set")
+    parser.add_argument(
+        "--copies", type=int, default=100, help="size of the study, in runs (default 100; 1: this run)"
+    )
     parser.add_argument("--kinds", help="of tasks, say data,network (default: all)")
     parser.add_argument("--workers", default=",".join(map(str, WORKERS)), help="numbers of cores")
     parser.add_argument("--start", type=float, default=20.0, help="of a worker [s] (default 20)")

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.results import RunFolder
-from benchmarks.runner.cache import Cache
+from benchmarks.runner.cache import DEFAULT_ONLY, Cache
 from benchmarks.runner.cluster import ClusterExecutor
-from benchmarks.runner.executor import Executor
+from benchmarks.runner.executor import Executor, LocalExecutor
 from benchmarks.runner.loop import Runner
 from benchmarks.tasks.task import Outcome, Task
 
@@ -146,14 +146,16 @@ class NoLog:
 
 
 def finish(folder: Path, executor: Executor, **fields) -> Runner:
-    """The chain, run or reused."""
+    """The chain, run or reused; what has failed is tried again."""
     RunFolder(folder).remove_parts()
-    runner = Runner(chain(**fields), Cache(RunFolder(folder), origin={"commit": "c", "hardware": "h"}))
+    cache = Cache(RunFolder(folder), only=(*DEFAULT_ONLY, "failed"), origin={"commit": "c", "hardware": "h"})
+    runner = Runner(chain(**fields), cache)
     runner.run(executor, NoLog())
     return runner
 
 
 def main(folder: str, address: str, seconds: str, mark: str) -> None:
-    """The chain on a cluster."""
-    executor = ClusterExecutor(RunFolder(folder), None, 1, address)
+    """The chain on a cluster, or without an address on two processes here."""
+    run = RunFolder(folder)
+    executor = ClusterExecutor(run, None, 1, address) if address else LocalExecutor(run, None, 2)
     finish(Path(folder), executor, seconds=float(seconds), mark=mark)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import nullcontext, suppress
 from pathlib import Path
 
 import h5py
@@ -31,6 +32,8 @@ from benchmarks.runner.executor import LocalExecutor
 from benchmarks.runner.source import digest
 from benchmarks.tasks.task import Outcome, RunStopped
 from snug.tensor_file import read_tensors
+
+KILLS = int(os.environ.get("KILLS", "20"))  # of the processes here, and as many of the cluster
 
 
 class Bar:
@@ -130,6 +133,19 @@ def test_a_file_goes_to_a_worker_once(two, folder, monkeypatch):
     together(folder, two.address, *batches, needed={("numbers", "first"): first})
     put = [(worker.address, name) for worker, function, name in sent if function is cluster_worker.put_piece]
     assert len(put) == len(set(put)) and {name for _, name in put} >= {"numbers/first.npy"}
+
+
+def test_a_worker_has_its_next_task_before_results_of_others_are_taken(two, folder, monkeypatch):
+    monkeypatch.setattr(runner_side, "POLL", 1.0)  # both have ended then
+    calls = []
+    for name in ("_take", "_hand"):
+        own = getattr(ClusterExecutor, name)
+        monkeypatch.setattr(
+            ClusterExecutor, name,
+            lambda self, *words, own=own, name=name: (calls.append(name), own(self, *words)),
+        )  # fmt: skip
+    together(folder, two.address, *([write(name)] for name in "abcd"))
+    assert calls == ["_hand", "_hand", *["_take", "_hand"] * 2, *["_take"] * 2]
 
 
 def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
@@ -289,6 +305,25 @@ def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folde
 
 
 @pytest.mark.slow
+def test_an_outcome_that_goes_with_its_worker_keeps_nobody_waiting(folder, tmp_path, monkeypatch):
+    killed: list[float] = []
+    take = ClusterExecutor._take
+
+    def taken(self, worker, lane):
+        if not killed:
+            one.workers[0].kill()
+            killed.append(time.monotonic())
+            one.add()
+            until(lambda: worker.address not in self._client.nthreads())
+        take(self, worker, lane)
+
+    monkeypatch.setattr(ClusterExecutor, "_take", taken)
+    with cluster(tmp_path, 1) as one:
+        assert together(folder, one.address, [write("one")])["one"].status == "ok"
+        assert time.monotonic() - killed[0] < 55.0
+
+
+@pytest.mark.slow
 def test_workers_behind_a_nanny_need_a_setting_and_then_come_back(folder, tmp_path):
     with cluster(tmp_path, 0) as none:
         none.add("--nanny")
@@ -325,37 +360,43 @@ def test_with_a_worker_killed_and_the_scheduler_restarted_the_files_are_the_same
 
 
 @pytest.mark.slow
-def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected):
-    """Twenty times the runner or a worker; what was finished is done no second time."""
+@pytest.mark.parametrize("workers", [0, 2])
+def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected, workers):
+    """The runner, or a worker; here a task's process. What was finished is done no second time."""
     chance, kills, mark = random.Random(7), 0, tmp_path / "mark"
-    with cluster(tmp_path, 2) as two:
-        while kills < 20:
-            runner = start_runner(folder.path, two.address, seconds=0.3, mark=mark)
-            while kills < 20 and runner.poll() is None:
+    with cluster(tmp_path, workers) if workers else nullcontext() as there:
+        address = there.address if there else ""
+        while kills < KILLS:
+            runner = start_runner(folder.path, address, seconds=0.3, mark=mark)
+            while kills < KILLS and runner.poll() is None:
                 begun = len(lines(mark))
-                until(lambda: len(lines(mark)) > begun or runner.poll() is not None)  # noqa: B023
+                until(lambda: len(lines(mark)) > begun or runner.poll() is not None, 120.0)  # noqa: B023
                 time.sleep(chance.uniform(0.0, 0.6))
                 if runner.poll() is not None:
                     break
                 kept = {path: path.read_bytes() for path in folder.path.glob("cache/**/*.json")}
-                kill_one(chance, two, runner)
+                kill_one(chance, there, runner, lines(mark)[-1][1])
                 kills += 1
                 assert {path: path.read_bytes() for path in kept} == kept
             runner.wait(120)
             if files(folder.path) == expected:  # begin again: there are kills left
                 for path in folder.path.rglob("*.json"):
                     path.unlink()
-        finish(folder.path, ClusterExecutor(folder, None, 1, two.address))
+        last = ClusterExecutor(folder, None, 1, address) if there else LocalExecutor(folder, None, 2)
+        finish(folder.path, last)
     assert files(folder.path) == expected
     until(lambda: not any(alive(task) for _, task in lines(mark)), 15.0)
 
 
-def kill_one(chance: random.Random, two: Cluster, runner: subprocess.Popen) -> None:
+def kill_one(chance: random.Random, there: Cluster | None, runner: subprocess.Popen, task: int) -> None:
     if chance.random() < 0.5:
         runner.kill()
         runner.wait()
-        return
-    victim = two.workers.pop(chance.randrange(len(two.workers)))
-    victim.kill()
-    victim.wait()
-    two.add()
+    elif there is None:
+        with suppress(ProcessLookupError):  # it has just ended with the chain
+            os.kill(task, signal.SIGKILL)
+    else:
+        victim = there.workers.pop(chance.randrange(len(there.workers)))
+        victim.kill()
+        victim.wait()
+        there.add()

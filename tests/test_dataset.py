@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dressing import tube_dress
+from own_memory import children, needs_proc, own_memory
 from tasks_by_hand import InProcess
 
 from benchmarks import dataset
@@ -394,17 +395,8 @@ def test_settings_tell_garments_and_bodies_apart():
 MANY = 60
 
 
-def _memory(pid: int) -> int:
-    """Its own memory [kB], files that are mapped left out; 0 of a process that has ended."""
-    try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    except OSError:
-        return 0
-    return next((int(line.split()[1]) for line in lines if line.startswith("RssAnon")), 0)
-
-
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
+@needs_proc
 def test_many_sequences_survive_a_kill_and_take_no_more_memory(tube, tmp_path):
     """python -m benchmarks.dataset build with two workers, killed half-way and begun again."""
     out = tmp_path / "many"
@@ -415,9 +407,8 @@ def test_many_sequences_survive_a_kill_and_take_no_more_memory(tube, tmp_path):
     for most in (MANY // 2, 2 * MANY):
         running = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
         while running.poll() is None and (done := len(list(entries.glob("*/*.json")))) < most:
-            crew = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
-            for pid in (running.pid, *map(int, crew)):
-                memory.setdefault(pid, []).append((done, _memory(pid)))
+            for pid in (running.pid, *children(running.pid)):
+                memory.setdefault(pid, []).append((done, own_memory(pid)))
             time.sleep(0.2)
         if running.poll() is None:
             running.kill()
@@ -431,6 +422,6 @@ def test_many_sequences_survive_a_kill_and_take_no_more_memory(tube, tmp_path):
             late = done > done[0] + 3
             assert np.polyfit(done[late], kilobytes[late], 1)[0] < 100, "kB a sequence"
     deadline = time.monotonic() + 10.0
-    while (left := [pid for pid in memory if _memory(pid)]) and time.monotonic() < deadline:
+    while (left := [pid for pid in memory if own_memory(pid)]) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert not left

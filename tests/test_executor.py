@@ -6,10 +6,14 @@ import dataclasses
 import os
 import signal
 
+from own_memory import needs_proc, own_memory
+
 from benchmarks.results import RunFolder
 from benchmarks.runner import executor
 from benchmarks.runner.executor import LocalExecutor
 from benchmarks.tasks.task import Outcome, Task
+
+HELD: list[bytearray] = []  # of a process
 
 
 class Bar:
@@ -36,10 +40,15 @@ class Add(Task):
             os.kill(os.getpid(), signal.SIGKILL)
         if self.how == "hang":
             signal.pause()
+        if self.how == "fill":
+            pieces: list = [bytearray(50_000) for _ in range(3000)]  # each too small to be mapped by itself
+            HELD.append(bytearray(50_000))  # while it is there the heap does not shrink by itself
+            pieces.append(pieces)  # freed only by who looks for circles
+            del pieces
         context.tell(1)
         context.memo.setdefault("done", []).append(self.name)
         first, second = self.terms
-        return Outcome(result={"sum": first + second, "memo": list(context.memo["done"])})
+        return Outcome(result={"sum": first + second, "memo": list(context.memo["done"]), "kB": own_memory()})
 
 
 def add(name: str, **fields) -> Add:
@@ -82,6 +91,13 @@ def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
     found, _ = together(tmp_path, batch, [add("three")])
     assert found["two"].result["memo"] == ["one", "two"] and found["three"].result["memo"] == ["three"]
     assert found["bad"].failed and found["four"].result["memo"] == ["one", "two", "bad", "four"]
+
+
+@needs_proc
+def test_free_memory_of_a_batch_is_given_back(tmp_path):
+    found, _ = together(tmp_path, [add("one", how="fill"), add("two")], [add("three")])
+    during, after = (found[name].result["kB"] for name in ("two", "three"))
+    assert during - after > 100_000
 
 
 def test_what_hangs_in_a_batch_costs_the_others_nothing(tmp_path):

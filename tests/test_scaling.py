@@ -10,6 +10,7 @@ from benchmarks.results import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.scaling import Costs, Measured, outlook, stage_seconds, study
 from benchmarks.tasks.ground_truth import SimulateMotion
+from benchmarks.tasks.sequence import SimulateSequence
 from benchmarks.tasks.task import Outcome
 
 FREE = Costs(start=0.0, handling=0.0, bandwidth=np.inf)
@@ -60,13 +61,14 @@ def test_a_study_draws_from_what_was_measured():
     assert len(many) == 800 and set(many) == set(some)
     mean = np.mean([task.seconds for task in many if task.stage == "a"])
     assert mean == pytest.approx(2.0, abs=4 * 0.816 / np.sqrt(600))
+    assert study(some, 1, np.random.default_rng(0)) == some
 
 
-def finished(folder: RunFolder, name: str, seconds: float, *, failed: bool = False) -> None:
+def finished(folder: RunFolder, name: str, seconds: float, *, kind=SimulateMotion, failed=False) -> None:
     """The entry of a task in the cache, with a file of two megabytes."""
     path = folder.path / f"{name}.bin"
     path.write_bytes(bytes(2_000_000))
-    task = SimulateMotion(name=name, label=name, inputs={}, modules=(), scene=None, entry=None)  # type: ignore
+    task = kind(name=name, label=name, inputs={}, modules=(), scene=None, entry=None)  # type: ignore
     Cache(folder).keep(task, Outcome(seconds=seconds, failed=failed, files=(path.name,)), {})
 
 
@@ -83,6 +85,11 @@ def test_a_run_is_read_and_tabulated(tmp_path, capsys):
     assert scaling.main([str(tmp_path), "--copies", "10", "--workers", "1,4", "-o", str(out)]) == 0
     assert "20 tasks" in capsys.readouterr().out
     assert [line.split(",")[0] for line in out.read_text().splitlines()] == ["workers", "1", "4"]
+
+
+def test_a_data_set_is_read_too(tmp_path):
+    finished(RunFolder(tmp_path), "one", 3.0, kind=SimulateSequence)
+    assert [t.seconds for t in scaling.measured(RunFolder(tmp_path), ["sequence"])] == [3.0]
 
 
 @pytest.mark.parametrize(

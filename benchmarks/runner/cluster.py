@@ -34,7 +34,6 @@ ATTEMPTS = 3  # workers that may die of a task
 LOOK = 2.0  # [s] between looks at which workers there are and how far they are
 FIRST = 5.0  # [s] in which a scheduler answers at first
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
-ANSWER = 60.0  # [s] for an outcome to come once the task has ended
 
 
 class ClusterError(ValueError):
@@ -104,6 +103,7 @@ class ClusterExecutor(LocalExecutor):
 
     def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
         self._waiting.extend((deque(batch), needed) for batch, needed in batches)
+        self._looked = 0.0  # whoever went since the last stage would be asked in vain for half a minute
         try:
             while self._waiting or self._busy() or self._finished:
                 self._look(bar)
@@ -222,9 +222,15 @@ class ClusterExecutor(LocalExecutor):
         for worker in list(self._workers.values()):
             for lane in worker.lanes:
                 if self._waiting and self._knows(worker) and not lane.batch:
-                    lane.batch, lane.needed = self._waiting.popleft()
-                    lane.fresh = True
-                    self._hand(worker, lane)
+                    self._go_on(worker, lane)
+
+    def _go_on(self, worker: _Worker, lane: _Lane) -> None:
+        """The next task of its batch to a thread, or the first of another."""
+        if not lane.batch and self._waiting:
+            lane.batch, lane.needed = self._waiting.popleft()
+            lane.fresh = True
+        if lane.batch:
+            self._hand(worker, lane)
 
     def _hand(self, worker: _Worker, lane: _Lane) -> None:
         """The next task of its batch to a thread, once all files that it needs are there."""
@@ -246,9 +252,11 @@ class ClusterExecutor(LocalExecutor):
         lane.fresh = False
 
     def _take(self, worker: _Worker, lane: _Lane) -> None:
-        """The outcome of a task that has ended, with its files; then the next of its batch."""
+        """The outcome of a task that has ended, with its files; then the next task."""
         try:
-            outcome = lane.future.result(timeout=ANSWER)
+            outcome = lane.future.result(timeout=LOOK)
+        except TimeoutError:  # it went with its worker, whose end the next look finds
+            return
         except CancelledError:  # the scheduler died
             self._lose(worker, died=False)
             return
@@ -266,8 +274,7 @@ class ClusterExecutor(LocalExecutor):
         outcome = dataclasses.replace(outcome, origin={"hardware": worker.hardware})
         self._finished.append((lane.batch.popleft(), outcome))
         lane.future = None
-        if lane.batch:
-            self._hand(worker, lane)
+        self._go_on(worker, lane)  # at once: it does not wait while results of others are taken
 
     # --- files ---------------------------------------------------------------------------------------------
 

@@ -18,6 +18,7 @@ from ..assets import Assets
 from ..results import RunFolder
 from ..tasks.task import Context, Outcome, RunStopped, Task, TaskId, failure, tell_nobody
 from .cache import damaged
+from .memory import give_back
 from .process import IsolatedProcess, WorkerDied
 
 POLL = 0.2  # [s] between looks at the progress
@@ -196,6 +197,7 @@ def begin_tasks(context: Context, progress: Any = None) -> None:
 
 def _forget() -> None:
     _context.memo.clear()
+    give_back()
 
 
 def _perform(task: Task, needed: Needed) -> Outcome:
