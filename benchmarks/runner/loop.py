@@ -11,8 +11,6 @@ from contextlib import AbstractContextManager
 from itertools import groupby
 from typing import Any, Protocol
 
-from reference_sim.progress import progress_bar
-
 from ..tasks.task import Outcome, Task, TaskId, failure
 from .cache import Cache, Found
 from .executor import Executor
@@ -192,4 +190,6 @@ class Runner:
 
 
 def _bar(task: Task, total: int) -> Any:
+    from reference_sim.progress import progress_bar
+
     return progress_bar(total=total, desc=task.stage, unit=task.unit, smoothing=0.05)
