@@ -136,9 +136,8 @@ def outlook(tasks: Sequence[Measured], workers: int, costs: Costs) -> Outlook:
 def stage_seconds(tasks: Iterable[Measured], workers: int, costs: Costs, start: float = 0.0) -> float:
     """[s] until the last result of a stage is written; workers begin at `start`."""
     runner = start  # the time until which it is busy
-    results: list[
-        tuple[float, float]
-    ] = []  # a heap: when a task ends, and for how long the runner then has work
+    # A heap: when a task ends, and for how long the runner then has work.
+    results: list[tuple[float, float]] = []
     for number, task in enumerate(sorted(tasks, key=lambda task: -task.seconds)):
         if number >= workers:  # who is back first gets the next
             ended, busy = heapq.heappop(results)

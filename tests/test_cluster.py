@@ -370,7 +370,7 @@ def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expec
             runner = start_runner(folder.path, address, seconds=0.3, mark=mark)
             while kills < KILLS and runner.poll() is None:
                 begun = len(lines(mark))
-                until(lambda: len(lines(mark)) > begun or runner.poll() is not None, 120.0)  # noqa: B023
+                until(lambda: len(lines(mark)) > begun or runner.poll() is not None)  # noqa: B023
                 time.sleep(chance.uniform(0.0, 0.6))
                 if runner.poll() is not None:
                     break

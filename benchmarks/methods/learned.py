@@ -92,9 +92,9 @@ LEARNED = (
             base="snug", pairing_group="snug"),
     *(_ablation(recipe.name) for recipe in ABLATIONS),
     *(_stored(precision) for precision in ("bf16", "int8")),
-    *(entry for solver in ("lbfgs", "fast-lbfgs")
-      for entry in warm_started("snug-dynamic", "SNUG, dynamic", solver, trained="snug-dynamic",
-                                pairing_group="snug")),
+    *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
+    *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs", trained="snug-dynamic",
+                  pairing_group="snug"),
     *(cleaned(network(kind, label, "")) for kind, label in (("snug", "SNUG"), ("pbns", "PBNS"),
                                                 ("supervised", "Supervised"),
                                                 ("santesteban2019", "Santesteban 2019"),
