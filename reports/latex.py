@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import wrap
 
 import pandas as pd
 
@@ -14,7 +15,9 @@ from reports.data import Run
 from reports.layout import column_texts, remarks_of
 from reports.table import Table
 
-HEAD = "% Needs \\usepackage{booktabs}. Names that are not Latin need LuaLaTeX or XeLaTeX.\n"
+HEAD = "% Needs \\usepackage{booktabs} and LuaLaTeX or XeLaTeX for names not Latin; as wide as two columns.\n"
+NARROW = r"\footnotesize\setlength{\tabcolsep}{3pt}"
+LINE = 11  # letters of a heading's line
 MARKS = {"*": r"\ast", "†": r"\dagger", "‡": r"\ddagger", "§": r"\S"}
 _POWER = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
 _PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
@@ -35,23 +38,32 @@ def latex(run: Run, table: Table) -> str:
         column_texts(run, column, [row[place] for row in table.rows], [])
         for place, column in enumerate(table.columns)
     ]
-    heads = [f"{c.title} [{c.unit}]" if c.unit else c.title for c in table.columns]
+    heads = [f"{c.title} [{c.unit_above}]" if c.unit_above else c.title for c in table.columns]
     cells = {
         head: [cell["text"] if column.text else _cell(cell) for cell in texts]
         for head, column, texts in zip(heads, table.columns, columns)
     }
     words = [head for head, column in zip(heads, table.columns) if column.text]
     styled = pd.DataFrame(cells).style.hide(axis="index")
-    styled = styled.format(escape="latex", subset=words).format_index(escape="latex", axis="columns")
+    styled = styled.format(escape="latex", subset=words)
+    styled = styled.format_index(_stacked, escape="latex", axis="columns")
     # Of rows that stand beside the paper's in the PDF, the remark on those is not for here.
     lines = [list(line) for line in zip(*columns)]
     note = remarks_of(Table(table.name, table.columns, table.rows), lines)
     kinds = "".join("l" if column.text else "r" for column in table.columns)
     text = styled.to_latex(
         column_format=kinds, hrules=True, position_float="centering", caption=_plain(table.caption),
-        label=f"tab:{table.name}",
+        label=f"tab:{table.name}", environment="table*",
     )  # fmt: skip
-    return HEAD + text.replace(r"\end{table}", f"\\par\\footnotesize {_plain(note)}\n\\end{{table}}")
+    text = text.replace("\\centering\n", f"\\centering\n{NARROW}\n")
+    return HEAD + (text.replace(r"\end{table*}", f"\\par {_plain(note)}\n\\end{{table*}}") if note else text)
+
+
+def _stacked(head: str) -> str:
+    """A heading of short lines, its unit on the last: columns are as wide as their numbers."""
+    title, _, unit = head.partition(" [")
+    lines = [*wrap(title, LINE, break_long_words=False), *([f"{{[{unit}}}"] if unit else [])]
+    return r"\shortstack[r]{" + r"\\ ".join(lines) + "}" if len(lines) > 1 else head
 
 
 def _cell(cell: Mapping[str, str]) -> str:

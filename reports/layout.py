@@ -70,13 +70,7 @@ def _block(run: Run, table: Table) -> Block:
         "caption": table.caption,
         "note": remarks_of(table, lines),
         "columns": [
-            # A duration is printed with a unit of its own.
-            {
-                "title": column.title,
-                "unit": "" if column.unit == "s" else column.unit,
-                "left": column.text,
-                "width": width,
-            }
+            {"title": column.title, "unit": column.unit_above, "left": column.text, "width": width}
             for column, width in zip(columns, _widths(columns))
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],

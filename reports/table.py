@@ -39,6 +39,11 @@ class Column:
     trim: bool = False
     mixed: bool = False
 
+    @property
+    def unit_above(self) -> str:
+        """The unit as the column's heading has it: a duration is printed with a unit of its own."""
+        return "" if self.unit == "s" else self.unit
+
 
 @dataclass(frozen=True)
 class Table:

@@ -68,6 +68,16 @@ def test_every_row_of_the_csv_is_in_the_tex_with_its_number_spread_and_mark(made
     assert "$66.7$~min" in cost["PBNS"]
 
 
+def test_headings_are_stacked_and_no_wider_than_a_word_or_two(made):
+    for path in made.tables.glob("*.tex"):
+        row = path.read_text(encoding="utf-8").partition("\\toprule\n")[2].partition(" \\\\\n")[0]
+        heads = [re.sub(r"\\shortstack\[r\]\{(.*)\}", r"\1", head) for head in row.split(" & ")]
+        lines = [line for head in heads for line in head.split("\\\\ ")]
+        assert len(lines) > len(heads) > 2, path.name
+        assert all(len(line) <= 12 or " " not in line for line in lines), lines
+    assert "{[s]}" not in (made.tables / "cost.tex").read_text(encoding="utf-8")  # the cells say it
+
+
 def test_names_are_escaped_and_powers_are_powers(made):
     text = (made.tables / "energies.tex").read_text(encoding="utf-8")
     line = next(line for line in text.splitlines() if "passwd" in line)
