@@ -171,6 +171,7 @@ function makeErrors() {
   const panel = plot?.panels[byId('error').value];
   byId('error-said').textContent = panel
     ? `${sentence(panel.definition)} Circles are networks, diamonds baselines, squares solvers; a click shows or hides one.`
+      + (plot.reference ? ' Dotted: the time of the simulation.' : '')
       + (panel.band ? ' Shaded: as near as right simulations are to each other.' : '')
     : '';
   const can = (method) => method in content.scenes[state.scene].methods;
