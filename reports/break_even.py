@@ -148,7 +148,7 @@ def break_even(folder: Path, run: Run) -> list[Picture]:
             colour = style(run, network.method).colour
             axes.plot(met, network.total(met), "o", color=colour, markersize=4.5)
     axes.set(xlabel="frames", ylabel="data, training and frames [s]")
-    axes.set_xscale("log")
+    log_axis(axes, "x")
     log_axis(axes, "y")
     grid(axes)
     legend_above(figure, [style(run, method) for method in run.ordered(c.method for c in costs)], lines=True)

@@ -89,7 +89,9 @@ def dots(folder: Path, run: Run) -> list[Picture]:
     if not shown or not methods or not garment:
         return []
     found = means(rows[rows["metric"].isin(shown)], "method", "metric")
-    figure = new_figure(PAGE_WIDTH, 0.65 + 0.21 * len(methods))
+    labels = [wrapped(run.label(method), 28) for method in methods]
+    lines = max(label.count("\n") + 1 for label in labels)
+    figure = new_figure(PAGE_WIDTH, 0.65 + (0.04 + 0.13 * lines) * len(methods))
     for axes, name in zip(np.atleast_1d(figure.subplots(1, len(shown), sharey=True)), shown):
         for place, method in enumerate(methods):
             mean = found.get((method, name))
@@ -107,7 +109,7 @@ def dots(folder: Path, run: Run) -> list[Picture]:
             log_axis(axes, "x")
         axes.set_xlabel(run.metrics[name].heading)
         grid(axes, "x")
-    figure.axes[0].set_yticks(range(len(methods)), [wrapped(run.label(method), 24) for method in methods])
+    figure.axes[0].set_yticks(range(len(methods)), labels)
     figure.axes[0].set_ylim(len(methods) - 0.4, -0.6)
     caption = f"{garment}: each motion and seed behind the means; the bar is the mean."
     return [save(figure, folder, "dots", caption=caption, kind="dots")]

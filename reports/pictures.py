@@ -215,12 +215,21 @@ def side_by_side(folder: Path, run: Run, filmed: Filmed, methods: Sequence[str])
     figure = sheet(rows, tile, _heads(run, methods, wide), beside=("front", "back"))
     time = float(filmed.series[methods[0]].times[frame])
     caption = f"{filmed.scene}: frame {frame} (t = {number(time)} s), {why}."
-    ended = [method for method in filmed.series if method not in methods]
-    if ended:
-        caption += f" Not shown, for they ended before it: {', '.join(map(run.label, run.ordered(ended)))}."
+    for why, left in _not_shown(filmed, methods).items():
+        caption += f" Not shown, {why}: {', '.join(map(run.label, run.ordered(left)))}." if left else ""
     return save(
         figure, folder, f"frames_{file_name(filmed.scene)}", caption=caption, kind="frames", vector=False
     )
+
+
+def _not_shown(filmed: Filmed, methods: Sequence[str]) -> dict[str, list[str]]:
+    """Why -> the roll-outs that are not among these methods."""
+    frames = {method: cloth.frames for method, cloth in filmed.series.items() if method not in methods}
+    last = max(filmed.series[method].frames for method in methods)
+    return {
+        "for they ended before it": [method for method, own in frames.items() if own < last],
+        "for want of room": [method for method, own in frames.items() if own >= last],
+    }
 
 
 def strip(

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 OWN_STEP = ("gap/energy", "gap/relative", "step/curvature", "step/distance", "gradient/norm")
 DECADES = 9  # below the largest error; what is smaller is drawn on the lower edge
 GREY = "#B4B4B4"
+NEAR = 1.6  # times another's time and error: two numbers beside them would cover each other
 MOST_PANELS, MOST_SCENES = 4, 9  # in the PDF; the page has all
 
 
@@ -171,19 +172,20 @@ def _draw_scenes(
         return []
     columns = min(4, len(scenes))
     lines = -(-len(scenes) // columns)
-    figure = new_figure(PAGE_WIDTH, 0.35 + 1.45 * lines)
+    figure = new_figure(PAGE_WIDTH, 0.35 + 1.55 * lines)
     every = np.atleast_1d(figure.subplots(lines, columns)).ravel()
     for axes in every[len(scenes) :]:
         axes.set_axis_off()
+    titles = list(dict.fromkeys(metric.heading for _, (metric, _) in scenes))
     for axes, (rows, (metric, points)) in zip(every, scenes):
         reference = value_of(rows, run.reference, run_time(rows))
         _draw_points(axes, run, points, reference, indistinct(run, rows, metric.name), small=True)
-        axes.set_title(wrapped(str(rows["scene"].iloc[0]), 24), fontsize=8)
+        scene = wrapped(str(rows["scene"].iloc[0]), 24)
+        axes.set_title("\n".join([scene, *([metric.heading] if len(titles) > 1 else [])]), fontsize=8)
         axes.tick_params(labelsize=7)
         grid(axes)
     figure.supxlabel("run time [ms per frame]", fontsize=8.5)
-    titles = dict.fromkeys(metric.heading for _, (metric, _) in scenes)
-    caption = f"The same of other scenes, in the colours above: {', '.join(titles)} against run time."
+    caption = f"The same of other scenes, in the colours above: {' or '.join(titles)} against run time."
     return [save(figure, folder, "error_against_time_scenes", caption=caption, kind="scenes")]
 
 
@@ -257,9 +259,11 @@ def _join(axes: Axes, run: Run, members: Sequence[Point], least: float, edge: fl
     heights = [point.error if point.error > least else edge for point in members]
     times = [point.time for point in members]
     axes.plot(times, heights, color=look.colour, linestyle=look.line, linewidth=0.9, zorder=2)
-    for place in sorted({0, len(members) - 1}) if named else ():
-        text = power_text(run.methods[members[place].method].level or 0.0)
-        spot = (times[place], heights[place])
+    numbers = [power_text(run.methods[point.method].level or 0.0) for point in members]
+    named_at = {(times[0], heights[0]): numbers[0], (times[-1], heights[-1]): numbers[-1]}
+    if len(members) > 1 and max(times) < NEAR * min(times) and max(heights) < NEAR * min(heights):
+        named_at = {(times[0], heights[0]): f"{numbers[0]} to {numbers[-1]}"}
+    for spot, text in named_at.items() if named else ():
         axes.annotate(text, spot, (4, 3), textcoords="offset points", fontsize=7, color=look.colour)
 
 

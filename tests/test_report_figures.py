@@ -122,6 +122,12 @@ def test_what_ended_early_moves_nobody_elses_picture(tmp_path):
     picture = pictures.side_by_side(tmp_path, run, shown, ["simulation", "snug"])
     assert "frame 3 " in picture.caption
     assert "Not shown, for they ended before it: L-BFGS, 5 iterations." in picture.caption
+    whole = filmed(tmp_path, {"simulation": FRAMES, "snug": FRAMES, "lbfgs-5": FRAMES})
+    picture = pictures.side_by_side(tmp_path, run, whole, ["simulation", "snug"])
+    assert (
+        "Not shown, for want of room: L-BFGS, 5 iterations." in picture.caption
+        and "ended" not in picture.caption
+    )
 
 
 def test_the_frame_of_page_one_is_one_whose_step_was_judged(tmp_path):

@@ -307,6 +307,24 @@ def test_every_figure_of_the_suite_is_drawn(tmp_path):
     assert indistinct(run, walk, "gap/energy") == 0.015 and indistinct(run, walk, "curvature/error") == 0.0
 
 
+def test_no_axis_is_labelled_in_markup(tmp_path, monkeypatch):
+    """Names may hold dollars, so that no text is taken for a formula: neither are an axis's numbers."""
+    drawn = []
+    for module in ("break_even", "work_precision"):
+        monkeypatch.setattr(f"reports.{module}.save", lambda figure, *_, **more: drawn.append(figure))
+    for make in (error_against_time, break_even):
+        make(tmp_path, run_of(all_rows()))
+    assert len(drawn) == 4
+    for figure in drawn:
+        figure.canvas.draw()
+        labels = [
+            label.get_text()
+            for axes in figure.axes
+            for label in (*axes.get_xticklabels(), *axes.get_yticklabels())
+        ]
+        assert any(labels) and not [label for label in labels if "$" in label]
+
+
 def test_any_metric_against_any_other(tmp_path, capsys):
     run = RunFolder(tmp_path)
     run.write_config(declaration(all_rows()))

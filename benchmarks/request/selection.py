@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ..validation.case import Case
 
 MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
+UNTRAINED = "networks are trained for a second garment where its scenes are named"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +83,8 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[
     _check_words("scene", request.scenes, [*declared, *(entry.name for entry in MEASURED)])
     _check_words("method", request.methods, list(methods))
     found: dict[tuple[str, str, int], Cell] = {}
-    for suite, scene, method in _pairs(request):
-        entry = methods[method]
+    for suite, scene, entry in _pairs(request):
+        method = entry.name
         for seed in request.seeds if entry.seeded else (0,):
             key = (scene, method, seed)
             before = found[key].suites if key in found else ()
@@ -132,8 +133,8 @@ def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> l
     return found
 
 
-def _pairs(request: Request) -> Iterator[tuple[str, str, str]]:
-    """(suite, scene, method), suite by suite.
+def _pairs(request: Request) -> Iterator[tuple[str, str, MethodEntry]]:
+    """(suite, scene, method), suite by suite; a method that is left out of a scene says why.
 
     A scene that no suite lists is met where its whole name is given: a body in a whole motion in garments,
     all else in speed. A method that no suite lists takes part in each suite where its whole name is given.
@@ -155,8 +156,9 @@ def _pairs(request: Request) -> Iterator[tuple[str, str, str]]:
                 if not (named(scene, request.scenes) and named(method, request.methods)):
                     continue
                 entry = request.declared_methods[method]
-                if entry.meant_for(declared[scene]) and not (plain and entry.trained):
-                    yield suite.name, scene, method
+                if entry.meant_for(declared[scene]):
+                    left_out = UNTRAINED if plain and entry.trained else entry.left_out
+                    yield suite.name, scene, replace(entry, left_out=left_out)
 
 
 def _cases(request: Request) -> Iterator[Case]:
