@@ -16,7 +16,7 @@ from reports.layout import column_texts, remarks_of
 from reports.table import Table
 
 HEAD = "% Needs \\usepackage{booktabs} and LuaLaTeX or XeLaTeX for names not Latin; as wide as two columns.\n"
-NARROW = r"\footnotesize\setlength{\tabcolsep}{3pt}"
+FEW = 9  # columns that fit in the larger letters
 LINE = 11  # letters of a heading's line
 MARKS = {"*": r"\ast", "†": r"\dagger", "‡": r"\ddagger", "§": r"\S"}
 _POWER = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
@@ -55,7 +55,8 @@ def latex(run: Run, table: Table) -> str:
         column_format=kinds, hrules=True, position_float="centering", caption=_plain(table.caption),
         label=f"tab:{table.name}", environment="table*",
     )  # fmt: skip
-    text = text.replace("\\centering\n", f"\\centering\n{NARROW}\n")
+    size, gap = ("footnotesize", 3) if len(heads) <= FEW else ("scriptsize", 2)
+    text = text.replace("\\centering\n", f"\\centering\n\\{size}\\setlength{{\\tabcolsep}}{{{gap}pt}}\n")
     return HEAD + (text.replace(r"\end{table*}", f"\\par {_plain(note)}\n\\end{{table*}}") if note else text)
 
 
@@ -67,11 +68,13 @@ def _stacked(head: str) -> str:
 
 
 def _cell(cell: Mapping[str, str]) -> str:
-    text = _math(cell["text"])
-    if cell["spread"]:
-        text += rf" $\pm$ {_math(cell['spread'].removeprefix('± '))}"
-    marks = "".join(MARKS.get(mark, mark) for mark in cell["mark"])
-    return f"{text.removesuffix('$')}{'' if text.endswith('$') else '$'}{{}}^{{{marks}}}$" if marks else text
+    text, marks = _math(cell["text"]), "".join(MARKS.get(mark, mark) for mark in cell["mark"])
+    if marks:
+        text = f"{text.removesuffix('$')}{'' if text.endswith('$') else '$'}{{}}^{{{marks}}}$"
+    if cell["spread"]:  # below the number: beside it a table would be too wide for a page
+        text += rf"\\ \tiny $\pm$ {_math(cell['spread'].removeprefix('± '))}"
+        text = rf"\begin{{tabular}}[t]{{@{{}}r@{{}}}}{text}\end{{tabular}}"
+    return text
 
 
 def _math(text: str) -> str:

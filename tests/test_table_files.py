@@ -16,6 +16,7 @@ from reports import build, dictionary, latex
 from reports.build import read_run
 from reports.tables import make_tables
 
+TOP = r"\begin{tabular}[t]{@{}r@{}}"
 NASTY = r"a_b & 50 % $x$ #1 {c} ~ ^ \input{/etc/passwd} <b> мантия"
 
 
@@ -61,7 +62,10 @@ def test_every_row_of_the_csv_is_in_the_tex_with_its_number_spread_and_mark(made
     assert rows["Simulation"][2:4] == ["$0.150$", "$0.0150$"]
     strain = next(line for line in lines if line["method"] == "snug")
     value, spread = float(strain["energy/strain [J]"]), float(strain["energy/strain_spread"])
-    assert rows["SNUG"][2] == rf"${value:.3f}$ $\pm$ ${spread:.2f}{{}}^{{\ast}}$"  # one scene with seed 1
+    below = rf"\\ \tiny $\pm$ ${spread:.2f}$"
+    assert (
+        rows["SNUG"][2] == rf"{TOP}${value:.3f}{{}}^{{\ast}}${below}\end{{tabular}}"
+    )  # one scene with seed 1
     assert rows["Newton, 4 iterations"][2] == r"$-1{,}234{}^{\ast\dagger}$"
     assert rows["Newton, 4 iterations"][3] == "--"
     cost = {cells[1]: cells for cells in body_of(made.tables / "cost.tex")}
@@ -83,7 +87,7 @@ def test_names_are_escaped_and_powers_are_powers(made):
     line = next(line for line in text.splitlines() if "passwd" in line)
     name = r"a\_b \& 50 \% \$x\$ \#1 \{c\} \textasciitilde \space \textasciicircum \space "
     assert name + r"\textbackslash input\{/etc/passwd\}" in line and "мантия" in line
-    assert r"$2.50\times 10^{-7}$ $\pm$ $1\times 10^{-8}{}^{\ast}$" in line
+    assert r"}$2.50\times 10^{-7}{}^{\ast}$\\ \tiny $\pm$ $1\times 10^{-8}$\end{tabular}" in line
 
 
 def test_all_math_is_math_and_nothing_else_is_special(made):
