@@ -126,9 +126,11 @@ def table_rows(path: Path) -> list[list[str]]:
     return [[cell.strip() for cell in line[1:-1].split("|")] for line in lines if line.startswith("|")]
 
 
-def ratio(text: str) -> str:
-    """A ratio as docs/paper.md writes it: two places, or two digits where it is small."""
+def effect_text(kind: str, text: str) -> str:
+    """As docs/paper.md writes it: a ratio in two places, or two digits where it is small; whole points."""
     value = float(text)
+    if kind == "difference":
+        return f"{value:.0f}"
     return (f"{value:.2f}" if value >= 0.1 else f"{value:.2g}").removeprefix("0")
 
 
@@ -144,7 +146,9 @@ def test_the_page_of_the_paper_says_what_the_published_findings_say():
         published = list(csv.DictReader(stream))
     judged = [row for row in table_rows(PAPER) if row[-1] == "findings"]
     for found in published:
-        effect, low, high = (ratio(found[name]) for name in ("effect", "effect_low", "effect_high"))
+        effect, low, high = (
+            effect_text(found["effect_kind"], found[name]) for name in ("effect", "effect_low", "effect_high")
+        )
         verdict, words = SAID[found["verdict"]], f"{effect} ({low} to {high})"
         assert any(row[1] == verdict and words in row[2] for row in judged), f"{verdict}: {words}"
     assert len(judged) == len(published)
