@@ -45,11 +45,17 @@ def table_blocks(run: Run, table: Table) -> Iterator[Block]:
 
 
 def shortened(table: Table, most: int) -> Table:
-    """Its first rows, and in its note where the others are."""
+    """The first rows of each of its groups, equally many, and in its note where the others are."""
     if len(table.rows) <= most:
         return table
+    heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
+    groups = [tuple(row[place] for place in heads) for row in table.rows]
+    places = [groups[:number].count(group) for number, group in enumerate(groups)]
+    # Of equal places in their groups the first groups have theirs: as many rows as there is room for.
+    chosen = sorted(sorted(range(len(places)), key=lambda number: places[number])[:most])
     left = f"{len(table.rows) - most} more rows are in tables/{table.name}.csv."
-    return replace(table, rows=table.rows[:most], note=f"{left} {table.note}".strip())
+    rows = tuple(table.rows[number] for number in chosen)
+    return replace(table, rows=rows, note=f"{left} {table.note}".strip())
 
 
 def _block(run: Run, table: Table) -> Block:
@@ -152,8 +158,9 @@ def figure_block(picture: Picture) -> Block:
 
 
 def row_block(pictures: Sequence[Picture]) -> Block:
-    """Figures side by side."""
-    return {"kind": "row", "items": [figure_block(picture) for picture in pictures]}
+    """Figures side by side; one alone keeps its width."""
+    items = [figure_block(picture) for picture in pictures]
+    return {"kind": "row", "items": items} if len(items) > 1 else items[0]
 
 
 def list_block(intro: str, items: Sequence[str]) -> Block:

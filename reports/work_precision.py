@@ -138,7 +138,8 @@ def _draw_errors(
     time = run_time(rows)
     words = "pose to vertices" if time == WHOLE else "own work"
     reference = value_of(rows, run.reference, time)
-    lines, columns = -(-len(panels) // 2), min(2, len(panels))
+    columns = 3 if len(panels) == 3 else min(2, len(panels))
+    lines = -(-len(panels) // columns)
     figure = new_figure(PAGE_WIDTH, 2.05 if lead else 0.75 + 2.0 * lines)
     every = np.atleast_1d(figure.subplots(lines, columns)).ravel()
     for axes in every[len(panels) :]:

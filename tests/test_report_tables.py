@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,10 +18,12 @@ from reports import numbers
 from reports.ablations import ablation_effects, ablations
 from reports.data import run_data
 from reports.document import document
-from reports.layout import shortened, table_blocks
+from reports.layout import row_block, shortened, table_blocks
 from reports.means import Mean, mean_of, pair
 from reports.narrative import summary
 from reports.overview import ROWS, leads
+from reports.plotting import Picture
+from reports.table import Column, Table
 from reports.tables import make_tables, map_points, merged
 from reports.verdict import endings, failures, verdict
 
@@ -392,6 +395,24 @@ def test_the_table_of_page_one_stays_short():
     energies = make_tables(run_of([*all_rows(), *many]))["energies"]
     short = shortened(energies, 12)
     assert len(short.rows) == 12 and short.note.startswith("12 more rows are in tables/energies.csv")
+
+
+def test_a_shortened_table_has_rows_of_each_garment():
+    columns = (Column("garment", "Garment", text=True), Column("method", "Method", text=True))
+    lines = tuple((garment, f"{garment}-{k}") for garment in ("shirt", "tunic") for k in range(8))
+    short = shortened(Table("energies", columns, lines, grouped_by=("garment",)), 12)
+    assert short.rows == (*lines[:6], *lines[8:14])
+
+
+def test_a_figure_alone_in_its_row_keeps_its_width():
+    picture = Picture(Path("half.svg"), "said", "break_even", 0.5)
+    assert row_block([picture]) == {
+        "kind": "figure",
+        "path": "figures/half.svg",
+        "caption": "said",
+        "width": 0.5,
+    }
+    assert row_block([picture, picture])["kind"] == "row"
 
 
 def test_no_number_of_the_report_is_infinite_or_nan():
