@@ -210,7 +210,7 @@ def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_ne
     speed = planned("--suite", "speed")
     skirts = [cell for cell in speed.cells if cell.scene.garment == "skirt"]
     assert len({cell.method for cell in skirts}) >= 10
-    assert not any(find_method(cell.method).trained for cell in skirts)
+    assert not any(find_method(cell.method).trained for cell in skirts if cell.entry.skip(cell.scene) is None)
 
 
 def test_suite_speed_has_clips_of_the_split():
