@@ -94,7 +94,7 @@ PRESETS = (
     ),
     Preset(
         name="quick",
-        description="garments of 1000 vertices, all embedded motions; by default about 20 minutes on 2 cores",
+        description="garments of 1000 vertices, all embedded motions; by default half an hour on 2 cores",
         garment_vertices=1000,
         train_motions=None,
         test_motions=None,
