@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -50,11 +51,14 @@ def shortened(table: Table, most: int) -> Table:
         return table
     heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
     groups = [tuple(row[place] for place in heads) for row in table.rows]
-    places = [groups[:number].count(group) for number, group in enumerate(groups)]
-    # Of equal places in their groups the first groups have theirs: as many rows as there is room for.
-    chosen = sorted(sorted(range(len(places)), key=lambda number: places[number])[:most])
+    before: Counter[tuple[Cell, ...]] = Counter()
+    order = []
+    for line, group in enumerate(groups):
+        order.append((before[group], line))
+        before[group] += 1
+    chosen = sorted(line for _, line in sorted(order)[:most])
     left = f"{len(table.rows) - most} more rows are in tables/{table.name}.csv."
-    rows = tuple(table.rows[number] for number in chosen)
+    rows = tuple(table.rows[line] for line in chosen)
     return replace(table, rows=rows, note=f"{left} {table.note}".strip())
 
 

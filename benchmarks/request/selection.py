@@ -157,8 +157,9 @@ def _pairs(request: Request) -> Iterator[tuple[str, str, MethodEntry]]:
                     continue
                 entry = request.declared_methods[method]
                 if entry.meant_for(declared[scene]):
-                    left_out = UNTRAINED if plain and entry.trained else entry.left_out
-                    yield suite.name, scene, replace(entry, left_out=left_out)
+                    if plain and entry.trained:
+                        entry = replace(entry, left_out=UNTRAINED)
+                    yield suite.name, scene, entry
 
 
 def _cases(request: Request) -> Iterator[Case]:
