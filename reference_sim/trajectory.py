@@ -74,9 +74,8 @@ class Trajectory:
         """Write the whole file under a temporary name, then put it in place."""
         count = self.positions.shape[1]
         with TrajectoryWriter(path, self.faces, self.provenance, vertex_count=count, live=False) as writer:
-            for k in range(self.frames):
-                fields = {name: values[k] for name, values in self.frame_fields.items()}
-                writer.append(self.positions[k], self.times[k], self.frame_seconds[k], fields)
+            if self.frames:
+                writer.extend(self.positions, self.times, self.frame_seconds, self.frame_fields)
             writer.finish(self.status, self.reason)
 
     @classmethod

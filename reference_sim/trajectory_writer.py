@@ -97,32 +97,50 @@ class TrajectoryWriter:
         before: (2, V, 3) positions [m] and velocity [m/s] from which the last step to this frame was made; a
         run with sub-steps that is resumed from this frame needs them.
         """
+        self._extend(
+            np.asarray(positions)[None],
+            [time],
+            [seconds],
+            {name: [value] for name, value in (fields or {}).items()},
+            before=before,
+        )
+
+    def extend(
+        self, positions: np.ndarray, times: np.ndarray, seconds: np.ndarray, fields: dict[str, np.ndarray]
+    ) -> None:
+        """Add K frames at once: positions (K, V, 3) [m], times and seconds (K,), further numbers (K,)."""
+        self._extend(positions, times, seconds, fields)
+
+    def _extend(
+        self, positions: Any, times: Any, seconds: Any, fields: Any, *, before: np.ndarray | None = None
+    ) -> None:
+        k, count = self.frames, len(positions)
         self._reserve(np.size(positions) + (0 if before is None else 2 * np.size(before)))
-        k, vtk, own = self.frames, self._file["VTKHDF"], self._file["benchmark"]
+        vtk, own = self._file["VTKHDF"], self._file["benchmark"]
         steps = vtk["Steps"]
         # VTK crashes on Values longer than NSteps, so the count is raised first.
-        steps.attrs.modify("NSteps", k + 1)
-        _extend(vtk["Points"], positions)
-        _extend(steps["Values"], [time])
-        _extend(steps["PointOffsets"], [k * self._vertex_count])
-        _extend(steps["PartOffsets"], [0])
-        _extend(steps["NumberOfParts"], [1])
+        steps.attrs.modify("NSteps", k + count)
+        _append(vtk["Points"], np.reshape(positions, (-1, 3)))
+        _append(steps["Values"], times)
+        _append(steps["PointOffsets"], np.arange(k, k + count) * self._vertex_count)
+        _append(steps["PartOffsets"], np.zeros(count, dtype=np.int64))
+        _append(steps["NumberOfParts"], np.ones(count, dtype=np.int64))
         for name in ("CellOffsets", "ConnectivityIdOffsets"):
-            _extend(steps[name], np.zeros((1, 4), dtype=np.int64))
-        _extend(own["frame_seconds"], [seconds])
-        for name, value in (fields or {}).items():
+            _append(steps[name], np.zeros((count, 4), dtype=np.int64))
+        _append(own["frame_seconds"], seconds)
+        for name, values in fields.items():
             group = own["frame_fields"]
             # An energy's name has a slash in it; HDF5 would make a group of that.
             key = name.replace("/", ":")
             if key not in group:
                 group.create_dataset(key, (0,), maxshape=(None,), dtype="f8", fillvalue=np.nan)
-            group[key].resize((k + 1,))
-            group[key][k] = value
+            group[key].resize((k + count,))
+            group[key][k:] = values
         if before is not None:
             if BEFORE not in own:
                 own.create_dataset(BEFORE, (2, *np.shape(before)), dtype="f8")
             own[BEFORE][k % 2] = before  # the other half still serves the frame before, should this one fail
-        self.frames = k + 1
+        self.frames = k + count
         if self._live:
             self._file.flush()
         own.attrs.modify("frames", self.frames)  # last: a reader trusts only whole frames
@@ -173,7 +191,7 @@ class TrajectoryWriter:
             os.fsync(file.fileno())
 
 
-def _extend(dataset: h5py.Dataset, rows: Any) -> None:
+def _append(dataset: h5py.Dataset, rows: Any) -> None:
     rows = np.asarray(rows)
     size = dataset.shape[0]
     dataset.resize(size + len(rows), axis=0)

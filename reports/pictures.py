@@ -84,7 +84,7 @@ def _colours() -> Colormap:
 
 def scales(filmed: Filmed, methods: Sequence[str], frame: int, reference: str) -> dict[str, Scale]:
     """By name, of what is known of all of these methods at that frame."""
-    from reports.page.vertex_values import area_change, depth, distance, mean_curvature
+    from reports.page.vertex_values import area_change, depth, distance, mean_curvature, skin_of
 
     cloths = {method: filmed.series[method] for method in methods}
     at = {m: cloth.positions[frame] for m, cloth in cloths.items()}
@@ -101,9 +101,10 @@ def scales(filmed: Filmed, methods: Sequence[str], frame: int, reference: str) -
         found["strain"] = Scale("change of area [%]", strain)
     bent = {m: mean_curvature(x[None], cloths[m].faces)[0] for m, x in at.items()}
     found["curvature"] = Scale("mean curvature [1/m]", bent)
-    if filmed.body is not None and frame < filmed.body.frames:
-        body = filmed.body
-        deep = {m: depth(x, body.positions[frame], body.faces) for m, x in at.items()}
+    body = filmed.body
+    skin = skin_of(body.positions[frame], body.faces) if body and frame < body.frames else None
+    if skin:
+        deep = {m: depth(x, skin, 0) for m, x in at.items()}
         found["depth"] = Scale("below the skin [mm]", deep)
     return {name: scale for name, scale in found.items() if scale.top > NOTHING}
 

@@ -22,7 +22,7 @@ from benchmarks.results import RunFolder
 from reports import build
 from reports.page.choice import groups
 from reports.page.pack import Pack
-from reports.page.vertex_values import area_change, depth, distance, mean_curvature
+from reports.page.vertex_values import area_change, depth, distance, mean_curvature, skin_of
 from reports.page.write import write_page
 from reports.tables import make_tables
 
@@ -47,6 +47,13 @@ def rows_of_page():
     return [*rows, skipped(scene="hanging_sheet", suite="speed")]
 
 
+def block() -> tuple[np.ndarray, np.ndarray]:
+    """Corners (8,3) and faces (12,3) of the unit cube."""
+    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, np.array([half for a, b, c, d in squares for half in ((a, b, c), (a, c, d))])
+
+
 def moving(height: float, scene: str = WHOLE) -> tuple[np.ndarray, np.ndarray]:
     """A sheet that swings, (T,V,3) and (F,3); in no scene as in another."""
     x, faces = sheet(height)
@@ -67,7 +74,8 @@ def make_folder(path: Path) -> RunFolder:
     run.write_rows(rows_of_page())
     run.write_config(declaration(rows_of_page(), preset="smoke", commit=NASTY))
     for scene in (WHOLE, *CLIPS):
-        body, faces = sheet(-0.05)
+        corners, faces = block()
+        body = np.repeat((0.5 * corners - [0.0, 0.0, 0.5])[None], len(sheet(0.0)[0]), axis=0)
         write_mesh(run.trajectory_path(scene, "body"), body, faces, {})
         for method, height in METHODS.items():
             cloth, faces = moving(height, scene)
@@ -186,11 +194,11 @@ def test_change_of_area_distance_and_depth_have_their_known_values():
     rest = np.full(len(faces), 0.4 / 3 * 0.5 / 3 / 2)
     np.testing.assert_allclose(area_change(1.1 * x, faces, rest), 21.0, rtol=1e-9)
     np.testing.assert_allclose(distance(x[:2] + np.array([0.0, 0.003, 0.004]), x), 5.0, rtol=1e-9)
-    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    box = np.array([half for a, b, c, d in squares for half in ((a, b, c), (a, c, d))])
+    corners, box = block()
     points = np.array([[0.5, 0.5, 0.98], [0.5, 0.5, 1.02], [0.01, 0.3, 0.4]])
-    np.testing.assert_allclose(depth(points, corners, box), [20.0, 0.0, 10.0], atol=1e-9)
+    skin = skin_of(np.stack([corners + 1.0, corners]), box)
+    np.testing.assert_allclose(depth(points, skin, 1), [20.0, 0.0, 10.0], atol=1e-9)
+    assert skin_of(corners, box[1:]) is None
 
 
 def test_the_page_holds_the_roll_outs_of_the_run(folder):

@@ -65,14 +65,13 @@ def test_saving_replaces_a_file_whole_and_leaves_nothing_else(tmp_path):
 def test_a_save_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
     path = tmp_path / "wave.vtkhdf"
     wave(3).save(path)
-    append = TrajectoryWriter.append
+    extend = TrajectoryWriter.extend
 
-    def fail_at_two(self, *args, **more):
-        if self.frames == 2:
-            raise RuntimeError("the disk is full")
-        append(self, *args, **more)
+    def fail_when_written(self, *args):
+        extend(self, *args)
+        raise RuntimeError("the disk is full")
 
-    monkeypatch.setattr(TrajectoryWriter, "append", fail_at_two)
+    monkeypatch.setattr(TrajectoryWriter, "extend", fail_when_written)
     with pytest.raises(RuntimeError, match="the disk is full"):
         wave(5).save(path)
     assert_same(Trajectory.load(path), wave(3))

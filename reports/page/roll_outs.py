@@ -14,9 +14,10 @@ from benchmarks.results import RunFolder
 from reports.data import STEP, Run
 from reports.page.choice import groups
 from reports.page.pack import Pack
-from reports.page.vertex_values import area_change, depth, distance, mean_curvature
+from reports.page.vertex_values import area_change, depth, distance, mean_curvature, skin_of
 
 if TYPE_CHECKING:
+    from reference_sim import Obstacle
     from reference_sim.trajectory import Trajectory
 
 SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one
@@ -66,7 +67,8 @@ def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
         if run.reference in cloths:
             references[group.scene] = cloths[run.reference]
         body = read(folder.trajectory_path(group.scene, "body"))
-        depths = _depths(cloths, body) if body else {}
+        skin = skin_of(body.positions, body.faces) if body else None
+        depths = _depths(cloths, skin) if skin else {}
         rest = _rest_areas(folder.rest_areas_path(group.scene))
         for method, cloth in cloths.items():
             scene = dict(found.scenes.get(group.scene) or {"body": None, "methods": {}})
@@ -152,14 +154,14 @@ def _rest_areas(path: Path) -> np.ndarray | None:
         return None
 
 
-def _depths(cloths: Mapping[str, Trajectory], body: Trajectory) -> dict[str, np.ndarray]:
+def _depths(cloths: Mapping[str, Trajectory], skin: Obstacle) -> dict[str, np.ndarray]:
     """Method -> (T,V) [mm] below the skin; all of a frame at once, for its search tree is the cost."""
     found = {method: np.zeros(cloth.positions.shape[:2]) for method, cloth in cloths.items()}
-    for frame in range(body.frames):
+    for frame in range(skin.frames):
         having = [method for method, cloth in cloths.items() if frame < cloth.frames]
         if having:
             points = [cloths[method].positions[frame] for method in having]
-            deep = depth(np.concatenate(points), body.positions[frame], body.faces)
+            deep = depth(np.concatenate(points), skin, frame)
             for method, own in zip(having, np.split(deep, np.cumsum([len(x) for x in points])[:-1])):
                 found[method][frame] = own
     return found
