@@ -49,7 +49,8 @@ def test_short_work_is_done_again_until_enough_is_measured_and_long_work_once():
         return np.zeros((2, 3, 3))
 
     _, reading = clocked(run, of=positions_of, least=0.1)
-    assert 3 <= len(reading.runs) <= 5 and sum(reading.runs) >= 0.1 and reading.complaint == ""
+    assert len(reading.runs) > 1 and reading.complaint == ""
+    assert sum(reading.runs[:-1]) < 0.1 <= sum(reading.runs)
     assert reading.seconds == sorted(reading.runs)[len(reading.runs) // 2] or len(reading.runs) % 2 == 0
     assert len(clocked(run, of=positions_of)[1].runs) == 1
     _, reading = clocked(lambda: np.zeros(1), of=positions_of, least=60.0)

@@ -19,7 +19,7 @@ from ..results import RunFolder
 from ..tasks.task import Context, Outcome, RunStopped, Task, TaskId, failure, tell_nobody
 from .cache import damaged
 from .memory import give_back
-from .process import IsolatedProcess, WorkerDied
+from .process import IsolatedProcess, WorkerDied, new_processes
 
 POLL = 0.2  # [s] between looks at the progress
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
@@ -126,7 +126,7 @@ class TaskProcess:
 
     def _renew(self) -> None:
         # A queue for each process: one that is killed while it reports leaves a lock that nobody opens.
-        self.progress = multiprocessing.get_context("spawn").SimpleQueue()
+        self.progress = new_processes().SimpleQueue()
         self.process = IsolatedProcess(*self._begin, self.progress)
         self.warm: set[tuple[str, str]] = set()
 
