@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 Made = TypeVar("Made")
 WHOLE = ("ok", "stalled")  # statuses of cells that came to their last frame
+NUMBERS_OF = ("answer", "method", "machine")
 COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what others are measured beside
 
 
@@ -54,9 +55,12 @@ class Estimate(NamedTuple):
 class Metric:
     """The declaration of a metric.
 
-    title: the head of its column; table: the table that has this column, or empty. reference_tolerance: how
-    far from zero the value of the reference simulation may be; its row is then judged. declared_in: as of a
-    MethodEntry.
+    title: the head of its column; table: the table that has this column, or empty. arbitrary_zero: whether
+    its zero is a choice, as the height of a potential energy: then differences say something, and ratios
+    nothing. of: what it is a number of: the "answer" of a method; the "method" itself, as its size; or the
+    "machine", as every time. Another seed gives another answer; another machine, or the same when it is
+    busy, another time. reference_tolerance: how far from zero the value of the reference simulation may be;
+    its row is then judged. declared_in: as of a MethodEntry. Raises ValueError for another `of`.
     """
 
     name: str
@@ -65,8 +69,14 @@ class Metric:
     definition: str
     table: str = ""
     lower_is_better: bool | None = None
+    arbitrary_zero: bool = False
+    of: str = "answer"
     reference_tolerance: float | None = None
     declared_in: str = ""
+
+    def __post_init__(self) -> None:
+        if self.of not in NUMBERS_OF:
+            raise ValueError(f"metric {self.name}: of='{self.of}': use one of {', '.join(NUMBERS_OF)}")
 
 
 class Kept:

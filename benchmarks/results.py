@@ -60,7 +60,7 @@ class Row:
     Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
     Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
     that number; base, the method that it varies or starts from; seeded, whether another seed gives another
-    answer; pairing_group, of variants of one method, which share the seed and are compared seed by seed.
+    value; pairing_group, of variants of one method, which share the seed and are compared seed by seed.
 
     Raises ResultsError for an unknown status, a non-finite value called ok, or a skip without a reason.
     """

@@ -32,7 +32,7 @@ def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
     schedule = Schedule(plan)
     cells = [row for cell in plan.cells for row in rows_of_cell(cell, schedule, outcomes)]
     others = [row for task in tasks for row in _rows_of_task(task, outcomes)]
-    return [*remarked(with_uncertainty(cells)), *others]
+    return [*remarked(with_uncertainty(cells, plan.metrics)), *others]
 
 
 def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator[Row]:
@@ -109,7 +109,8 @@ def _rows(
             why, ended = why or f"{name} is not finite", "failed" if status == "ok" else status
         yield dataclasses.replace(
             base, metric=name, unit=metric.unit, value=_finite(value),
-            status=ended, reason=why, uncertainty=_finite(uncertainty), **judged,
+            status=ended, reason=why, uncertainty=_finite(uncertainty),
+            seeded=entry.seeded and metric.of == "answer", **judged,
         )  # fmt: skip
 
 
@@ -198,10 +199,10 @@ def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
         yield dataclasses.replace(row, **outcome.origin, reason=reason, unit=unit)
 
 
-def with_uncertainty(rows: Sequence[Row]) -> list[Row]:
+def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:
     """The rows, those of the reference with the largest difference to a simulation that is as right.
 
-    Not of times, and not of what has an uncertainty of its own.
+    Of answers, and not of what has an uncertainty of its own. outside: where further metrics are declared.
     """
     others: dict[tuple[str, str], list[float]] = {}
     for row in rows:
@@ -210,7 +211,8 @@ def with_uncertainty(rows: Sequence[Row]) -> list[Row]:
 
     def of(row: Row) -> float | None:
         there = others.get((row.scene, row.metric), [])
-        if row.role == "reference" and row.uncertainty is None and not row.metric.startswith("cost/"):
+        answer = row.role == "reference" and find_metric(row.metric, outside).of == "answer"
+        if answer and row.uncertainty is None:
             return max((abs(value - row.value) for value in there if row.value is not None), default=None)
         return row.uncertainty
 

@@ -69,29 +69,20 @@ class Outlook:
 
 def measured(folder: RunFolder, kinds: Sequence[str] = ()) -> list[Measured]:
     """The finished tasks of a run, all or those of these kinds. Raises ResultsError where there are none."""
-    from .tasks import case, cell, ground_truth, metrics, microbenchmark, sequence, task, training
-    from .tasks import training_windows as windows
-
-    modules = (case, cell, ground_truth, metrics, microbenchmark, sequence, training, windows)
-    classes = {
-        own.kind: own
-        for module in modules
-        for own in vars(module).values()
-        if isinstance(own, type) and issubclass(own, task.Task) and hasattr(own, "kind")
-    }
-    if unknown := sorted(set(kinds) - classes.keys()):
-        raise ResultsError(f"unknown kind of task '{unknown[0]}': use {', '.join(sorted(classes))}")
+    there = sorted(path.name for path in folder.cache.iterdir()) if folder.cache.is_dir() else []
+    if unknown := sorted(set(kinds) - set(there)):
+        raise ResultsError(f"no task of kind '{unknown[0]}' in {folder.path}: use {', '.join(there)}")
     found = []
-    for kind, own in classes.items():
-        if kinds and kind not in kinds:
-            continue
-        timed = issubclass(own, cell.CellTask | microbenchmark.RunMicrobenchmark)
+    for kind in kinds or there:
         for path in sorted((folder.cache / kind).rglob("*.json")):
             entry = read_entry(path)
+            if entry and "stage" not in entry:
+                raise ResultsError(f"{path}: an older version wrote it: do the run again")
             if entry and not entry["outcome"]["failed"]:
                 files = (folder.path / name for name in entry["files"])
                 size = sum(file.stat().st_size for file in files if file.is_file()) / MEGABYTE
-                found.append(Measured(own.stage, float(entry["outcome"]["seconds"]), size, timed))
+                seconds = float(entry["outcome"]["seconds"])
+                found.append(Measured(entry["stage"], seconds, size, entry["alone"]))
     if not found:
         raise ResultsError(f"{folder.cache}: holds no finished task; name the folder of a run or data set")
     return found

@@ -118,7 +118,7 @@ class BuiltScene:
     frame is zero. exact: (T,V,3) [m] or None. pin_positions: frame -> (P,3) [m] of handles that move.
     substeps: time steps that a simulator takes for a frame. glitch: the frame whose pose is wrong on purpose.
     kept: frames of the motion that a trajectory holds, or None for all. repeated: two sets of frames of the
-    trajectory that show the same motion.
+    trajectory that show the same motion. Raises ValueError for a warm-up below two.
     """
 
     name: str
@@ -140,6 +140,10 @@ class BuiltScene:
 
     def __post_init__(self) -> None:
         by_name("energy", self.energies)  # rows of one would overwrite those of the other
+        if self.warm_up < 2:
+            raise ValueError(
+                f"scene {self.name}: warm_up {self.warm_up}: give 2 frames or more, see BuiltScene"
+            )
 
     @cached_property
     def start_state(self) -> np.ndarray:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from reports.data import Run
 from reports.means import mean_of, pair
-from reports.significance import effect
+from reports.significance import effect_on
 from reports.table import Cell, Column, Table, metric_column, table
 
 SHOWN = (
@@ -44,11 +44,14 @@ def ablation_effects(run: Run) -> list[Table]:
     for garment, base, below, rows in _families(run):
         for method in below:
             pairs = [pair(rows, method, base, metric.name) for metric in metrics]
-            effects = [effect(one, full) if one and full else None for one, full in pairs]
+            effects = [
+                effect_on(metric, one, full, run, rows) if one and full else None
+                for metric, (one, full) in zip(metrics, pairs)
+            ]
             lines.append((garment, method, *effects))
     caption = (
         "Each variant beside its base, over the scenes that both have: × the variant over the base, of "
-        "geometric means; where a value is not positive, the variant less the base."
+        "geometric means; where a value is not positive or zero is a choice, the variant less the base."
     )
     note = "Differences in the unit above. Below: 95 % intervals over motions and seeds, each for itself."
     columns = (*HEAD, *map(metric_column, metrics))

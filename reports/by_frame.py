@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 
 from benchmarks import frame_energies
 from reports.data import Metric
+from reports.means import Mean
 
+HALF = 50.0  # [%]
 FRAME = ["scene", "seed", "seconds"]
 
 
@@ -23,6 +26,11 @@ def read_frames(path: Path) -> pd.DataFrame:
 def share_of_frames(term: str) -> Metric:
     """What `with_shares` measures."""
     return Metric(f"frames/{term}", "%", f"Frames with more {term}", lower_is_better=True)
+
+
+def half_of(mean: Mean) -> Mean:
+    """What a share of frames is compared with: half of them, in each of its roll-outs."""
+    return replace(mean, value=HALF, cells=dict.fromkeys(mean.cells, HALF), seeded=False)
 
 
 def with_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, other: str) -> pd.DataFrame:

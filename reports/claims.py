@@ -5,20 +5,20 @@ Santesteban, Otaduy, Casas: SNUG, CVPR 2022. Nothing else in a report is judged.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from dataclasses import dataclass
 
 import pandas as pd
 
-from reports.by_frame import share_of_frames, with_shares
+from reports.by_frame import half_of, share_of_frames, with_shares
 from reports.data import Metric, Run
 from reports.means import Mean, pair
-from reports.significance import LEVEL, Effect, effect, holm, within_uncertainty
+from reports.significance import LEVEL, Effect, effect, effect_on, holm, within_uncertainty
 from reports.table import Cell, Column, Table, table
 
 HOLDS, FAILS, EQUAL, OPEN = "holds", "does not hold", "tie", "cannot be told"
-BEFORE = Metric("cost/before", "s", "Data, setup and training", lower_is_better=True)  # the sum of:
+# The sum of PARTS.
+BEFORE = Metric("cost/before", "s", "Data, setup and training", lower_is_better=True, of="machine")
 PARTS = ("cost/data", "cost/setup", "cost/train")
 
 
@@ -99,17 +99,18 @@ CLAIMS = (
     ),
 )
 NOTE = (
-    "Effect: × the first over the second, of geometric means over motions and seeds; where a value is not "
-    "positive, the first less the second. Below it the 95 % interval over motions and seeds, of the line by "
-    "itself. p: corrected by Holm for all lines; a claim holds, or does not hold, where p is below .05. Tie: "
-    "p is not, and all of the interval is within 5 % of equality; or the difference is within the "
-    "uncertainty of the reference. Cannot be told: neither. Where nothing was repeated, 5 % decide."
+    "Effect: × the first over the second, of geometric means over motions and seeds; the first less the "
+    "second where a value is not positive or zero is a choice, as of gravity; of frames, the first's share "
+    "less half. Below it the 95 % interval over motions and seeds, of the line by itself. p: corrected by "
+    "Holm for all lines; a claim holds, or does not hold, where p is below .05. Tie: p is not, and all of "
+    "the interval is within 5 % of equality; or the difference is within the uncertainty of the reference. "
+    "Cannot be told: neither, or a network was trained with one seed. Where nothing was repeated, 5 % decide."
 )
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A claim, the two means, None where all of one diverged, and what came out."""
+    """A claim, the two means, None where all of one diverged, what came out, and a remark on that."""
 
     claim: Claim
     metric: Metric
@@ -118,6 +119,7 @@ class Judged:
     effect: Effect | None
     p: float | None
     verdict: str
+    remark: str = ""
 
 
 def findings(run: Run) -> list[Table]:
@@ -140,7 +142,7 @@ def findings(run: Run) -> list[Table]:
             found.claim.says, found.metric.heading, found.claim.lower, found.claim.relation,
             found.claim.higher, found.one, found.other,
             None if found.one is None or found.other is None else found.one.value - found.other.value,
-            found.effect, found.p, found.verdict,
+            found.effect, found.p, found.verdict + found.remark,
         )
         for found in judged(run)
     ]  # fmt: skip
@@ -148,11 +150,14 @@ def findings(run: Run) -> list[Table]:
     return table("findings", columns, rows, caption, grouped_by=("claim",), note=NOTE)
 
 
-def counts(run: Run) -> str:
-    """How many claims came out how; empty where none was judged."""
-    found = Counter(re.split(r"[:(]", line.verdict)[0].strip() for line in judged(run))
-    words = ", ".join(f"{word} {found[word]}" for word in (HOLDS, FAILS, EQUAL, OPEN) if found[word])
-    return f"Of {found.total()}: {words}." if found else ""
+def counts(run: Run) -> Counter[str]:
+    """How many claims came out how."""
+    return Counter(line.verdict for line in judged(run))
+
+
+def in_words(found: Counter[str]) -> str:
+    """As "holds 3, tie 1"."""
+    return ", ".join(f"{word} {found[word]}" for word in (HOLDS, FAILS, EQUAL, OPEN) if found[word])
 
 
 def judged(run: Run) -> list[Judged]:
@@ -160,6 +165,8 @@ def judged(run: Run) -> list[Judged]:
     first = next(iter(run.garments(run.worn)), None)
     frame = with_before(run.worn[run.worn["garment"] == first])
     ran = set(frame["method"])
+    made = [BEFORE, *(share_of_frames(claim.of_frames) for claim in CLAIMS if claim.of_frames)]
+    metrics = {**run.metrics, **{metric.name: metric for metric in made}}
     asked = []
     for claim in CLAIMS:
         if {claim.lower, claim.higher} <= ran:
@@ -167,30 +174,40 @@ def judged(run: Run) -> list[Judged]:
             if claim.of_frames:
                 own = with_shares(frame, run.frames, claim.of_frames, claim.lower, claim.higher)
             own = own[(own["metric"] == claim.metric) | ~own["usable"]]
-            asked.append((claim, *pair(own, claim.lower, claim.higher, claim.metric)))
-    effects = [effect(one, other) if one and other else None for _, one, other in asked]
-    p_values = [found.p_value(claim.factor) if found else None for (claim, *_), found in zip(asked, effects)]
+            metric = metrics.get(claim.metric, Metric(claim.metric))
+            asked.append((claim, metric, *pair(own, claim.lower, claim.higher, claim.metric)))
+    effects = [_effect(run, frame, *line) for line in asked]
+    p_values = [found.p_value(line[0].factor) if found else None for line, found in zip(asked, effects)]
     corrected = iter(holm([p for p in p_values if p is not None]))
     diverged = set(frame[frame["status"] == "diverged"]["method"])
-    made = [BEFORE, *(share_of_frames(claim.of_frames) for claim in CLAIMS if claim.of_frames)]
-    metrics = {**run.metrics, **{metric.name: metric for metric in made}}
     lines = []
-    for (claim, one, other), found, alone in zip(asked, effects, p_values):
-        metric = metrics.get(claim.metric, Metric(claim.metric))
+    for (claim, metric, one, other), found, alone in zip(asked, effects, p_values):
         p = None if alone is None else next(corrected)
         if found is not None and one is not None and other is not None:
-            said = verdict(claim, one, other, found, p) + one.fewer
+            said = verdict(claim, one, other, found, p)
+            remark = ": one seed" if said == OPEN and found.one_seed else ""
+            remark += one.fewer or other.fewer
         else:
-            said = of_diverged(claim, metric, one, other, diverged)
+            said, remark = of_diverged(claim, metric, one, other, diverged)
         if said:
-            lines.append(Judged(claim, metric, one, other, found, p, said))
+            lines.append(Judged(claim, metric, one, other, found, p, said, remark))
     return lines
+
+
+def _effect(
+    run: Run, rows: pd.DataFrame, claim: Claim, metric: Metric, one: Mean | None, other: Mean | None
+) -> Effect | None:
+    if one is None or other is None:
+        return None
+    if claim.of_frames:  # the other's share is what is left, and no second sample
+        return effect(one, half_of(one), differences=True)
+    return effect_on(metric, one, other, run, rows)
 
 
 def verdict(claim: Claim, one: Mean, other: Mean, found: Effect, p: float | None) -> str:
     """In words, by the p-value after Holm's correction; None where nothing was repeated."""
-    if claim.factor != 1.0 and not found.ratio:
-        return OPEN  # no factor between numbers of which some are zero
+    if (claim.factor != 1.0 and not found.ratio) or found.one_seed:
+        return OPEN  # no factor between numbers of which some are zero; no scatter of what one seed gave
     equal = found.equal(claim.factor)
     if within_uncertainty(one, other, claim.factor) or (equal and (p is None or p >= LEVEL or claim.on_par)):
         return HOLDS if claim.on_par else EQUAL
@@ -201,13 +218,16 @@ def verdict(claim: Claim, one: Mean, other: Mean, found: Effect, p: float | None
 
 def of_diverged(
     claim: Claim, metric: Metric, one: Mean | None, other: Mean | None, diverged: set[str]
-) -> str:
-    """Of a metric of which less is better, a method that diverged has more; else nothing can be said."""
-    if not metric.lower_is_better:
-        return ""
-    if one is not None and claim.higher in diverged:
-        return f"{HOLDS}: the second diverged"
-    return f"{FAILS}: the first diverged" if other is not None and claim.lower in diverged else ""
+) -> tuple[str, str]:
+    """Verdict and remark: of an answer of which less is better, a method that diverged has more. Of what it
+    cost nothing can be said: no time of a network that diverged is usable.
+    """
+    if metric.lower_is_better and metric.of == "answer":
+        if one is not None and claim.higher in diverged:
+            return HOLDS, ": the second diverged"
+        if other is not None and claim.lower in diverged:
+            return FAILS, ": the first diverged"
+    return "", ""
 
 
 def with_before(frame: pd.DataFrame) -> pd.DataFrame:

@@ -20,12 +20,11 @@ from reports.data import SUITES, Metric, Run
 from reports.means import Mean, means
 from reports.numbers import number, with_spread
 from reports.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
-from reports.significance import LEVEL, Effect, effect, holm, within_uncertainty
+from reports.significance import LEVEL, Effect, effect_on, holm, within_uncertainty
 
 CELL = ["scene", "method", "seed", "metric"]
 GROUP = ["place", "method", "metric"]
 WORSE, BETTER, OTHER = "worse", "better", "changed"
-CLOCKED = ("s", "ms", "MB")  # units of what the machine's state moves from run to run
 EXAMPLES = """examples:
   python -m reports.compare before after
   python -m reports.compare before after --metrics 'energy/*,curvature/*' --methods snug
@@ -34,7 +33,8 @@ EXAMPLES = """examples:
 What counts as a change:
   a mean   p below .05, corrected by Holm for all means compared, the 95 % interval not within 5 % of
            equality, and more than the uncertainties of both runs together (column uncertainty; of run
-           times, the range of repeats). Where nothing was repeated, 5 % decide in place of p.
+           times, the range of repeats). Where nothing was repeated, 5 % decide in place of p. Of total and
+           gravity, whose zero is a choice, 5 % are of what skinning has more than the simulation.
   a time   so, and all of the interval beyond 20 %, on the same hardware, and only where it was repeated;
            memory likewise.
   a check  one that passed fails, or the other way round; so with stress tests, whatever --metrics says.
@@ -79,12 +79,15 @@ def compare(
     if presets[0] != presets[1]:
         raise ResultsError(f"A is of preset {presets[0]}, B of {presets[1]}: their numbers differ by design")
     frames = [_chosen(run, methods) for run in (one, other)]
+    endings = _endings(*frames)
     keys = [frame.set_index(CELL).index for frame in frames]
     frames = [frame[key.isin(rest)] for frame, key, rest in zip(frames, keys, reversed(keys))]
-    endings = _endings(*frames)
     same = set(one.frame["hardware"]) == set(other.frame["hardware"])
     kept = [frame[_matching(frame["metric"], metrics)] for frame in frames]
-    kept = [frame if times and same else frame[~frame["unit"].isin(CLOCKED)] for frame in kept]
+    machines = [
+        metric.name for run in (one, other) for metric in run.metrics.values() if metric.of == "machine"
+    ]
+    kept = [frame if times and same else frame[~frame["metric"].isin(machines)] for frame in kept]
     if kept[0].empty:
         raise ResultsError("the two runs share no such scene, method, seed and metric: nothing to compare")
     judged, compared, one_seed = _means(one, *kept)
@@ -115,10 +118,13 @@ def _matching(names: pd.Series, patterns: str) -> pd.Series:
 
 
 def _endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
-    """Cells, checks and stress tests that ended well in one run alone; once for all metrics of a cell."""
+    """Cells, checks and stress tests of both that ended well in one run alone; once for a cell's metrics."""
     both = one.merge(other, on=CELL, suffixes=("", "_other"))
-    good, good_other = both["status"] == "ok", both["status_other"] == "ok"
-    moved = both[good != good_other].drop_duplicates(["scene", "method", "seed", "status", "status_other"])
+    # A cell that failed has one row, of a metric that it need not have where it ends well.
+    cells = _worst(one).merge(_worst(other), on=CELL[:3], suffixes=("", "_other"))
+    rows = pd.concat([both, cells], ignore_index=True)
+    good, good_other = rows["status"] == "ok", rows["status_other"] == "ok"
+    moved = rows[good != good_other].drop_duplicates([*CELL[:3], "status", "status_other"])
     return [
         Change(
             WORSE if row.status == "ok" else BETTER, row.scene, row.method, row.metric,
@@ -129,12 +135,19 @@ def _endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     ]  # fmt: skip
 
 
+def _worst(frame: pd.DataFrame) -> pd.DataFrame:
+    """A row of each cell: one that is not ok, where there is one."""
+    ordered = frame.iloc[(frame["status"] == "ok").argsort(kind="stable")]
+    return ordered.drop_duplicates(CELL[:3])
+
+
 def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
     """Means beyond noise; how many were compared, one family; how many differ that have one seed."""
     first, second = (means(frame, *GROUP) for frame in _over_the_same(*frames))
+    cells = run.cells(*SUITES)
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
     found = [
-        (place, method, run.metrics[name], mean, new, effect(new, mean))
+        (place, method, run.metrics[name], mean, new, _effect(run, cells, name, new, mean))
         for (place, method, name), (mean, new) in differ.items()
         if not mean.seeded or mean.seeds > 1
     ]
@@ -144,10 +157,15 @@ def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
     for (place, method, metric, mean, new, far), alone in zip(found, p_values):
         p = None if alone is None else next(corrected)
         noise = within_uncertainty(mean, new) or far.equal() or (p is not None and p >= LEVEL)
-        if not noise and not (metric.unit in CLOCKED and _machine(mean, far)):
+        if not noise and not (metric.of == "machine" and _machine(mean, far)):
             verdict = _side(metric, far)
             changes.append(Change(verdict, place, method, metric.name, _said(metric, mean, new, far, p)))
     return changes, len(first), len(differ) - len(found)
+
+
+def _effect(run: Run, cells: pd.DataFrame, metric: str, new: Mean, mean: Mean) -> Effect:
+    scenes = {scene for scene, _ in mean.cells}
+    return effect_on(run.metrics[metric], new, mean, run, cells[cells["scene"].isin(scenes)])
 
 
 def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:

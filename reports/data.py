@@ -17,7 +17,9 @@ SUITES = ("garments", "speed", "validation", "extremes", "shapes", "performance"
 
 @dataclass(frozen=True)
 class Metric:
-    """A metric as it is declared: head of its column, a sentence on it, and the table that has the column."""
+    """A metric as it is declared, see benchmarks.metric.Metric: head of its column, a sentence on it, and the
+    table that has the column; which side is better, and what comparisons may make of it.
+    """
 
     name: str
     unit: str = ""
@@ -25,6 +27,8 @@ class Metric:
     definition: str = ""
     table: str = ""
     lower_is_better: bool | None = None
+    arbitrary_zero: bool = False
+    of: str = "answer"
 
     @property
     def heading(self) -> str:
@@ -144,6 +148,7 @@ def _metric(name: str, unit: str, said: Mapping[str, Any]) -> Metric:
     return Metric(
         name, unit, str(said.get("title") or name), str(said.get("definition") or ""),
         str(said.get("table") or ""), None if lower is None else bool(lower),
+        bool(said.get("arbitrary_zero")), str(said.get("of") or "answer"),
     )  # fmt: skip
 
 

@@ -18,23 +18,22 @@ import pandas as pd
 class Mean:
     """The mean of a metric, its spread over seeds, and what went into it.
 
-    `complete` says that every seed has every scene in which anybody has the metric; otherwise the mean is
-    over fewer cells than its neighbours in a table, and the table must say so. `stalled` says that a solver
-    left some frames of some cell unconverged, `seeded` that another seed would give another value. `cells`:
-    the value of each (scene, seed). `lost`: seeds of which nothing usable is left, as of a network that
-    diverged. `pairing_group`: means of one group are compared seed by seed; empty for none. `uncertainty`: in
-    the metric's unit, how far another reference, as right as the one taken, would move it; None if unknown.
+    `scenes`, `seeds`: how many have it. `asked`: how many cells were to have it, every seed in every scene in
+    which anybody has the metric; where fewer have, the mean is not `complete`, and the table must say so.
+    `stalled` says that a solver left some frames of some cell unconverged, `seeded` that another seed would
+    give another value. `cells`: the value of each (scene, seed). `pairing_group`: means of one group are
+    compared seed by seed; empty for none. `uncertainty`: in the metric's unit, how far another reference, as
+    right as the one taken, would move it; None if unknown.
     """
 
     value: float
     spread: float | None
     scenes: int
     seeds: int
-    complete: bool
+    asked: int
     stalled: bool = False
     seeded: bool = True
     cells: Mapping[tuple[str, int], float] = field(default_factory=dict, compare=False)
-    lost: int = 0
     pairing_group: str = field(default="", compare=False)
     uncertainty: float | None = None
 
@@ -44,11 +43,18 @@ class Mean:
         return max((x for x in (self.spread, self.uncertainty) if x is not None), default=None)
 
     @property
+    def lacking(self) -> int:
+        """How many cells were to have it, and have not: they failed, or belong to a network that diverged."""
+        return max(self.asked - len(self.cells), 0)
+
+    @property
+    def complete(self) -> bool:
+        return self.lacking == 0
+
+    @property
     def fewer(self) -> str:
-        """Words behind a number or verdict: over how many scenes or seeds, where these are not all."""
-        if self.lost:
-            return f" ({self.seeds} of {self.seeds + self.lost} seeds)"
-        return "" if self.complete else f" ({self.scenes} {'scene' if self.scenes == 1 else 'scenes'} only)"
+        """Words behind a number or verdict: over how many roll-outs, where these are not all."""
+        return "" if self.complete else f" ({len(self.cells)} of {self.asked} roll-outs)"
 
 
 def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
@@ -70,24 +76,23 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     across = seeds.groupby(own, sort=False)
     unsure = of_all["uncertainty"].mean() if "uncertainty" in frame else [None] * len(cells)
     columns = (
-        across.mean(), across.std(), of_seed.size().groupby(own, sort=False).min(), of_all["scene"].nunique(),
-        of_all["stalled"].any(), of_all["seeded"].any(), of_all["pairing_group"].first(), unsure,
+        across.mean(), across.std(), of_all["scene"].nunique(), of_all["stalled"].any(),
+        of_all["seeded"].any(), of_all["pairing_group"].first(), unsure,
     )  # fmt: skip
     found = {}
-    for key, value, spread, fewest, scenes, stalled, seeded, pairing_group, moved in zip(cells, *columns):
+    for key, value, spread, scenes, stalled, seeded, pairing_group, moved in zip(cells, *columns):
         group = dict(zip(own, key))
         own_seeds = {seed for _, seed in cells[key]}
-        lost = failed.get(_key(group, ends), set()) - own_seeds
+        every_seed = own_seeds | failed.get(_key(group, ends), set())
         found[key] = Mean(
             value=float(value),
             spread=None if pd.isna(spread) else float(spread),
             scenes=int(scenes),
             seeds=len(own_seeds),
-            complete=not lost and fewest == asked[_key(group, places)],
+            asked=int(asked[_key(group, places)]) * len(every_seed),
             stalled=bool(stalled),
             seeded=bool(seeded),
             cells=cells[key],
-            lost=len(lost),
             pairing_group=pairing_group,
             uncertainty=None if pd.isna(moved) else float(moved),
         )
@@ -142,5 +147,5 @@ def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean |
     if not both:
         return None, None
     asked = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
-    first, second = (replace(m, complete=len(both) == asked and not m.lost) for m in (first, second))
-    return first, second
+    seeds = (m.asked // len(both) for m in (first, second))
+    return replace(first, asked=asked * next(seeds)), replace(second, asked=asked * next(seeds))

@@ -34,7 +34,7 @@ def summary(run: Run) -> list[tuple[str, str]]:
         ("Error against time", fronts(run, cells, compared)),
         ("When training pays", training_pays(run, cells, compared)),
         ("The reference", reference(run, cells[cells["scene"].isin(compared)])),
-        ("Claims of the paper", claims.counts(run)),
+        ("Claims of the paper", _of_claims(run)),
         ("Known answers", checks(run).strip()),
     ]
     return [(topic, unbroken(said)) for topic, said in found if said]
@@ -108,6 +108,11 @@ def reference(run: Run, frame: pd.DataFrame) -> str:
         return text
     text += f" It is not converged in time: with {finest.level:g} steps a frame it is itself "
     return text + f"{number(found[0])} 1/m and {number(found[1])} mm away."
+
+
+def _of_claims(run: Run) -> str:
+    found = claims.counts(run)
+    return f"Of {found.total()}: {claims.in_words(found)}." if found else ""
 
 
 def checks(run: Run) -> str:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
 from reports.break_even import NETWORK, compared_scenes, rivals
 from reports.data import Run
-from reports.means import mean_of, value_of
-from reports.pareto import TIME, WHOLE
+from reports.means import mean_of, shared_scenes
+from reports.pareto import run_time
 from reports.table import Cell, Column, Table, metric_column, table
 
 ROWS = 8
@@ -19,28 +19,33 @@ LEARNED = ("network", "ablation")
 BEST_BY = ("step/distance", "gap/energy", "curvature/error", "energy/total")
 
 
-def leads(run: Run, rows: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
+def leads(
+    run: Run, rows: pd.DataFrame, among: Iterable[str] | None = None, by: Sequence[str] = BEST_BY
+) -> list[str]:
     """The reference, the network, the best of other networks in these rows, and the first baseline; of those
-    in `among` alone where that is given. Changed networks are networks where a run has no others.
+    in `among` alone where that is given. Changed networks are networks where a run has no others. The best
+    has the lowest of the first metric of `by` that any of them has.
     """
     usable = set(rows[rows["usable"]]["method"])
     have = usable if among is None else usable & set(among)
     learned = [name for name in run.with_role(*LEARNED) if name in have]
     others = [name for name in learned if not run.methods[name].base] or learned
     own = NETWORK if NETWORK in others else next(iter(others), "")
-    best = _best(run, rows, [name for name in others if name != own])
+    best = _best(rows, [name for name in others if name != own], by)
     baseline = next((name for name in run.with_role("baseline") if name in have), "")
     return [name for name in (run.reference, own, best, baseline) if name in have]
 
 
-def _best(run: Run, rows: pd.DataFrame, names: Iterable[str]) -> str:
-    """By the first metric that any of them has."""
-    names = list(names)
-    for metric in BEST_BY:
-        values = {name: value_of(rows, name, metric) for name in names}
-        found = {name: value for name, value in values.items() if value is not None}
-        if found:
-            return min(found, key=lambda name: found[name])
+def _best(rows: pd.DataFrame, names: Sequence[str], by: Sequence[str]) -> str:
+    """Over the scenes that those of them share that came through most of them."""
+    for metric in by:
+        found = {name: mean for name in names if (mean := mean_of(rows, name, metric)) is not None}
+        most = max((len(mean.cells) for mean in found.values()), default=0)
+        whole = [name for name, mean in found.items() if len(mean.cells) == most]
+        scenes = shared_scenes(rows, whole, metric)
+        means = {name: mean for name in whole if (mean := mean_of(rows, name, metric, scenes)) is not None}
+        if means:
+            return min(means, key=lambda name: means[name].value)
     return next(iter(names), "")
 
 
@@ -67,8 +72,7 @@ def overview(run: Run) -> list[Table]:
     why = rivals(run, cells, scenes) if scenes else {}
     solvers = [m for m in why if m not in chosen]
     chosen = run.ordered([*chosen[: ROWS - len(solvers)], *solvers])
-    time = WHOLE if len(timed[timed["metric"] == WHOLE]) else TIME
-    wanted = [(name, worn) for name in WORN] + [(name, timed) for name in (*STEPS, time)]
+    wanted = [(name, worn) for name in WORN] + [(name, timed) for name in (*STEPS, run_time(timed))]
     wanted += [("cost/train", worn)]
     asked = [(run.metrics[name], rows) for name, rows in wanted if name in run.metrics]
     lines: list[tuple[Cell, ...]] = [

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import pandas as pd
 
-from reports.means import Mean
+from reports.data import Metric, Run
+from reports.means import Mean, pair
 
 TIE = 0.05  # share of the larger of two values up to which they count as equal
 LEVEL = 0.05  # of the two-sided tests, and what an interval leaves out
@@ -22,8 +24,9 @@ class Effect:
 
     value: on the scale of the test: the mean over motions and seeds of the difference, of logarithms where
     `ratio`. error: its standard error, None where nothing was repeated; freedom: of Student's t. covers: what
-    was resampled: "motions and seeds", "motions", "seeds" or nothing. scale: the larger of the two means, by
-    which a difference is a share. complete: neither mean lacks a scene or a seed.
+    was resampled: "motions and seeds", "motions", "seeds" or nothing. scale: by which a difference is a
+    share; 0 where nothing is known to be one. complete: neither mean lacks a scene or a
+    seed. one_seed: whether a mean is of one seed, and nobody knows how far another would move it.
     """
 
     value: float
@@ -33,6 +36,7 @@ class Effect:
     covers: str = ""
     scale: float = 0.0
     complete: bool = True
+    one_seed: bool = False
 
     @property
     def shown(self) -> float:
@@ -78,11 +82,12 @@ class Effect:
         return float(stats.t.ppf(1.0 - LEVEL / 2.0, self.freedom))
 
 
-def effect(one: Mean, other: Mean) -> Effect:
+def effect(one: Mean, other: Mean, *, differences: bool = False, scale: float | None = None) -> Effect:
     """Of two means over the same motions, as reports.means.pair gives them.
 
     Positive numbers are compared by their logarithms, cell by cell: a violent motion has more of every energy
     with every method, and what came out a million times as large with one seed is told apart all the same.
+    differences: not so here. scale: of which a difference is a share, the larger mean where none is given.
 
     The standard error is that of a bootstrap that draws motions and seeds, each with replacement and of each
     one fewer than there are: the variance is then that of the mean, not (n - 1) / n of it (Hesterberg 2015).
@@ -95,7 +100,7 @@ def effect(one: Mean, other: Mean) -> Effect:
     number and was not repeated; so with seeds.
     """
     first, second = _grid(one), _grid(other)
-    ratio = bool((first > 0.0).all() and (second > 0.0).all())
+    ratio = bool((first > 0.0).all() and (second > 0.0).all()) and not differences
     if ratio:
         first, second = np.log(first), np.log(second)
     grids = _drawn_alike(one, other, first, second)
@@ -110,9 +115,27 @@ def effect(one: Mean, other: Mean) -> Effect:
         error=error,
         freedom=freedom,
         covers=" and ".join(name for name, several in repeated.items() if several),
-        scale=max(abs(one.value), abs(other.value)),
+        scale=max(abs(one.value), abs(other.value)) if scale is None else scale,
         complete=one.complete and other.complete,
+        one_seed=_one_seed(one, other) or _one_seed(other, one),
     )
+
+
+def effect_on(metric: Metric, one: Mean, other: Mean, run: Run, rows: pd.DataFrame) -> Effect:
+    """Of two means of this metric, which are of these rows. Where its zero is a choice, they are told apart
+    by their difference, as a share of what the baseline, skinning, has more than the reference.
+    """
+    if not metric.arbitrary_zero:
+        return effect(one, other)
+    baseline = next((name for name in run.with_role("baseline") if name in set(rows["method"])), "")
+    high, low = pair(rows, baseline, run.reference, metric.name)
+    scale = abs(high.value - low.value) if high and low else 0.0
+    return effect(one, other, differences=True, scale=scale)
+
+
+def _one_seed(mean: Mean, beside: Mean) -> bool:
+    """Whether the mean is of one seed of many, and the one beside it does not tell what seeds scatter."""
+    return mean.seeded and mean.seeds == 1 and not (beside.seeded and beside.seeds > 1)
 
 
 def within_uncertainty(one: Mean, other: Mean, factor: float = 1.0) -> bool:

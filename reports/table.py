@@ -64,8 +64,8 @@ class Table:
     def write_csv(self, folder: Path) -> Path:
         """Write <folder>/<name>.csv, whole or not at all.
 
-        A mean gets a column for its spread over seeds, and one for its uncertainty where there is any; an
-        effect columns for what it is and its interval.
+        A mean gets a column for its spread over seeds, and where there is any, one for its uncertainty and
+        one for the roll-outs that it lacks; an effect columns for what it is and its interval.
         """
         path = folder / f"{self.name}.csv"
         texts: dict[str, list[str]] = {}
@@ -78,6 +78,9 @@ class Table:
                 moved = [cell.uncertainty if isinstance(cell, Mean) else None for cell in cells]
                 if any(x is not None for x in moved):
                     texts[f"{column.name}_uncertainty"] = [csv_number(x) for x in moved]
+                lacking = [cell.lacking if isinstance(cell, Mean) else 0 for cell in cells]
+                if any(lacking):
+                    texts[f"{column.name}_lacking"] = [str(count) for count in lacking]
             if any(isinstance(cell, Effect) for cell in cells):
                 parts = zip(*map(_parts_of_effect, cells))
                 texts |= {f"{column.name}_{part}": list(own) for part, own in zip(EFFECT_PARTS, parts)}

@@ -11,8 +11,8 @@ from reports.means import Mean, mean_of, pair, shared_scenes, value_of
 from reports.narrative import fronts, unbroken
 from reports.numbers import number, with_spread
 from reports.overview import LEARNED, leads
-from reports.pareto import TIME, WHOLE, indistinct
-from reports.significance import within_uncertainty
+from reports.pareto import indistinct, run_time
+from reports.significance import LEVEL, effect_on, within_uncertainty
 from reports.tables import BAD
 
 TOTAL, CURVATURE, DISTANCE, SWING = "energy/total", "curvature/error", "distance/rms", "dynamics/amplitude"
@@ -38,7 +38,7 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     """The network's total energy beside the simulation's, over the scenes that all of page one have."""
     rows = worn[(worn["metric"] == TOTAL) | ~worn["usable"]]
     have = set(rows[rows["usable"]]["method"])
-    names = [name for name in leads(run, worn) if name in have]
+    names = [name for name in leads(run, worn, by=(TOTAL,)) if name in have]
     scenes = shared_scenes(rows, names, TOTAL)
     found = {name: mean_of(rows, name, TOTAL, scenes) for name in names}
     means = {name: mean for name, mean in found.items() if mean is not None}
@@ -46,24 +46,33 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     if not own or run.reference not in means:
         return ""
     one, other = means.pop(own), means.pop(run.reference)
-    tie = within_uncertainty(one, other) or abs(one.value - other.value) <= _scatter(one, other)
-    how = "as low as" if tie else "above" if one.value > other.value else "below"
     asked = worn[worn["metric"] == TOTAL]["scene"].nunique()
     count = f"{len(scenes)} of {asked}" if len(scenes) < asked else str(asked)
-    text = f"On {count} unseen motion{'' if asked == 1 else 's'} {run.label(own)}'s total energy, "
-    text += f"{with_spread(one.value, one.spread_or_uncertainty)} J{one.fewer}, is {how} the simulation's, "
-    text += with_spread(other.value, other.spread_or_uncertainty)
+    text = f"On {count} unseen motion{'' if asked == 1 else 's'} {run.label(own)}'s total energy is "
+    text += f"{with_spread(one.value, one.spread_or_uncertainty)} J{one.fewer}, the simulation's "
+    text += with_spread(other.value, other.spread_or_uncertainty) + _apart(run, rows, one, other)
     words = [f"{run.label(name)} has {number(mean.value)}{mean.fewer}" for name, mean in means.items()]
     return text + (f"; {', '.join(words)}." if words else ".")
 
 
-def _scatter(one: Mean, other: Mean) -> float:
-    return (one.spread_or_uncertainty or 0.0) + (other.spread_or_uncertainty or 0.0)
+def _apart(run: Run, rows: pd.DataFrame, one: Mean, other: Mean) -> str:
+    """Which way, in how many roll-outs, and whether others may show the contrary. The other has no seeds."""
+    if within_uncertainty(one, other):
+        return ": a tie"
+    higher, beside = one.value > other.value, {scene: value for (scene, _), value in other.cells.items()}
+    above = [(value > beside[scene]) is higher for (scene, _), value in one.cells.items()]
+    text = f": {'higher' if higher else 'lower'} in {sum(above)} of {len(above)} roll-outs"
+    found = effect_on(run.metrics[TOTAL], one, other, run, rows)
+    if found.equal():
+        return ": a tie"
+    if found.one_seed:
+        return f"{text} of one seed, which judges no network"
+    p = found.p_value()
+    return text if p is None or p < LEVEL else f"{text}; of other motions and seeds it cannot be told"
 
 
 def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
-    time = WHOLE if len(timed[timed["metric"] == WHOLE]) else TIME
-    own, reference = pair(timed, NETWORK, run.reference, time)
+    own, reference = pair(timed, NETWORK, run.reference, run_time(timed))
     if own is None or reference is None or not own.value:
         return ""
     text = f"{run.label(NETWORK)} takes {number(own.value)} ms a frame, the simulation "
@@ -86,7 +95,7 @@ def _trust(run: Run, worn: pd.DataFrame, timed: pd.DataFrame) -> str:
         )
     counted = claims.counts(run)
     if counted:
-        parts.append(f"of the paper's claims tested here: {counted.partition(': ')[2].rstrip('.')}")
+        parts.append(f"of the paper's claims tested here: {claims.in_words(counted)}")
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if parts else ""
 

@@ -75,7 +75,8 @@ def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *
     garment, _, motion = scene.partition("/")
     declared = {
         "role": own.get("role", "network"), "family": own.get("family", method), "base": own.get("base", ""),
-        "level": own.get("level"), "seeded": own.get("seeded", network),
+        "level": own.get("level"),
+        "seeded": own.get("seeded", network) and not metric.startswith("cost/"),
         "pairing_group": own.get("pairing_group", method if network else ""),
         "garment": garment if motion else "", "motion": motion, "part": "whole" if motion else "",
     }  # fmt: skip
@@ -104,6 +105,8 @@ def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
                 "unit": r.unit, "title": TITLES.get(name, name.partition("/")[2].capitalize()),
                 "definition": f"definition of {name}", "table": TABLES.get(name.partition("/")[0], ""),
                 "lower_is_better": True if name in BETTER_LOWER else None,
+                "arbitrary_zero": name in ("energy/gravity", "energy/total"),
+                "of": "machine" if name.startswith("cost/") else "answer",
             }
             for name, r in metrics.items()
         },

@@ -22,11 +22,11 @@ def rows_of(draw: int = 0, **factors: float):
     factor = {"snug": 1.0, "lbfgs-4": 1.0, "time": 1.0, **factors}
     rows = []
     for i, scene in enumerate(SCENES):
-        rows.append(row(scene, "simulation", "energy/total", 1.0 + i))
-        rows.append(row(scene, "lbfgs-4", "energy/total", factor["lbfgs-4"] * (1.3 + i), uncertainty=0.01))
+        rows.append(row(scene, "simulation", "energy/strain", 1.0 + i))
+        rows.append(row(scene, "lbfgs-4", "energy/strain", factor["lbfgs-4"] * (1.3 + i), uncertainty=0.01))
         rows.append(row(scene, "lbfgs-4", "curvature/mean", 5.0 + i, unit="1/m"))
         rows += [
-            row(scene, "snug", "energy/total", factor["snug"] * (2.0 + i) * scatter[i, seed], seed=seed)
+            row(scene, "snug", "energy/strain", factor["snug"] * (2.0 + i) * scatter[i, seed], seed=seed)
             for seed in SEEDS
         ]
     timed = {"suite": "speed", "method": "lbfgs-4"}
@@ -63,17 +63,33 @@ def test_of_many_means_that_scatter_none_is_a_change():
 
 @pytest.mark.parametrize(("factor", "verdict"), [(1.3, "worse"), (0.7, "better")])
 def test_a_network_that_moved_beyond_its_seeds_is_found(factor, verdict):
-    assert found(rows_of(), rows_of(1, snug=factor)) == [(verdict, "tshirt", "snug", "energy/total")]
+    assert found(rows_of(), rows_of(1, snug=factor)) == [(verdict, "tshirt", "snug", "energy/strain")]
 
 
 def test_what_the_uncertainty_or_5_percent_covers_is_no_change():
-    assert found(rows_of(), rows_of(**{"lbfgs-4": 1.1})) == [("worse", "tshirt", "lbfgs-4", "energy/total")]
+    assert found(rows_of(), rows_of(**{"lbfgs-4": 1.1})) == [("worse", "tshirt", "lbfgs-4", "energy/strain")]
     assert found(rows_of(), rows_of(**{"lbfgs-4": 1.04})) == []
     unsure = [
         dataclasses.replace(r, uncertainty=0.5) if r.method == "lbfgs-4" else r
         for r in rows_of(**{"lbfgs-4": 1.1})
     ]
     assert found(rows_of(), unsure) == []
+
+
+def test_where_zero_is_a_choice_no_change_hangs_on_it():
+    """All gravity energies are higher by 50 J, or by none: the same change is found in both."""
+
+    def heights(more: float, zero: float):
+        rows = [row(s, "simulation", "energy/gravity", zero + 1.0 + i) for i, s in enumerate(SCENES)]
+        rows += [row(s, "skinning", "energy/gravity", zero + 2.0 + i) for i, s in enumerate(SCENES)]
+        return rows + [
+            row(s, "lbfgs-4", "energy/gravity", zero + 1.1 + i + more) for i, s in enumerate(SCENES)
+        ]
+
+    for zero in (0.0, 50.0):
+        assert found(heights(0.0, zero), heights(0.04, zero)) == []  # 4 % of what skinning has more
+        moved = [("changed", "tshirt", "lbfgs-4", "energy/gravity")]
+        assert found(heights(0.0, zero), heights(0.06, zero)) == moved
 
 
 def test_a_metric_without_a_better_side_is_only_changed():
@@ -105,10 +121,20 @@ def test_a_cell_that_fails_and_a_check_that_is_off_are_worse():
         return dataclasses.replace(r, status="diverged", value=None, reason="step 7") if lost else r
 
     later = [ended(r) for r in rows_of()]
-    both = [("worse", SCENES[0], "snug", "energy/total"), ("worse", "sag", "simulation", "check")]
+    both = [("worse", SCENES[0], "snug", "energy/strain"), ("worse", "sag", "simulation", "check")]
     assert found(rows_of(), later) == found(rows_of(), later, metrics="curvature/*") == both
     assert [verdict for verdict, *_ in found(later, rows_of())] == ["better", "better"]
     assert found(rows_of(), later, methods="lbfgs-*") == []
+
+
+def test_a_cell_that_fails_is_found_where_it_has_no_metric_in_common():
+    """An untimed cell has metrics of its answer, and where it crashed a row of its time."""
+    cell = {"scene": "out_of_distribution/splits", "method": "simulation", "suite": "extremes"}
+    well = [*rows_of(), row(metric="motion/strain", **cell)]
+    crash = {"metric": "cost/frame", "value": None, "status": "failed", "reason": "crashed"}
+    assert ("worse", cell["scene"], "simulation", "motion/strain") in found(
+        well, [*rows_of(), row(**crash, **cell)]
+    )
 
 
 def write(path, rows, **more):
@@ -123,7 +149,9 @@ def test_exit_status_and_lines(tmp_path, capsys):
     assert command.main([one, one]) == 0 and "0 worse" in capsys.readouterr().out
     assert command.main([one, worse]) == 1
     line = capsys.readouterr().out.splitlines()[0]
-    assert line.startswith("worse   tshirt  snug  energy/total  3.5") and " J, × 1.3" in line and "p " in line
+    assert (
+        line.startswith("worse   tshirt  snug  energy/strain  3.5") and " J, × 1.3" in line and "p " in line
+    )
     assert command.main([worse, one]) == 0
 
 
@@ -135,7 +163,7 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, capsys, what):
     if what in ("nothing shared", "pattern"):
         other = [row("skirt/turn")] if what == "nothing shared" else rows_of()
         write(tmp_path / "b", other, preset="quick")
-    options = ["--metrics", "energy/totle"] if what == "pattern" else []
+    options = ["--metrics", "energy/strian"] if what == "pattern" else []
     assert command.main([one, str(tmp_path / "b"), *options]) == 2
     captured = capsys.readouterr()
     assert captured.out == "" and captured.err.startswith("reports.compare: ")

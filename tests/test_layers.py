@@ -25,6 +25,8 @@ ALLOWED = {
         "reference_sim.array_file",
         "reference_sim.point_cache",
         "reference_sim.whole_file",
+        "reference_sim.cloth",  # what lies under the skin is looked up as the simulator does
+        "reference_sim.obstacle",
     ),
 }
 # The referee's solvers are not for the contestants.

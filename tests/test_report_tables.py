@@ -49,7 +49,7 @@ def test_every_declared_case_has_its_place_in_the_tables(tmp_path):
 def test_mean_and_spread_over_seeds():
     rows = [row(scene, seed=s, value=v) for scene in SCENES for s, v in ((0, 1.0), (1, 3.0), (2, 8.0))]
     mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
-    assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), scenes=2, seeds=3, complete=True)
+    assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), scenes=2, seeds=3, asked=6)
     assert dict(mean.cells) == {(scene, s): v for scene in SCENES for s, v in enumerate((1.0, 3.0, 8.0))}
     assert mean_of(run_of(rows[:1]).frame, "snug", "energy/strain", SCENES[:1]).spread is None
     assert mean_of(run_of(rows).frame, "snug", "energy/bending") is None
@@ -59,7 +59,7 @@ def test_the_mean_is_over_scenes_first():
     """One seed has one scene of two: it weighs as much as the other."""
     rows = [row(SCENES[0], value=1.0), row(SCENES[1], value=3.0), row(SCENES[0], value=8.0, seed=1)]
     mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
-    assert mean.value == 5.0 and not mean.complete and mean.fewer == " (2 scenes only)"
+    assert mean.value == 5.0 and not mean.complete and mean.fewer == " (3 of 4 roll-outs)"
 
 
 def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
@@ -86,7 +86,7 @@ def test_a_seed_that_is_lost_is_said_wherever_the_mean_of_the_others_stands():
     (mean,) = (
         line[2] for line in make_tables(run_of(rows))["energies"].rows if line[:2] == ("tshirt", "snug")
     )
-    assert (mean.lost, mean.complete, mean.fewer) == (1, False, " (2 of 3 seeds)")
+    assert (mean.lacking, mean.complete, mean.fewer) == (1, False, " (2 of 3 roll-outs)")
     assert mean_of(run_of(rows).worn, "snug", "energy/total", ["tshirt/walk"]) == mean
 
 
@@ -158,24 +158,24 @@ def test_a_duration_has_its_own_unit_and_none_over_its_column():
 
 
 def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
-    rows = seeds_of("snug-no-noise", "energy/total", (2.0, 2.2, 2.4))
-    rows += seeds_of("snug-window6", "energy/total", (1.0, 1.2, 1.4))
-    rows += seeds_of("snug", "energy/total", (1.0, 1.1, 1.2))
+    rows = seeds_of("snug-no-noise", "curvature/error", (2.0, 2.2, 2.4))
+    rows += seeds_of("snug-window6", "curvature/error", (1.0, 1.2, 1.4))
+    rows += seeds_of("snug", "curvature/error", (1.0, 1.1, 1.2))
     long = {"scene": "tshirt/there_and_back", "unit": "mm"}
     rows += seeds_of("snug", "roll_out/drift", (1.0, 1.1, 1.2), **long)
     rows += seeds_of("snug-no-noise", "roll_out/drift", (0.1,), **long)
     made = make_tables(run_of(rows))
-    assert [line[1] for line in made["energies"].rows] == ["snug"]
+    assert [line[1] for line in made["curvature"].rows] == ["snug"]
     assert [line[1] for line in made["ablations"].rows] == ["snug", "snug-no-noise", "snug-window6"]
     captions = made["ablations"].caption + made["ablation_effects"].caption
     assert "recipe" not in captions and "ingredient" not in captions  # a variant may have more of it
     full = made["ablations"].rows[0]
-    assert full[-1] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, complete=True)
+    assert full[-2] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, asked=3)
     lines = {line[1]: line[2:] for line in made["ablation_effects"].rows}
     assert list(lines) == ["snug-no-noise", "snug-window6"]
-    total, drift = lines["snug-no-noise"]
-    assert total.shown == pytest.approx((2.0 * 2.2 * 2.4 / (1.0 * 1.1 * 1.2)) ** (1 / 3))
-    assert total.interval[0] > 1.0 > drift.interval[1] and total.covers == "seeds"
+    error, drift = lines["snug-no-noise"]
+    assert error.shown == pytest.approx((2.0 * 2.2 * 2.4 / (1.0 * 1.1 * 1.2)) ** (1 / 3))
+    assert error.interval[0] > 1.0 > drift.interval[1] and error.covers == "seeds"
     assert lines["snug-window6"][1] is None
     # They are described: no word says which of them is better.
     (block,) = table_blocks(run_of(rows), made["ablation_effects"])
@@ -198,7 +198,7 @@ def on_two_scenes(method, *values, metric="energy/total"):
 def test_ablations_are_compared_over_the_scenes_that_both_have():
     run = run_of(on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("snug-no-noise", 2.0))
     (line,) = ablation_effects(run)[0].rows
-    assert line[2].shown == pytest.approx(2.0) and not line[2].complete
+    assert line[2].shown == pytest.approx(1.0) and not line[2].ratio and not line[2].complete
     assert [line[2].value for line in ablations(run)[0].rows] == [5.0, 2.0]
 
 
@@ -258,10 +258,12 @@ def near(rows) -> str:
 
 def test_the_verdict_compares_means_over_the_scenes_that_all_have():
     rows = on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
-    assert near(rows) == ("On 2 unseen motions SNUG's total energy, 5.00 J, is above the simulation's, 3.75.")
+    few = " roll-outs of one seed, which judges no network"
+    said = "On 2 unseen motions SNUG's total energy is 5.00 J, the simulation's 3.75: higher in 2 of 2"
+    assert near(rows) == f"{said}{few}."
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
-    fewer = "On 1 of 2 unseen motions SNUG's total energy, 1.00 J, is above the simulation's, 0.500; "
-    assert near(rows).startswith(fewer + "PBNS has 2.00")
+    fewer = "On 1 of 2 unseen motions SNUG's total energy is 1.00 J, the simulation's 0.500: higher in 1 of 1"
+    assert near(rows).startswith(f"{fewer}{few}; PBNS has 2.00")
     # The reference's twin is no rival, however near it is.
     assert near(rows + on_two_scenes("simulation-perturbed-1e-9", 0.5, 7.0)) == near(rows)
 
@@ -269,7 +271,9 @@ def test_the_verdict_compares_means_over_the_scenes_that_all_have():
 def test_the_verdict_says_how_many_seeds_are_left():
     rows = [*seeds_of("snug", "energy/total", (1.0, 1.2)), row(method="simulation", metric="energy/total")]
     rows.append(row(metric="cost/frame", value=None, seed=2, status="diverged", reason="no end"))
-    assert "1.10 ± 0.14 J (2 of 3 seeds), is as low as" in near(rows)
+    said = near(rows)
+    assert "1.10 ± 0.14 J (2 of 3 roll-outs), the simulation's 1.00: higher in 1 of 2 roll-outs; of" in said
+    assert said.endswith("of other motions and seeds it cannot be told.")
 
 
 def test_run_times_are_of_the_scenes_that_both_have():
@@ -278,7 +282,7 @@ def test_run_times_are_of_the_scenes_that_both_have():
     assert (
         dict(verdict(run))["At what cost"]
         .replace("\u00a0", " ")
-        .startswith("SNUG takes 0.250 ms a frame, the simulation 100: 400 times as long (1 scene only)")
+        .startswith("SNUG takes 0.250 ms a frame, the simulation 100: 400 times as long (1 of 2 roll-outs)")
     )
 
 
@@ -360,11 +364,14 @@ def test_page_one_names_the_worst_of_each_kind():
 
 def test_the_verdict_says_tie_only_within_the_uncertainty():
     def said(snug: float) -> str:
-        rows = seeds_of("snug", "energy/total", (snug, snug + 0.02))
-        return near([*rows, row(method="simulation", metric="energy/total")])
+        rows = seeds_of("snug", "energy/total", (snug, snug + 0.002))
+        others = [row(method="simulation", metric="energy/total", uncertainty=0.02)]
+        return near([*rows, *others, row(method="skinning", metric="energy/total", value=3.0)])
 
-    assert "is as low as the simulation's" in said(0.99)
-    assert "is above the simulation's, 1.00." in said(2.0) and "is below" in said(0.5)
+    assert "the simulation's 1.00 ± 0.020: a tie" in said(0.99)  # of right simulations
+    assert "the simulation's 1.00 ± 0.020: a tie" in said(1.05)  # within 5 % of what skinning has more
+    assert "1.00 ± 0.020: higher in 2 of 2 roll-outs;" in said(2.0)
+    assert ": lower in 2 of 2 roll-outs;" in said(0.5)
 
 
 def test_page_one_shows_the_network_the_best_of_others_and_a_baseline():
@@ -382,7 +389,7 @@ def test_changed_networks_are_networks_where_a_run_has_no_others():
     changed = [dataclasses.replace(r, role="ablation", base="snug") for r in rows[:2]] + rows[2:]
     run = run_of(changed)
     assert leads(run, run.worn) == ["simulation", "snug-springs"]
-    assert "5.00 J, is above the simulation's, 3.75" in near(changed)
+    assert "5.00 J, the simulation's 3.75" in near(changed)
     both = run_of(changed + on_two_scenes("snug", 1.0, 9.0))
     assert leads(both, both.worn) == ["simulation", "snug"]
 

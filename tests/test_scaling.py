@@ -64,22 +64,24 @@ def test_a_study_draws_from_what_was_measured():
     assert study(some, 1, np.random.default_rng(0)) == some
 
 
-def finished(folder: RunFolder, name: str, seconds: float, *, kind=SimulateMotion, failed=False) -> None:
+def finished(
+    folder: RunFolder, name: str, seconds: float, *, kind=SimulateMotion, failed=False, process=""
+) -> None:
     """The entry of a task in the cache, with a file of two megabytes."""
     path = folder.path / f"{name}.bin"
     path.write_bytes(bytes(2_000_000))
-    task = kind(name=name, label=name, inputs={}, modules=(), scene=None, entry=None)  # type: ignore
+    task = kind(name=name, label=name, inputs={}, modules=(), scene=None, entry=None, process=process)
     Cache(folder).keep(task, Outcome(seconds=seconds, failed=failed, files=(path.name,)), {})
 
 
 def test_a_run_is_read_and_tabulated(tmp_path, capsys):
     folder = RunFolder(tmp_path)
-    for name, seconds in (("one", 3.0), ("two", 5.0)):
-        finished(folder, name, seconds)
+    finished(folder, "one", 3.0)
+    finished(folder, "two", 5.0, process="of its own")
     finished(folder, "three", 9.0, failed=True)
     found = scaling.measured(folder)
     assert [(t.stage, t.seconds, t.megabytes, t.timed) for t in found] == [
-        ("ground truth", 3.0, 2.0, False), ("ground truth", 5.0, 2.0, False),
+        ("ground truth", 3.0, 2.0, False), ("ground truth", 5.0, 2.0, True),
     ]  # fmt: skip
     out = tmp_path / "scaling.csv"
     assert scaling.main([str(tmp_path), "--copies", "10", "--workers", "1,4", "-o", str(out)]) == 0
@@ -96,7 +98,7 @@ def test_a_data_set_is_read_too(tmp_path):
     ("options", "words"),
     [
         ([], "no finished task"),
-        (["--kinds", "dta"], "unknown kind of task 'dta'"),
+        (["--kinds", "dta"], "no task of kind 'dta'"),
         (["--workers", "0"], "posi"),
     ],
 )

@@ -213,7 +213,7 @@ def test_a_point_is_of_the_seeds_that_did_every_scene():
     gone = {"value": None, "seed": 1, "status": "diverged", "reason": "no end"}
     rows.append(dataclasses.replace(row(SCENES[1], "snug", "cost/frame", 0.0), **gone))
     (found,) = points_of(run_of(rows), run_of(rows).frame, SCENES, "gap/energy")
-    assert (found.time, found.error, found.fewer) == (2.0, 2.0, " (1 of 2 seeds)")
+    assert (found.time, found.error, found.fewer) == (2.0, 2.0, " (2 of 4 roll-outs)")
 
 
 def test_a_training_without_rivals_has_no_sentence():

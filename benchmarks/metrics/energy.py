@@ -32,22 +32,24 @@ if TYPE_CHECKING:
 FIRST_FULL_FRAME = 2
 
 
-def _energy(term: str, definition: str, title: str = "") -> Metric:
+def _energy(term: str, definition: str, title: str = "", *, arbitrary_zero: bool = False) -> Metric:
     return Metric(
         name=f"energy/{term}", unit="J", title=title or term.capitalize(), definition=definition,
-        table="energies", lower_is_better=True,
+        table="energies", lower_is_better=True, arbitrary_zero=arbitrary_zero,
     )  # fmt: skip
 
 
 METRICS = (
     _energy("strain", "membrane energy of the declared material, mean over frames"),
     _energy("bending", "energy of the hinges, mean over frames"),
-    _energy("gravity", "weight times height above the pelvis's own height at rest, mean over frames"),
+    _energy("gravity", "weight times height above the pelvis in that frame, mean over frames: its zero moves "
+            "with the body", arbitrary_zero=True),
     _energy("inertia", "sum of m / (2 dt^2) |x - 2 x' + x''|^2 over vertices, x' and x'' the method's "
             "own last two frames; mean over frames"),
     _energy("collision", "cubic penalty of vertices, edge midpoints and centroids nearer to the body than "
             "the margin, contact planes searched at the method's own positions; mean over frames"),
-    _energy("total", "sum of all terms that the scene declares, and inertia"),
+    _energy("total", "sum of all terms that the scene declares, and inertia; its zero is that of gravity",
+            arbitrary_zero=True),
     _energy("*", "energy of that term, mean over frames", "{}"),
     Metric(
         name="inertia/correlation", unit="1", title="Inertia with the body's",

@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from ..metric import RollOut
 
 
-def _training(name: str, unit: str, title: str, definition: str) -> Metric:
+def _training(name: str, unit: str, title: str, definition: str, of: str = "answer") -> Metric:
     return Metric(
         name=f"train/{name}", unit=unit, title=title, definition=definition, table="training",
-        lower_is_better=True,
+        lower_is_better=True, of=of,
     )  # fmt: skip
 
 
@@ -28,7 +28,7 @@ METRICS = (
     _training(
         "high_windows", "1", "High windows", "windows above the recipe's limit once the training had settled"
     ),
-    _training("step", "ms", "Step", "time of a training step"),
+    _training("step", "ms", "Step", "time of a training step", "machine"),
 )
 
 

@@ -79,6 +79,8 @@ class Cache:
         outcome = dataclasses.replace(outcome, digests=files, origin={**self.origin, **outcome.origin})
         entry = {
             "task": task.title,
+            "stage": task.stage,
+            "alone": bool(task.process),
             "inputs": sorted(task.inputs),
             "parts": dependencies(task),
             "needs": _needs(task, others),

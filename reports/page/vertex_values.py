@@ -69,7 +69,8 @@ def depth(points: np.ndarray, skin: Obstacle, frame: int) -> np.ndarray:
 
 def skin_of(positions: np.ndarray, faces: np.ndarray) -> Obstacle | None:
     """A body (T,B,3) [m], or (B,3), as a surface with an inside; None where its faces (F,3) do not close."""
-    from reference_sim import MeshError, Obstacle
+    from reference_sim.cloth import MeshError
+    from reference_sim.obstacle import Obstacle
 
     try:
         return Obstacle(positions, faces)
