@@ -22,7 +22,7 @@ FINDINGS = ROOT / "reports" / "published" / "quick" / "tables" / "findings.csv"
 SAID = {"holds": "reproduced", "does not hold": "refuted", "tie": "tie", "cannot be told": "cannot be told"}
 EXTEND = ROOT / "docs" / "extend.md"
 FILE = re.compile(r"File `([^`]+)`:$")
-SHORT = ("A method", "A scene", "A metric", "A package")
+SHORT = ("A method", "A network from elsewhere", "A scene", "A metric", "A package")
 LONG = (
     "How to add something",
     "A program",
@@ -90,6 +90,9 @@ def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
         total = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/total"}
         # In n frames backward Euler falls (n + 1) / n times as far.
         assert total["explicit-200"] == pytest.approx(total["simulation"], rel=0.2)
+    if title == "A network from elsewhere":
+        skinned = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/strain"}
+        assert skinned["pose-network"] > skinned["skinning"] > 0.0  # the same but for smoothed weights
     if title == "A program":
         off = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "exact/distance"}
         assert methods == {"simulation", "fall"} and max(off.values()) < 1e-9
@@ -126,11 +129,14 @@ def table_rows(path: Path) -> list[list[str]]:
     return [[cell.strip() for cell in line[1:-1].split("|")] for line in lines if line.startswith("|")]
 
 
-def effect_text(kind: str, text: str) -> str:
-    """As docs/paper.md writes it: a ratio in two places, or two digits where it is small; whole points."""
+def effect_text(kind: str, metric: str, text: str) -> str:
+    """As docs/paper.md writes it: a ratio in two places, or two digits where it is small; whole points;
+    other differences in two places, or three below 1.
+    """
     value = float(text)
     if kind == "difference":
-        return f"{value:.0f}"
+        places = 0 if "%" in metric else 2 if abs(value) >= 1.0 else 3
+        return re.sub(r"^(-?)0\.", r"\1.", f"{value:.{places}f}")
     return (f"{value:.2f}" if value >= 0.1 else f"{value:.2g}").removeprefix("0")
 
 
@@ -147,7 +153,8 @@ def test_the_page_of_the_paper_says_what_the_published_findings_say():
     judged = [row for row in table_rows(PAPER) if row[-1] == "findings"]
     for found in published:
         effect, low, high = (
-            effect_text(found["effect_kind"], found[name]) for name in ("effect", "effect_low", "effect_high")
+            effect_text(found["effect_kind"], found["metric"], found[name])
+            for name in ("effect", "effect_low", "effect_high")
         )
         verdict, words = SAID[found["verdict"]], f"{effect} ({low} to {high})"
         assert any(row[1] == verdict and words in row[2] for row in judged), f"{verdict}: {words}"
