@@ -29,12 +29,14 @@ def row(metric: str, value: float | None, unit: str = "J", **fields) -> Row:
     return Row(suite="garments", scene="tshirt/kick", metric=metric, unit=unit, value=value, **given)
 
 
+class Run(Task):
+    kind = "cell"
+    stage = "cells"
+
+
 def cell(name: str, machine: str, **inputs) -> Task:
     given = {"scene": "kick", "machine": machine, **inputs}
-    return Task(name=name, label=name, inputs=given, modules=("benchmarks.json_file",))
-
-
-Task.kind = "cell"  # a task without a kind is no task of a run
+    return Run(name=name, label=name, inputs=given, modules=("benchmarks.json_file",))
 
 
 @pytest.fixture
