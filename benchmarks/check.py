@@ -7,7 +7,6 @@ import dataclasses
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,7 +107,7 @@ def check(
     from .assets import embedded_motions, open_assets
     from .runner.cache import Cache
     from .runner.executor import LocalExecutor
-    from .runner.loop import Runner
+    from .runner.loop import NoLog, Runner
     from .runner.schedule import Schedule
 
     plan = plan_of(declared, folder)
@@ -124,7 +123,7 @@ def check(
     of_methods = dataclasses.replace(plan, cells=tuple(c for c in plan.cells if c.entry.declared_in))
     before = [t for t in Schedule(of_methods).tasks() if t.stage in ("ground truth", "training")]
     runner = Runner(before, Cache(run))
-    runner.run(LocalExecutor(run, assets, 1), _Quiet())
+    runner.run(LocalExecutor(run, assets, 1), NoLog())
     executor = LocalExecutor(run, assets, 1)
     try:
         hung = set[str]()
@@ -135,13 +134,6 @@ def check(
                 yield lines, fine
     finally:
         executor.close()
-
-
-class _Quiet:
-    """Where nobody follows the stages."""
-
-    def stage(self, name: str) -> AbstractContextManager[None]:
-        return nullcontext()
 
 
 def plan_of(declared: dict[str, list[Any]], folder: Path) -> Plan:

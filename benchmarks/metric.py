@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from .results import as_right
+from .results import USABLE, as_right
 
 if TYPE_CHECKING:
     from reference_sim import Trajectory
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from .scene import BuiltScene
 
 Made = TypeVar("Made")
-WHOLE = ("ok", "stalled")  # statuses of cells that came to their last frame
 NUMBERS_OF = ("answer", "method", "machine")
 COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what others are measured beside
 
@@ -169,7 +168,7 @@ class SceneRollOuts(Kept):
         for roll_out in self.roll_outs:
             entry = roll_out.entry
             fits = entry.role == role and family in (None, entry.family) and level in (None, entry.level)
-            if fits and roll_out.status in WHOLE:
+            if fits and roll_out.status in USABLE:
                 return roll_out
         return None
 

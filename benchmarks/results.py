@@ -21,13 +21,9 @@ from .json_file import ResultsError, check_config, read_json
 
 FORMAT = 3  # of run.json, results.csv and the cache; written into run.json
 OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
+USABLE = ("ok", "stalled")  # statuses of cells that came to their last frame: their numbers count
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
 
-COLUMNS = (
-    "suite", "scene", "method", "seed", "metric", "unit", "value", "status", "reason", "expected",
-    "tolerance", "uncertainty", "preset", "commit", "hardware", "dtype", "threads", "terms", "garment",
-    "motion", "part", "family", "level", "role", "base", "seeded", "pairing_group",
-)  # fmt: skip
 # In this order methods stand in a report.
 ROLES = (
     "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
@@ -108,7 +104,8 @@ class Row:
         return self.status in ("ok", "skipped")
 
 
-_OPTIONAL_NUMBERS = ("value", "expected", "tolerance", "uncertainty", "level")
+COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
+OPTIONAL_NUMBERS = ("value", "expected", "tolerance", "uncertainty", "level")
 _WHOLE_NUMBERS = ("seed", "threads")
 _TRUTHS = {"true": True, "false": False}
 _NAMES = ("suite", "scene", "method", "metric", "garment", "motion", "part", "family", "role", "base")
@@ -122,7 +119,7 @@ def row_to_cells(row: Row) -> dict[str, str]:
         value = getattr(row, name)
         if value is None:
             cells[name] = ""
-        elif name in _OPTIONAL_NUMBERS:
+        elif name in OPTIONAL_NUMBERS:
             cells[name] = repr(float(value))
         elif isinstance(value, bool):
             cells[name] = str(value).lower()
@@ -135,7 +132,7 @@ def cells_to_row(cells: dict[str, str]) -> Row:
     """The row written in the cells. Raises ResultsError for one that is no number, or name, as it should."""
     values: dict[str, Any] = dict(cells)
     try:
-        for name in _OPTIONAL_NUMBERS:
+        for name in OPTIONAL_NUMBERS:
             values[name] = float(cells[name]) if cells[name] else None
         for name in _WHOLE_NUMBERS:
             values[name] = int(cells[name])

@@ -84,7 +84,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
         line = str(error) if isinstance(error, RunStopped) else disk_full(error)
         if not line:
             raise
-        print(f"{PROGRAM}: {line}; the same command goes on from there", file=sys.stderr)
+        print(f"{program}: {line}; the same command goes on from there", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print(f"{program}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)

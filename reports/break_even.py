@@ -59,26 +59,26 @@ def frames_text(frames: float) -> str:
     return number(float(f"{frames:.1e}"), 6, trim=True)
 
 
-def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str], network: str = NETWORK) -> dict[str, str]:
-    """Solvers a network competes with: method -> why, the converged one and the fastest as accurate as it."""
+def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> dict[str, str]:
+    """Solvers that SNUG competes with: method -> why, the converged one and the fastest as accurate as it."""
     found = {run.reference: "converged"} if mean_of(frame, run.reference, TIME, scenes) else {}
     for metric, words in ACCURACIES:
         points = points_of(run, frame, scenes, metric)
-        own = next((p for p in points if p.method == network), None)
+        own = next((p for p in points if p.method == NETWORK), None)
         best = fastest(solvers(run, points), own.error) if own else None
         if best is not None and best.method != run.reference:
             found[best.method] = f"{found[best.method]} and {words}" if best.method in found else words
     return found
 
 
-def compared_scenes(run: Run, frame: pd.DataFrame, network: str = NETWORK) -> dict[str, list[str]]:
-    """Garment -> the scenes in which the network was timed beside a truncated solver.
+def compared_scenes(run: Run, frame: pd.DataFrame) -> dict[str, list[str]]:
+    """Garment -> the scenes in which SNUG was timed beside a truncated solver.
 
     Those of suite speed where there are any: whole motions have no energy gap.
     """
     timed = frame[frame["usable"] & (frame["metric"] == TIME) & (frame["garment"] != "")]
     levels = {name for name, method in run.methods.items() if method.level is not None}
-    both = set(timed[timed["method"] == network]["scene"]) & set(timed[timed["method"].isin(levels)]["scene"])
+    both = set(timed[timed["method"] == NETWORK]["scene"]) & set(timed[timed["method"].isin(levels)]["scene"])
     rows = timed[timed["scene"].isin(both)]
     of_speed = rows[rows["suite"] == "speed"]
     return run.garments(of_speed if len(of_speed) else rows)

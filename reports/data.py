@@ -8,10 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.results import COLUMNS, ROLES, Row, as_right
+from benchmarks.results import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row, as_right
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
-USABLE = ("ok", "stalled")
 SUITES = ("garments", "speed", "validation", "extremes", "shapes", "performance")
 
 
@@ -129,8 +128,7 @@ def run_data(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[s
     frame = pd.DataFrame.from_records(
         [[getattr(row, name) for name in COLUMNS] for row in rows], columns=list(COLUMNS)
     )
-    numbers = [name for name in ("value", "expected", "tolerance", "level", "uncertainty") if name in frame]
-    frame[numbers] = frame[numbers].astype(float)
+    frame[list(OPTIONAL_NUMBERS)] = frame[list(OPTIONAL_NUMBERS)].astype(float)
     finite = frame["value"].abs() < float("inf")
     frame["usable"] = frame["status"].isin(USABLE) & finite
     declared = config.get("metrics") or {}

@@ -68,7 +68,7 @@ def document(
     }  # fmt: skip
     return {
         "title": "Neural garments beside a converged solver",
-        "subtitle": _subtitle(run.config),
+        "subtitle": subtitle(run.config),
         "first": {
             "changed": changed(run),
             "size": _size(run.config),
@@ -136,7 +136,8 @@ def _side_by_side(config: Mapping[str, Any]) -> str:
     return f"{together}, one thread each."
 
 
-def _subtitle(config: Mapping[str, Any]) -> str:
+def subtitle(config: Mapping[str, Any]) -> str:
+    """Preset, commit and day of a run."""
     parts = [f"preset {config['preset']}"] if config.get("preset") else []
     parts += [f"commit {config['commit']}"] if config.get("commit") else []
     parts += [str(config["started"])[:10]] if config.get("started") else []

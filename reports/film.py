@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.results import ResultsError, RunFolder, replacing
+from reports.render import camera_axes, vertex_normals
 
 if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
@@ -29,7 +30,6 @@ CLOTH, BODY, PAPER, INK = "#D9694A", "#CFC9C2", "#F4F2EE", (40, 40, 40)
 PER_ROW = 4
 TALL = 1.25  # height of a view over its width
 ANGLE = 18.0  # [degrees] of the perspective, over the height of a view
-ABOVE = 8.0  # [degrees] that the camera looks down
 SMOOTHED = 0.6  # [s] over which the camera's path is smoothed
 MARGIN = 1.25  # around the garment
 SWATCH = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).screenshot()"
@@ -43,7 +43,7 @@ class Stage:
         from vtkmodules.vtkCommonCore import vtkLogger
 
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # that there is no screen
-        self.kept, self.axes = kept, camera_axes(azimuth)
+        self.kept, self.axes = kept, camera_axes(-azimuth)
         self.width, self.height = width - width % 2, round(width * TALL / 2) * 2
         size = [self.width, self.height]
         self.plotter: Any = pyvista.Plotter(off_screen=True, window_size=size, lighting="none")
@@ -91,27 +91,7 @@ class Stage:
 
 def _move(mesh, positions: np.ndarray, frame: int) -> None:
     mesh.points = positions[min(frame, len(positions) - 1)].astype(np.float32)
-    mesh.point_data.active_normals = vertex_normals(mesh.points, mesh.regular_faces)
-
-
-def vertex_normals(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Unit normals (V,3) of points (V,3) and faces (F,3), by area; of a vertex without any, zero."""
-    corners = points[faces].astype(float)
-    of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    around = [
-        np.bincount(faces.ravel(), np.repeat(of_faces[:, k], 3), minlength=len(points)) for k in range(3)
-    ]
-    normals = np.stack(around, axis=1)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return (normals / np.maximum(length, np.finfo(float).tiny)).astype(np.float32)
-
-
-def camera_axes(azimuth: float) -> np.ndarray:
-    """(3,3): right, up and towards the camera as columns; azimuth [degrees] from +z to +x."""
-    turn, lift = np.radians((azimuth, ABOVE))
-    towards = np.array([np.sin(turn) * np.cos(lift), np.sin(lift), np.cos(turn) * np.cos(lift)])
-    right = np.array([np.cos(turn), 0.0, -np.sin(turn)])
-    return np.stack([right, np.cross(towards, right), towards], axis=1)
+    mesh.point_data.active_normals = vertex_normals(mesh.points.astype(float), mesh.regular_faces)
 
 
 def camera_path(kept: Kept, axes: np.ndarray) -> tuple[np.ndarray, float]:

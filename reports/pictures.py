@@ -24,6 +24,7 @@ DOTS = 200  # of a picture in an inch
 FRONT, BACK = -25.0, 155.0  # turns of the camera [degrees]
 BAR, NAME, SIDE = 0.62, 0.24, 0.2  # inches for a scale, a line of words and words at the side
 FULL = 97.0  # percentile of the values of the worst method: it has the darkest colour
+STRIP = 6  # frames side by side
 NOTHING = 1e-6  # of a scale's unit: what is less everywhere is not shown
 INERTIA = "energy/inertia"
 
@@ -233,13 +234,11 @@ def _not_shown(filmed: Filmed, methods: Sequence[str]) -> dict[str, list[str]]:
     }
 
 
-def strip(
-    folder: Path, run: Run, filmed: Filmed, methods: Sequence[str], columns: int = 6, spare: bool = False
-) -> Picture:
+def strip(folder: Path, run: Run, filmed: Filmed, methods: Sequence[str], spare: bool = False) -> Picture:
     """Frames of a motion, evenly spread, a row for each method; spare: to fill a page."""
     frames = min(filmed.series[method].frames for method in methods)
-    chosen = np.unique(np.linspace(frames // 5, frames - 1, columns).astype(int))
-    wide = (PAGE_WIDTH - SIDE) / columns
+    chosen = np.unique(np.linspace(frames // 5, frames - 1, STRIP).astype(int))
+    wide = (PAGE_WIDTH - SIDE) / STRIP
     tile = (wide, 1.05 * wide)
     seen = [shots(filmed, methods, int(frame), FRONT, tile) for frame in chosen]
     times = filmed.series[methods[0]].times

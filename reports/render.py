@@ -17,6 +17,7 @@ CLOTH_COLOUR = (0.72, 0.33, 0.22)  # mid-tone: folds show in both directions, in
 KEY, FILL = np.array([-0.78, 0.42, 0.46]), np.array([0.7, 0.1, 0.7])  # lights: right, up, towards
 LIFT = 0.012  # [m] that cloth is nearer: a coarse triangle cuts through the skin between its corners
 SAMPLES = 2  # of a pixel along each axis
+ABOVE = 8.0  # [degrees] that the camera looks down
 CREASE = 0.008  # [m] below its surroundings at which a fold is at its darkest
 
 
@@ -32,11 +33,12 @@ class Camera:
 
     def seen(self, positions: np.ndarray) -> np.ndarray:
         """(V,3) [m] -> (V,3): right, up and towards the camera, from the middle of the picture [m]."""
-        return (positions - self.centre) @ _axes(self.turn)
+        return (positions - self.centre) @ camera_axes(self.turn)
 
 
-def _axes(turn: float) -> np.ndarray:
-    side, lift = np.radians(-turn), np.radians(8.0)
+def camera_axes(turn: float) -> np.ndarray:
+    """(3,3): right, up and towards the camera as columns; turned from +z to -x [degrees]."""
+    side, lift = np.radians(-turn), np.radians(ABOVE)
     towards = np.array([np.sin(side) * np.cos(lift), np.sin(lift), np.cos(side) * np.cos(lift)])
     right = np.array([np.cos(side), 0.0, -np.sin(side)])
     return np.stack([right, np.cross(towards, right), towards], axis=1)
@@ -44,10 +46,10 @@ def _axes(turn: float) -> np.ndarray:
 
 def camera_for(positions: Sequence[np.ndarray], turn: float, tall: float) -> Camera:
     """One that just sees all of these (V,3) [m], in a picture `tall` times as high as wide."""
-    seen = np.concatenate(positions) @ _axes(turn)
+    seen = np.concatenate(positions) @ camera_axes(turn)
     low, high = seen.min(axis=0), seen.max(axis=0)
     width, height = (high - low)[:2]
-    return Camera(_axes(turn) @ ((low + high) / 2.0), 1.06 * float(max(height, width * tall)), turn)
+    return Camera(camera_axes(turn) @ ((low + high) / 2.0), 1.06 * float(max(height, width * tall)), turn)
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ def _paint(
     np.maximum.at(depth, pixels, near)
     kept = near == depth[pixels]
     pixels, corners, weights = pixels[kept], surface.faces[faces[kept]], weights[kept, :, None]
-    normals = (weights * _normals(seen, surface.faces)[corners]).sum(axis=1)
+    normals = (weights * vertex_normals(seen, surface.faces)[corners]).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
     key, fill = (np.clip(normals @ (light / np.linalg.norm(light)), 0.0, 1.0) for light in (KEY, FILL))
@@ -128,8 +130,8 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     return y * w + x, seen[own], np.stack([weight[kept] for weight in weights], axis=1)
 
 
-def _normals(seen: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V,3) of vertices, by the areas of their faces."""
+def vertex_normals(seen: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit normals (V,3) of vertices, by the areas of their faces; of one without any, zero."""
     corners = seen[faces]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     found = np.stack(

@@ -15,6 +15,7 @@ from reports.data import Run
 from reports.means import mean_of
 from reports.numbers import number, with_spread
 from reports.overview import leads
+from reports.page.roll_outs import rest_areas
 from reports.pictures import Failure, Filmed
 from reports.plotting import Picture
 from reports.styles import leading
@@ -66,11 +67,7 @@ def film(folder: RunFolder, run: Run, rows: pd.DataFrame, methods: Iterable[str]
     asked = {method: read(folder.trajectory_path(scene, method, int(seeds[method]))) for method in methods}
     series = {method: cloth for method, cloth in asked.items() if cloth is not None}
     body = read(folder.trajectory_path(scene, "body")) if series else None
-    try:
-        rest = np.load(folder.rest_areas_path(scene))
-    except (OSError, ValueError):
-        rest = None
-    return Filmed(scene, series, body, rest)
+    return Filmed(scene, series, body, rest_areas(folder.rest_areas_path(scene)))
 
 
 def said_below(run: Run, rows: pd.DataFrame, method: str) -> str:

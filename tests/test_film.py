@@ -14,6 +14,7 @@ from benchmarks.results import RunFolder
 from reference_sim import Trajectory
 from reports import film
 from reports.kept import Kept
+from reports.render import camera_axes, vertex_normals
 
 SCENE = "tshirt/walk"
 DRAWS = subprocess.run([sys.executable, "-c", film.SWATCH], capture_output=True).returncode == 0
@@ -96,18 +97,18 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
     walk = np.cumsum(rng.normal(0.0, 0.2, (40, 1, 3)), axis=0)
     one, other = (walk[:n] + rng.normal(0.0, 0.4, (n, 30, 3)) for n in (40, 25))
     for azimuth in (0.0, 25.0, 180.0, -90.0):
-        axes = film.camera_axes(azimuth)
+        axes = camera_axes(azimuth)
         assert axes.T @ axes == pytest.approx(np.eye(3), abs=1e-12) and np.linalg.det(axes) > 0.0
         centres, half = film.camera_path(kept_of(one, other), axes)
         for cloth in (one, np.concatenate([other, np.repeat(other[-1:], 15, axis=0)])):
             seen = (cloth - centres[:, None]) @ axes
             assert np.abs(seen[..., 1]).max() <= half and np.abs(seen[..., 0]).max() <= half / film.TALL
-    front = film.camera_axes(0.0)
+    front = camera_axes(0.0)
     assert front[:, 0] == pytest.approx([1.0, 0.0, 0.0]) and front[2, 2] > 0.95  # the body faces +z
 
 
 def test_a_single_frame_has_a_camera():
-    centres, half = film.camera_path(kept_of(np.eye(3)[None]), film.camera_axes(25.0))
+    centres, half = film.camera_path(kept_of(np.eye(3)[None]), camera_axes(25.0))
     assert centres.shape == (1, 3) and half > 0.0
 
 
@@ -115,9 +116,9 @@ def test_normals_of_a_sphere_point_outwards():
     import pyvista
 
     ball = pyvista.Icosphere(radius=2.0, nsub=2)
-    normals = film.vertex_normals(ball.points, ball.regular_faces)
+    normals = vertex_normals(ball.points, ball.regular_faces)
     assert normals == pytest.approx(ball.points / 2.0, abs=0.02)
-    assert np.all(film.vertex_normals(np.zeros((3, 3)), np.array([[0, 1, 2]])) == 0.0)
+    assert np.all(vertex_normals(np.zeros((3, 3)), np.array([[0, 1, 2]])) == 0.0)
 
 
 @pytest.mark.parametrize(

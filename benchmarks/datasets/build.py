@@ -6,7 +6,6 @@ import argparse
 import shlex
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +27,7 @@ from ..run import WORKERS, choose_body, choose_garment, choose_states, split
 from ..runner.cache import Cache
 from ..runner.execution import executor_of
 from ..runner.lock import held
-from ..runner.loop import Runner
+from ..runner.loop import NoLog, Runner
 from ..runner.schedule import Schedule
 from ..scenes import of_garment
 from ..tasks.sequence import SimulateSequence
@@ -65,20 +64,13 @@ def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
         kept = before.sequences if before else ()
         DataSet(plan.folder, settings, _lines(tasks, {}, kept), commands).write()
         try:
-            runner.run(executor_of(plan, folder, assets), _Stages())
+            runner.run(executor_of(plan, folder, assets), NoLog())
         finally:
             found = DataSet(plan.folder, settings, _lines(tasks, runner.known(), kept), commands)
             found.write()
     if runner.reused:
         print(f"{len(runner.reused)} sequences were there", file=sys.stderr)
     return found
-
-
-class _Stages:
-    """There is one stage, and the bar tells of it."""
-
-    def stage(self, name: str) -> nullcontext[None]:
-        return nullcontext()
 
 
 def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, Any]:

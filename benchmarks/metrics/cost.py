@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..metric import Metric
-
-if TYPE_CHECKING:
-    from ..metric import RollOut
 
 
 def _cost(name: str, unit: str, title: str, definition: str, table: str = "cost") -> Metric:
@@ -43,8 +40,3 @@ METRICS = (
     _size("memory", "MB", "Memory", "size of the network", table="cost", lower_is_better=True),
     _cost("peak", "MB", "Process", "most memory of the method's process until its run had ended"),
 )  # fmt: skip
-
-
-def measure(roll_out: RollOut) -> dict[str, float]:
-    """Nothing: a roll-out does not know what it has cost."""
-    return {}

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..metric import Metric
-
-if TYPE_CHECKING:
-    from ..metric import RollOut
 
 
 def _training(name: str, unit: str, title: str, definition: str, of: str = "answer") -> Metric:
@@ -30,8 +25,3 @@ METRICS = (
     ),
     _training("step", "ms", "Step", "time of a training step", "machine"),
 )
-
-
-def measure(roll_out: RollOut) -> dict[str, float]:
-    """Nothing: a roll-out does not know how it was trained."""
-    return {}

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..performance.microbenchmark import SUITE
-from ..results import Row
+from ..results import USABLE, Row
 from ..rows import DECLARED, NOT_FALLING, SPREAD
 
 COLUMNS = (
@@ -23,16 +22,17 @@ COLUMNS = (
 )
 DASH = "-"
 FEWER = "*"
+MEANS = ("garments", "speed")  # suites of which the methods' means are shown; of others, counts of endings
 
 
 def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
     """Means over scenes and seeds of each suite and method; counts of checks and cases; stage times."""
     parts = []
-    for suite in ("garments", "speed"):
+    for suite in MEANS:
         of_suite = [row for row in rows if row.suite == suite]
         for title, kept in _groups(suite, of_suite):
             parts.append(_table(title, kept))
-    for suite in ("validation", "extremes", SUITE):
+    for suite in dict.fromkeys(row.suite for row in rows if row.suite not in MEANS):
         kept = [row for row in rows if row.suite == suite]
         if kept:
             counts = {s: sum(row.status == s for row in kept) for s in dict.fromkeys(r.status for r in kept)}
@@ -81,7 +81,7 @@ def _table(title: str, rows: list[Row]) -> str:
     values: dict[tuple[str, str], list[float]] = {}
     scenes: dict[str, set[str]] = {}
     for row in rows:
-        if row.value is not None and row.status in ("ok", "stalled"):
+        if row.value is not None and row.status in USABLE:
             values.setdefault((row.method, row.metric), []).append(row.value)
             scenes.setdefault(row.metric, set()).add(row.scene)
     seeds = {method: len({row.seed for row in rows if row.method == method}) for method in methods}

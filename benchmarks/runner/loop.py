@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from itertools import groupby
 from typing import Any, Protocol
 
@@ -24,6 +24,13 @@ class Log(Protocol):
 
     def stage(self, name: str) -> AbstractContextManager[None]:
         """Around all tasks of a stage."""
+
+
+class NoLog:
+    """Where nobody follows the stages."""
+
+    def stage(self, name: str) -> AbstractContextManager[None]:
+        return nullcontext()
 
 
 class Runner:

@@ -100,7 +100,7 @@ def measured(
             module = load(name) if name in outside else modules()[name]
             suites = getattr(module, "SUITES", roll_out.suites)
             if any(suite in suites for suite in roll_out.suites):
-                values = module.measure(roll_out)
+                values = module.measure(roll_out) if hasattr(module, "measure") else {}
                 if hasattr(module, "compare"):
                     values |= compared(roll_out, module.compare)
                 metrics |= {find_metric(metric, outside).name: value for metric, value in values.items()}

@@ -69,7 +69,7 @@ def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
         body = read(folder.trajectory_path(group.scene, "body"))
         skin = skin_of(body.positions, body.faces) if body else None
         depths = _depths(cloths, skin) if skin else {}
-        rest = _rest_areas(folder.rest_areas_path(group.scene))
+        rest = rest_areas(folder.rest_areas_path(group.scene))
         for method, cloth in cloths.items():
             scene = dict(found.scenes.get(group.scene) or {"body": None, "methods": {}})
             texts: dict[str, str] = {}
@@ -146,7 +146,7 @@ def _comparable(cloth: Trajectory, reference: Trajectory) -> bool:
     return same and np.allclose(cloth.times, reference.times[: cloth.frames])
 
 
-def _rest_areas(path: Path) -> np.ndarray | None:
+def rest_areas(path: Path) -> np.ndarray | None:
     """(F,) [m^2]; None where there are none to be read, and the page then offers no change of area."""
     try:
         return np.load(path)

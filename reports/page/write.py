@@ -13,6 +13,7 @@ from typing import Any
 
 from benchmarks.results import RunFolder, replacing
 from reports.data import Run
+from reports.document import subtitle
 from reports.page.choice import BUDGET, RULE
 from reports.page.content import methods_of, plots_of, tables_of, trouble_of
 from reports.page.pack import deflated
@@ -62,17 +63,13 @@ def _page(
     script = f"'use strict';(() => {{\n{code}}})();"
     data = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     blobs = {"content": deflated(data.encode()), **embedded.texts}
-    config = run.config
-    said = [("preset", config.get("preset")), ("commit", config.get("commit"))]
-    parts = [f"{name} {value}" for name, value in said if value]
-    parts += [str(config["started"])[:10]] if config.get("started") else []
     template = string.Template((HERE / "page.html").read_text(encoding="utf-8"))
     return template.substitute(
         style=style,
         script=script,
         style_hash=_hash(style),
         script_hash=_hash(script),
-        subtitle=html.escape(" · ".join(parts)),
+        subtitle=html.escape(subtitle(run.config)),
         trouble=_trouble(run, tables, problems),
         left_out=html.escape(embedded.left_out(RULE)),
         blobs="\n".join(
