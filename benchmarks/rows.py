@@ -122,7 +122,8 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
     """What clock and process give: cost/frame and its percentiles, cost/whole, cost/batch [ms], cost/spread
     [%], cost/peak [MB]; and a remark on what did not go well.
 
-    Each is the median of the repeats; a frame's time is that of the whole run over the frames computed.
+    Times are medians of the repeats, but for those of inputs; these and the peak are of the first run. A
+    frame's time is that of the whole run over the frames computed.
     """
     first, remark = outcomes["cell", cell.name], ""
     batch = outcomes.get(("batch", cell.name), Outcome("skipped"))

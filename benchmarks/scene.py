@@ -105,6 +105,11 @@ class Dressed:
     betas: np.ndarray | None = None
     before: Motion | None = None
 
+    @property
+    def pelvis(self) -> np.ndarray:
+        """(T,3) [m] of the posed root joint."""
+        return self.body.joints(self.betas)[0] + self.motion.translations
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BuiltScene:

@@ -98,7 +98,7 @@ def _of_motion(folder: Path, run: Run, filmed: Filmed, few: list[str]) -> list[P
 def _failures(folder: RunFolder, run: Run, read: Reader) -> list[Picture]:
     """The networks with most strain over the simulation's, where their roll-outs are on disk."""
     found: list[Failure] = []
-    for method, scene, strain, ratio in overstretched(run):
+    for method, scene, _, strain, ratio in overstretched(run):
         if len(found) == WORST or sum(failure.method == method for failure in found) == OF_ONE:
             continue
         rows = run.frame[run.frame["scene"] == scene]

@@ -154,7 +154,8 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
     if frames and min(frames) <= FIRST_FULL_FRAME:
         raise ValueError(f"scene {scene.name}: a law needs {FIRST_FULL_FRAME + 1} frames, not {min(frames)}")
     own = [Potential(own_terms(scene)) for _ in trajectories]
-    pivots = _pelvis(scene)
+    # Angular momentum is taken about the pelvis, or the origin where there is no body.
+    pivots = np.zeros((scene.frames, 3)) if scene.dressed is None else scene.dressed.pelvis
     found: list[list[tuple[float, ...]]] = [[] for _ in trajectories]
     # From the first step on, as a solver: an obstacle's search tree covers what it has been asked about, and
     # where two of its faces are equally near, the tree decides between them.
@@ -199,10 +200,3 @@ def _one_step(
         float(np.abs(per_vertex).max()),
         float(np.sqrt((per_vertex**2).mean())),
     )
-
-
-def _pelvis(scene: BuiltScene) -> Floats:
-    """(T,3) [m] where angular momentum is taken about; the origin, where there is no body."""
-    if scene.dressed is None:
-        return np.zeros((scene.frames, 3))
-    return scene.dressed.body.joints(scene.dressed.betas)[0] + scene.dressed.motion.translations

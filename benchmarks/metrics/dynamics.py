@@ -80,10 +80,10 @@ def hem_motion(reference: RollOut) -> HemMotion | None:
         return None
     from snug.skeleton import rotation_matrices
 
-    body, motion = dressed.body, dressed.motion
+    motion = dressed.motion
     return HemMotion(
         axes=rotation_matrices(motion.poses[:, 0]),
-        origins=body.joints()[0] + motion.translations,
+        origins=dressed.pelvis,
         stop=stop_frame(motion.poses, motion.translations),
         hem=dressed.garment.hem,
         simulated=reference.positions,
