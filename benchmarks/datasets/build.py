@@ -184,8 +184,8 @@ def _line(name: str, outcome: Outcome) -> SimulatedSequence:
     if outcome.failed or not outcome.files:
         return SimulatedSequence(name, status=outcome.status, **told)
     trajectory, motion, vertices = outcome.files
-    status, _, reason = outcome.result["ending"].partition(": ")
+    result = outcome.result
     return SimulatedSequence(
-        name, trajectory, motion, vertices, outcome.digests, outcome.result["frames"], status,
-        usable=outcome.result["whole"], **told | {"reason": reason},
+        name, trajectory, motion, vertices, outcome.digests, result["frames"], result["status"],
+        usable=result["whole"], **told | {"reason": result["reason"]},
     )  # fmt: skip

@@ -99,7 +99,8 @@ class SimulateMotion(Task):
         result = {
             "frames": trajectory.frames,
             "whole": trajectory.frames == scene.frames,
-            "ending": f"{trajectory.status}: {trajectory.reason}",
+            "status": trajectory.status,
+            "reason": trajectory.reason,
             "converged": trajectory.status == "converged",
         }
         return Outcome(result=result, files=(context.folder.relative(path),))

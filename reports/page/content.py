@@ -120,9 +120,8 @@ def trouble_of(run: Run, tables: Mapping[str, Table]) -> tuple[str, bool, list[s
     order = [*(status for status in WRONG if status in counts), *(s for s in counts.index if s not in WRONG)]
     text = ", ".join(f"{counts[status]} {MEANING.get(status, status)}" for status in order)
     lines = []
-    for line in merged(tables["unfinished"], ("suite", "scene")).rows:
-        own = dict(zip(names, line))
+    ended = (dict(zip(names, line)) for line in merged(tables["unfinished"], ("suite", "scene")).rows)
+    for own in sorted(ended, key=lambda own: order.index(own["status"])):
         label = run.label(str(own["method"]))
         lines.append(f"{own['status']}: {label}, seed {own['seed']}, {own['scene']}: {own['reason']}")
-    lines.sort(key=lambda said: order.index(said.partition(":")[0]))
     return f"Not every cell ended well: {text}.", any(status in counts for status in WRONG), lines
