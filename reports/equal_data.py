@@ -77,22 +77,27 @@ def error_against_frames(folder: Path, run: Run) -> list[Picture]:
     figure = new_figure(PAGE_WIDTH, 2.6)
     looks = {family: family_style(run, run.methods[_first(run, shown, family)]) for family in families}
     for axes, metric in zip(np.atleast_1d(figure.subplots(1, len(metrics))), metrics):
+        level, declared = value_of(rows, run.reference, metric), run.metrics[metric]
+        zero = level if declared.arbitrary_zero and level is not None else 0.0
+        lowest = np.inf
         for family, look in looks.items():
             means = [
                 (value_of(rows, name, FRAMES), mean_of(rows, name, metric))
                 for name in shown
                 if run.methods[name].family == family
             ]
-            points = [(x, mean.value, mean.spread or 0.0) for x, mean in means if x and mean]
+            points = [(x, mean.value - zero, mean.spread or 0.0) for x, mean in means if x and mean]
             if points:
                 x, y, spread = zip(*points)
+                lowest = min(lowest, *y)
                 axes.errorbar(x, y, spread, color=look.colour, marker=look.marker, linestyle=look.line,
                     markersize=4, capsize=2)  # fmt: skip
-        if (level := value_of(rows, run.reference, metric)) is not None:
+        if level is not None and not zero:
             axes.axhline(level, color=style(run, run.reference).colour, linewidth=0.9, linestyle="--")
-        axes.set(xlabel="training frames", ylabel=run.metrics[metric].heading)
+        above = " above the simulation's" if zero else ""
+        axes.set(xlabel="training frames", ylabel=f"{declared.title}{above} [{declared.unit}]")
         log_axis(axes, "x")
-        if metric == DRAWN[0]:
+        if metric == DRAWN[0] and lowest > 0.0:
             log_axis(axes, "y")
         grid(axes)
     legend_above(figure, list(looks.values()), lines=False)
