@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import operator
 import os
+import sys
 import time
 
 import pytest
 
-from benchmarks.runner.process import IsolatedProcess, WorkerDied
+from benchmarks.runner.process import LOADED_BY_ALL, IsolatedProcess, WorkerDied
 
 
 def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():
@@ -30,3 +31,15 @@ def test_a_process_that_cannot_start_is_none_at_all():
         for _ in range(2):
             with pytest.raises(Exception, match="lambda"):
                 process.call(operator.mul, 2, 4, seconds=1)
+
+
+def loaded(names):
+    return [name for name in names if name in sys.modules]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere each process loads its own")
+def test_a_process_begins_with_what_all_need_and_nothing_that_a_scene_may_do_without():
+    assert "torch" not in LOADED_BY_ALL
+    with IsolatedProcess() as process:
+        names = [*LOADED_BY_ALL, "torch", "igl", "snug", "reports"]
+        assert process.call(loaded, names, seconds=60) == list(LOADED_BY_ALL)
