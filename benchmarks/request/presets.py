@@ -32,7 +32,7 @@ class Preset:
     again to know the gap to its minimum. least_seconds [s]: of run time to be measured of each timed cell,
     whose short run is done again until then. repeats: times that a cell of suite speed is run, those whose
     first run took at most repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended
-    [s].
+    [s]. smallest: whether of cases, microbenchmarks and hard motions only those run that are marked for it.
     """
 
     name: str
@@ -56,6 +56,7 @@ class Preset:
     cell_seconds: float
     dependence: Dependence
     further: bool = False
+    smallest: bool = False
 
     def steps_of(self, training: str, kind: str) -> int:
         """Optimiser steps of that training of snug.recipes, by its kind; 0 for an untrained network."""
@@ -65,6 +66,7 @@ class Preset:
 PRESETS = (
     Preset(
         name="smoke",
+        smallest=True,
         description="everything once, tiny: about 3 minutes on 2 cores; its numbers mean nothing",
         garment_vertices=350,
         train_motions=1,

@@ -169,7 +169,7 @@ def _cases(request: Request) -> Iterator[Case]:
     """
     if named(METHOD, request.methods):
         for case in CASES:
-            small = case.smoke or request.scenes or request.preset.name != "smoke"
+            small = case.smoke or request.scenes or not request.preset.smallest
             if small and case.suite in request.suites and named(case.name, request.scenes):
                 yield case
 
@@ -177,7 +177,7 @@ def _cases(request: Request) -> Iterator[Case]:
 def _microbenchmarks(request: Request) -> Iterator[Microbenchmark]:
     """Those of the scenes and methods named; the smallest preset runs those marked, unless they are named."""
     for benchmark in MICROBENCHMARKS if SUITE in request.suites else ():
-        small = benchmark.smoke or request.scenes or request.preset.name != "smoke"
+        small = benchmark.smoke or request.scenes or not request.preset.smallest
         wanted = small and named(benchmark.name, request.scenes) and named(benchmark.method, request.methods)
         if wanted and (not benchmark.long or benchmark.name in request.scenes):
             yield benchmark

@@ -126,7 +126,7 @@ def _dependence(extent: Extent) -> list[str]:
 
 
 def _out_of_distribution(extent: Extent) -> list[str]:
-    if extent.preset.name == "smoke" and not extent.further:
+    if extent.preset.smallest and not extent.further:
         return list(SMALL_OUT_OF_DISTRIBUTION)
     return [scene.name for scene in OUT_OF_DISTRIBUTION]
 
