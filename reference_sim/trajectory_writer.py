@@ -97,23 +97,24 @@ class TrajectoryWriter:
         before: (2, V, 3) positions [m] and velocity [m/s] from which the last step to this frame was made; a
         run with sub-steps that is resumed from this frame needs them.
         """
-        self._extend(
-            np.asarray(positions)[None],
-            [time],
-            [seconds],
-            {name: [value] for name, value in (fields or {}).items()},
-            before=before,
+        numbers = {name: np.array([value]) for name, value in (fields or {}).items()}
+        self.extend(
+            np.asarray(positions)[None], np.array([time]), np.array([seconds]), numbers, before=before
         )
 
     def extend(
-        self, positions: np.ndarray, times: np.ndarray, seconds: np.ndarray, fields: dict[str, np.ndarray]
+        self,
+        positions: np.ndarray,
+        times: np.ndarray,
+        seconds: np.ndarray,
+        fields: dict[str, np.ndarray],
+        *,
+        before: np.ndarray | None = None,
     ) -> None:
-        """Add K frames at once: positions (K, V, 3) [m], times and seconds (K,), further numbers (K,)."""
-        self._extend(positions, times, seconds, fields)
+        """Add K frames at once: positions (K, V, 3) [m], times and seconds (K,), further numbers (K,).
 
-    def _extend(
-        self, positions: Any, times: Any, seconds: Any, fields: Any, *, before: np.ndarray | None = None
-    ) -> None:
+        before: as of `append`, for one frame.
+        """
         k, count = self.frames, len(positions)
         self._reserve(np.size(positions) + (0 if before is None else 2 * np.size(before)))
         vtk, own = self._file["VTKHDF"], self._file["benchmark"]

@@ -147,7 +147,7 @@ def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
     cells = run.cells(*SUITES)
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
     found = [
-        (place, method, run.metrics[name], mean, new, _effect(run, cells, name, new, mean))
+        (place, method, metric := run.metrics[name], mean, new, effect_on(metric, new, mean, run, cells))
         for (place, method, name), (mean, new) in differ.items()
         if not mean.seeded or mean.seeds > 1
     ]
@@ -161,11 +161,6 @@ def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
             verdict = _side(metric, far)
             changes.append(Change(verdict, place, method, metric.name, _said(metric, mean, new, far, p)))
     return changes, len(first), len(differ) - len(found)
-
-
-def _effect(run: Run, cells: pd.DataFrame, metric: str, new: Mean, mean: Mean) -> Effect:
-    scenes = {scene for scene, _ in mean.cells}
-    return effect_on(run.metrics[metric], new, mean, run, cells[cells["scene"].isin(scenes)])
 
 
 def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:

@@ -78,8 +78,8 @@ def error_against_frames(folder: Path, run: Run) -> list[Picture]:
     looks = {family: family_style(run, run.methods[_first(run, shown, family)]) for family in families}
     for axes, metric in zip(np.atleast_1d(figure.subplots(1, len(metrics))), metrics):
         level, declared = value_of(rows, run.reference, metric), run.metrics[metric]
-        zero = level if declared.arbitrary_zero and level is not None else 0.0
-        lowest = np.inf
+        above = declared.arbitrary_zero and level is not None
+        zero, lowest = (level or 0.0) if above else 0.0, np.inf
         for family, look in looks.items():
             means = [
                 (value_of(rows, name, FRAMES), mean_of(rows, name, metric))
@@ -92,10 +92,10 @@ def error_against_frames(folder: Path, run: Run) -> list[Picture]:
                 lowest = min(lowest, *y)
                 axes.errorbar(x, y, spread, color=look.colour, marker=look.marker, linestyle=look.line,
                     markersize=4, capsize=2)  # fmt: skip
-        if level is not None and not zero:
+        if level is not None and not above:
             axes.axhline(level, color=style(run, run.reference).colour, linewidth=0.9, linestyle="--")
-        above = " above the simulation's" if zero else ""
-        axes.set(xlabel="training frames", ylabel=f"{declared.title}{above} [{declared.unit}]")
+        words = f"{declared.title} above the simulation's" if above else declared.title
+        axes.set(xlabel="training frames", ylabel=f"{words} [{declared.unit}]")
         log_axis(axes, "x")
         if metric == DRAWN[0] and lowest > 0.0:
             log_axis(axes, "y")

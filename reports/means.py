@@ -147,5 +147,5 @@ def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean |
     if not both:
         return None, None
     asked = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
-    seeds = (m.asked // len(both) for m in (first, second))
-    return replace(first, asked=asked * next(seeds)), replace(second, asked=asked * next(seeds))
+    first, second = (replace(m, asked=asked * (m.asked // len(both))) for m in (first, second))
+    return first, second

@@ -122,11 +122,12 @@ def effect(one: Mean, other: Mean, *, differences: bool = False, scale: float | 
 
 
 def effect_on(metric: Metric, one: Mean, other: Mean, run: Run, rows: pd.DataFrame) -> Effect:
-    """Of two means of this metric, which are of these rows. Where its zero is a choice, they are told apart
-    by their difference, as a share of what the baseline, skinning, has more than the reference.
+    """Of two means of this metric. Where its zero is a choice, they are told apart by their difference, as a
+    share of what the baseline, skinning, has more than the reference in the same scenes of these rows.
     """
     if not metric.arbitrary_zero:
         return effect(one, other)
+    rows = rows[rows["scene"].isin({scene for scene, _ in one.cells})]
     baseline = next((name for name in run.with_role("baseline") if name in set(rows["method"])), "")
     high, low = pair(rows, baseline, run.reference, metric.name)
     scale = abs(high.value - low.value) if high and low else 0.0

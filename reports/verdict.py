@@ -57,14 +57,12 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
 
 def _apart(run: Run, rows: pd.DataFrame, one: Mean, other: Mean) -> str:
     """Which way, in how many roll-outs, and whether others may show the contrary. The other has no seeds."""
-    if within_uncertainty(one, other):
+    found = effect_on(run.metrics[TOTAL], one, other, run, rows)
+    if not found.one_seed and (within_uncertainty(one, other) or found.equal()):
         return ": a tie"
     higher, beside = one.value > other.value, {scene: value for (scene, _), value in other.cells.items()}
     above = [(value > beside[scene]) is higher for (scene, _), value in one.cells.items()]
     text = f": {'higher' if higher else 'lower'} in {sum(above)} of {len(above)} roll-outs"
-    found = effect_on(run.metrics[TOTAL], one, other, run, rows)
-    if found.equal():
-        return ": a tie"
     if found.one_seed:
         return f"{text} of one seed, which judges no network"
     p = found.p_value()

@@ -372,6 +372,8 @@ def test_the_verdict_says_tie_only_within_the_uncertainty():
     assert "the simulation's 1.00 ± 0.020: a tie" in said(1.05)  # within 5 % of what skinning has more
     assert "1.00 ± 0.020: higher in 2 of 2 roll-outs;" in said(2.0)
     assert ": lower in 2 of 2 roll-outs;" in said(0.5)
+    alone = [row(value=1.0, metric="energy/total"), row(method="simulation", metric="energy/total")]
+    assert near(alone).endswith("of one seed, which judges no network.")
 
 
 def test_page_one_shows_the_network_the_best_of_others_and_a_baseline():

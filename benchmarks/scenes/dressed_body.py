@@ -56,6 +56,7 @@ def build(
     energies = declared_energies(cloth)
     # Which faces a vertex may touch is a matter of the body that the garment was made for.
     obstacle = Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped())
+    dressed = Dressed(body, garment, motion, shape, before=before)
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
@@ -64,8 +65,8 @@ def build(
         frames=motion.frames,
         settle=settle,
         obstacle=obstacle,
-        origin_heights=body.joints(shape)[0, 1] + motion.translations[:, 1],
-        dressed=Dressed(body, garment, motion, shape, before=before),
+        origin_heights=dressed.pelvis[:, 1],
+        dressed=dressed,
         warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )
