@@ -10,6 +10,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from snug.command_line import Parser, command
+
 from .methods import find_method
 from .registry import DeclarationError
 from .request import outside
@@ -48,36 +50,25 @@ exit status: 0 when nothing is wrong; 1 when something is, a line for each; 2 wh
 
 def make_parser() -> argparse.ArgumentParser:
     """The options of the command."""
-    parser = argparse.ArgumentParser(
-        prog=f"python -m {PROGRAM}", description=DESCRIPTION, epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    parser = Parser(prog=f"python -m {PROGRAM}", description=DESCRIPTION, epilog=EXAMPLES)
     parser.add_argument("what", nargs="+", metavar="FILE", help="a file, or an entry point of a package")
     parser.add_argument("--seconds", type=float, default=SECONDS,
         help=f"after which one method in one scene is ended (default {SECONDS:g})")  # fmt: skip
     return parser
 
 
+@command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     one_thread()
     options = make_parser().parse_args(arguments)
-    try:
-        if not options.seconds > 0.0:
-            raise DeclarationError(f"--seconds {options.seconds:g}: give a positive number")
-        declared = read(options.what)
-    except ValueError as error:
-        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    wrong = 0
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            for line, fine in check(declared, Path(folder), options.seconds):
-                print(line, flush=True)
-                wrong += not fine
-    except ValueError as error:  # there is no such motion
-        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
+    if not options.seconds > 0.0:
+        raise DeclarationError(f"--seconds {options.seconds:g}: give a positive number")
+    declared, wrong = read(options.what), 0
+    with tempfile.TemporaryDirectory() as folder:
+        for line, fine in check(declared, Path(folder), options.seconds):
+            print(line, flush=True)
+            wrong += not fine
     print("nothing is wrong" if not wrong else f"{wrong} to mend")
     return 1 if wrong else 0
 

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from snug.command_line import Parser, command
 from snug.garment_file import add_garment_options
 from snug.motion_options import add_motion_options
 
-from .request.options import Parser
 from .timing import one_thread
 
 if TYPE_CHECKING:
@@ -87,6 +87,7 @@ def add_build_options(parser: argparse.ArgumentParser) -> None:
     add_garment_options(parser)
 
 
+@command(PROGRAM, goes_on="the same command goes on from there")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -94,18 +95,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     actions: dict[str, Callable[[argparse.Namespace, Sequence[str]], int]] = {
         "build": _build, "verify": _verify, "list": _list, "merge": _merge,
     }  # fmt: skip
-    try:
-        options = make_parser().parse_args(words)
-        return actions[options.action](options, words)
-    except KeyboardInterrupt:
-        print(f"{PROGRAM}: interrupted; what had ended is kept", file=sys.stderr)
-        return 130
-    except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
-        from reference_sim.whole_file import disk_full
-
-        full = disk_full(error)
-        print(f"{PROGRAM}: {full or ' '.join(str(error).split())}", file=sys.stderr)
-        return 1 if full else 2
+    options = make_parser().parse_args(words)
+    return actions[options.action](options, words)
 
 
 def _build(options: argparse.Namespace, words: Sequence[str]) -> int:

@@ -10,8 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from snug.command_line import Parser, command
+
 from .request.one_scene import plan_of_scene, words_of_scene
-from .request.options import Parser, add_scene_options
+from .request.options import add_scene_options
 from .request.plan import Plan, PlanError
 from .timing import one_thread
 
@@ -47,28 +49,25 @@ def make_export_parser() -> argparse.ArgumentParser:
     return parser
 
 
+@command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
+    options = make_export_parser().parse_args(words)
+    folder = Path(options.out)
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise PlanError(f"--out {folder}: is there already; name a new folder")
+    plan = plan_of(options)
     try:
-        options = make_export_parser().parse_args(words)
-        folder = Path(options.out)
-        if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
-            raise PlanError(f"--out {folder}: is there already; name a new folder")
-        plan = plan_of(options)
         scene, assets = built(plan)
         from .export_files import write_scene
 
         chosen = ["--scene", options.scene, *words_of_scene(options)]
-        command = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
-        write_scene(folder, plan, scene, assets, score=command, reference=options.reference)
-    except (ValueError, RuntimeError) as error:
-        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print(f"{PROGRAM}: interrupted; nothing was written", file=sys.stderr)
-        return 130
+        score = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
+        write_scene(folder, plan, scene, assets, score=score, reference=options.reference)
+    except RuntimeError as error:  # a simulation that did not stay finite
+        raise PlanError(str(error)) from error
     print(f"{scene.name}: {scene.frames} frames of {scene.cloth.vertex_count} vertices in {folder}")
     return 0
 

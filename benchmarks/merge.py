@@ -17,8 +17,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from snug.command_line import Parser, command
+
 from .performance.microbenchmark import SUITE
-from .request.options import Parser
 from .results import ResultsError, Row, RunFolder, digest_of_file
 from .runner.cache import read_entry
 from .runner.execution import OF_TRAINING
@@ -46,21 +47,18 @@ class MergeError(ValueError):
     """Folders that do not belong together; the message names what differs, and where."""
 
 
+@command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     parser = Parser(prog=f"python -m {PROGRAM}", description="Join runs into one folder.", epilog=EXAMPLES)
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folders of benchmarks.run, two or more")
     parser.add_argument("-o", "--out", metavar="DIR", required=True, help="a new folder")
-    try:
-        options = parser.parse_args(words)
-        rows = merge(
-            [Path(run) for run in options.runs], Path(options.out),
-            command=shlex.join(["python", "-m", PROGRAM, *words]),
-        )  # fmt: skip
-    except (ValueError, OSError) as error:
-        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
+    options = parser.parse_args(words)
+    rows = merge(
+        [Path(run) for run in options.runs], Path(options.out),
+        command=shlex.join(["python", "-m", PROGRAM, *words]),
+    )  # fmt: skip
     left_out = [row for row in rows if row.status == "skipped" and of_a_machine(row)]
     if left_out:
         print(
@@ -168,7 +166,7 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
             raise MergeError(f"{folder.path}: has no cache/, which says what its results came of")
         for path in paths:
             entry = read_entry(path)
-            if entry is None or "inputs" not in entry:
+            if entry is None:
                 raise MergeError(f"{path}: damaged, or of an earlier version; run it again with --fresh")
             for name, value in entry["parts"].items():
                 own = name in entry["inputs"]

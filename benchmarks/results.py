@@ -19,7 +19,7 @@ from typing import Any
 
 from .json_file import ResultsError, check_config, read_json
 
-FORMAT = 3  # of run.json, results.csv and the cache; written into run.json
+FORMAT = 4  # of run.json, results.csv and the cache; written into run.json
 OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
 USABLE = ("ok", "stalled")  # statuses of cells that came to their last frame: their numbers count
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")

@@ -7,14 +7,14 @@ are shared and workers that die are left out.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import heapq
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from snug.command_line import Parser, command
 
 from .results import ResultsError, RunFolder, replacing
 from .runner.cache import read_entry
@@ -76,15 +76,15 @@ def measured(folder: RunFolder, kinds: Sequence[str] = ()) -> list[Measured]:
     for kind in kinds or there:
         for path in sorted((folder.cache / kind).rglob("*.json")):
             entry = read_entry(path)
-            if entry and "stage" not in entry:
-                raise ResultsError(f"{path}: an older version wrote it: do the run again")
             if entry and not entry["outcome"]["failed"]:
                 files = (folder.path / name for name in entry["files"])
                 size = sum(file.stat().st_size for file in files if file.is_file()) / MEGABYTE
                 seconds = float(entry["outcome"]["seconds"])
                 found.append(Measured(entry["stage"], seconds, size, entry["alone"]))
     if not found:
-        raise ResultsError(f"{folder.cache}: holds no finished task; name the folder of a run or data set")
+        raise ResultsError(
+            f"{folder.cache}: holds no finished task of this version; name the folder of a run or data set"
+        )
     return found
 
 
@@ -148,13 +148,14 @@ def table(outlooks: Iterable[Outlook]) -> Iterator[str]:
         yield f"{line.workers:8d} {line.seconds / 3600:10.3f} {line.efficiency:11.3f}  {held}"
 
 
+@command("benchmarks.scaling")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status: 0 done; 2 for a folder without finished tasks and options that cannot be met."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m benchmarks.scaling",
         description="Simulate the runner's schedule on many workers with the task times of a finished run.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+        epilog=EXAMPLES,
+    )
     parser.add_argument("run_dir", metavar="RUN", help="folder of a finished run or data set")
     parser.add_argument(
         "--copies", type=int, default=100, help="size of the study, in runs (default 100; 1: this run)"
@@ -169,14 +170,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     import numpy as np
 
-    try:
-        workers = [int(text) for text in options.workers.split(",")]
-        if min([options.copies, *workers]) < 1 or min(options.bandwidth, options.handling + 1) <= 0:
-            raise ValueError("--copies, --workers and --bandwidth have to be positive")
-        tasks = measured(RunFolder(options.run_dir), options.kinds.split(",") if options.kinds else ())
-    except (ValueError, ResultsError, OSError) as error:
-        print(f"benchmarks.scaling: {error}", file=sys.stderr)
-        return 2
+    workers = [int(text) for text in options.workers.split(",")]
+    if min([options.copies, *workers]) < 1 or min(options.bandwidth, options.handling + 1) <= 0:
+        raise ValueError("--copies, --workers and --bandwidth have to be positive")
+    tasks = measured(RunFolder(options.run_dir), options.kinds.split(",") if options.kinds else ())
     many = study(tasks, options.copies, np.random.default_rng(options.seed))
     costs = Costs(options.start, options.handling, options.bandwidth)
     found = [outlook(many, count, costs) for count in workers]

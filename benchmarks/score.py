@@ -13,8 +13,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from snug.command_line import Parser
+
 from .request.one_scene import plan_of_scene
-from .request.options import Parser, add_scene_options
+from .request.options import add_scene_options
 from .request.plan import Plan
 from .request.selection import stored_cells
 from .results import RunFolder

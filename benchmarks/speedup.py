@@ -18,7 +18,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .request.options import Parser
+from snug.command_line import Parser, command
+
 from .request.plan import PlanError
 from .results import ResultsError, RunFolder, replacing
 from .timing import THREADS
@@ -127,7 +128,7 @@ class Line:
     unit: str
 
 
-class SpeedupError(RuntimeError):
+class SpeedupError(ValueError):
     """A commit that is not there, or a run that failed; one line says which."""
 
 
@@ -201,26 +202,19 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+@command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     known = {what.group for what in MEASUREMENTS}
-    try:
-        options = make_parser().parse_args(arguments)
-        wanted = options.rows.split(",")
-        if unknown := set(wanted) - known:
-            raise PlanError(f"--rows {min(unknown)}: choose from {', '.join(sorted(known))}")
-    except PlanError as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
-        return 2
+    options = make_parser().parse_args(arguments)
+    wanted = options.rows.split(",")
+    if unknown := set(wanted) - known:
+        raise PlanError(f"--rows {min(unknown)}: choose from {', '.join(sorted(known))}")
     lines: list[Line] = []
     runs: dict[tuple[int, int, tuple[str, ...]], RunFolder] = {}
     failed = False
     with tempfile.TemporaryDirectory() as name:
-        try:
-            before = check_out(options.commit, Path(name))
-        except SpeedupError as error:
-            print(f"{PROGRAM}: {error}", file=sys.stderr)
-            return 2
+        before = check_out(options.commit, Path(name))
         for what in MEASUREMENTS:
             if what.group not in wanted:
                 continue

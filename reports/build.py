@@ -7,7 +7,6 @@ writes the same bytes twice.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Sequence
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.results import ResultsError, RunFolder, replacing
+from snug.command_line import Parser, command
 
 if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
@@ -172,9 +172,10 @@ def typeset(folder: RunFolder, content: dict[str, Any]) -> None:
         compiler.compile(output=str(temporary), format="pdf", timestamp=stamp)
 
 
+@command("reports.build", goes_on="the same command begins again", bad_input=(ResultsError,))
 def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status: 0 made; 1 made, but some file of the run could not be read; 2 no run folder."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m reports.build",
         description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run.",
         epilog="Exit status: 0 when all is made, 1 when some file of the run could not be read (the report "
@@ -194,19 +195,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="of --axes (default: those in which most methods have both)",
     )
     options = parser.parse_args(arguments)
-    try:
-        if options.axes:
-            x, y = options.axes
-            picture = draw_axes(RunFolder(options.run_dir), x, y, options.scenes)
-            print(picture.caption, picture.path, sep="\n")
-            return 0
-        path, problems = build_report(options.run_dir)
-    except (ResultsError, OSError) as error:
-        from reference_sim.whole_file import disk_full
-
-        full = disk_full(error)
-        print(f"reports.build: {full or error}", file=sys.stderr)
-        return 1 if full else 2
+    if options.axes:
+        x, y = options.axes
+        picture = draw_axes(RunFolder(options.run_dir), x, y, options.scenes)
+        print(picture.caption, picture.path, sep="\n")
+        return 0
+    path, problems = build_report(options.run_dir)
     for problem in problems:
         print(f"reports.build: left out: {problem}", file=sys.stderr)
     print(path)

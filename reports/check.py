@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 
 import pandas as pd
 
-from benchmarks.results import ResultsError, RunFolder
+from benchmarks.results import RunFolder
 from reports.build import read_run
 from reports.data import Run
 from reports.pareto import REPEATS, TIME
+from snug.command_line import Parser, command
 
 SHOWN = 4  # names in a line
 CELL = ["suite", "scene", "method", "seed"]
@@ -121,21 +120,18 @@ def _names(names: Iterable[str]) -> str:
     return ", ".join(found[:SHOWN]) + more
 
 
+@command("reports.check")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m reports.check",
         description="What a reader of a run's numbers would miss: units, seeds, hardware, spreads, reasons.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+        epilog=EXAMPLES,
+    )
     parser.add_argument("run_dir", metavar="RUN", help="folder of a run")
     options = parser.parse_args(arguments)
     folder = RunFolder(options.run_dir)
-    try:
-        found = list(findings(folder, read_run(folder)))
-    except (ResultsError, OSError) as error:
-        print(f"reports.check: {error}", file=sys.stderr)
-        return 2
+    found = list(findings(folder, read_run(folder)))
     for topic, said in found:
         print(f"{topic:10}{said}")
     print(f"{folder.path}: {len(found)} findings" if found else f"{folder.path}: nothing found")

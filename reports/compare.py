@@ -6,8 +6,6 @@ garment, over its motions and seeds; every other scene by itself, over its seeds
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -21,6 +19,7 @@ from reports.means import Mean, means
 from reports.numbers import number, with_spread
 from reports.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
 from reports.significance import LEVEL, Effect, effect_on, holm, within_uncertainty
+from snug.command_line import Parser, command
 
 CELL = ["scene", "method", "seed", "metric"]
 GROUP = ["place", "method", "metric"]
@@ -200,25 +199,22 @@ def _said(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -
     return text + ("" if p is None else f", p {number(p, 2)}")
 
 
+@command("reports.compare")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m reports.compare",
         description="What changed from one run to another beyond the noise of both.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+        epilog=EXAMPLES,
+    )
     parser.add_argument("one", metavar="A", help="folder of the earlier run")
     parser.add_argument("other", metavar="B", help="folder of the later run")
     for name in ("metrics", "methods"):
         parser.add_argument(f"--{name}", metavar="NAME,...", default="*", help="only these (patterns)")
     parser.add_argument("--without-times", action="store_true", help="neither run times nor memory")
     options = parser.parse_args(arguments)
-    try:
-        runs = [read_run(RunFolder(path)) for path in (options.one, options.other)]
-        found = compare(runs[0], runs[1], options.metrics, options.methods, times=not options.without_times)
-    except (ResultsError, OSError) as error:
-        print(f"reports.compare: {error}", file=sys.stderr)
-        return 2
+    runs = [read_run(RunFolder(path)) for path in (options.one, options.other)]
+    found = compare(runs[0], runs[1], options.metrics, options.methods, times=not options.without_times)
     for change in found.changes:
         print(f"{change.verdict:8}{change.place}  {change.method}  {change.metric}  {change.said}")
     print("\n".join(_summary(found, runs)))

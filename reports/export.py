@@ -8,12 +8,12 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.results import ResultsError, RunFolder
+from benchmarks.results import RunFolder
+from snug.command_line import Parser, command
 
 if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
@@ -146,11 +146,11 @@ def _write_frames(folder: Path, meshes: Meshes) -> None:
 
 def make_parser() -> argparse.ArgumentParser:
     """The options of the command."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m reports.export",
         description="Write a roll-out of a run, and the body, as Alembic, USD, PC2 or OBJ files.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+        epilog=EXAMPLES,
+    )
     parser.add_argument("run_dir", metavar="RUN", help="folder of a run that has kept its trajectories")
     parser.add_argument("--scene", required=True, help="as in results.csv, say tshirt/kick")
     parser.add_argument("--method", required=True, help="as in results.csv, say snug")
@@ -161,22 +161,19 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+@command("reports.export")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     options = make_parser().parse_args(arguments)
     path = Path(options.out)
-    try:
-        demand_writable(path)
-        from reports.kept import read_kept
-        from reports.page.roll_outs import first_frames
+    demand_writable(path)
+    from reports.kept import read_kept
+    from reports.page.roll_outs import first_frames
 
-        kept = read_kept(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
-        cloth = kept.cloths[options.method]
-        meshes = {"garment": cloth} | ({"body": first_frames(kept.body, cloth.frames)} if kept.body else {})
-        write(path, meshes)
-    except (ResultsError, ValueError, OSError) as error:
-        print(f"reports.export: {error}", file=sys.stderr)
-        return 2
+    kept = read_kept(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
+    cloth = kept.cloths[options.method]
+    meshes = {"garment": cloth} | ({"body": first_frames(kept.body, cloth.frames)} if kept.body else {})
+    write(path, meshes)
     sizes = ", ".join(f"{name} of {mesh.positions.shape[1]} vertices" for name, mesh in meshes.items())
     print(f"{path}: {cloth.frames} frames, {sizes}")
     if path.suffix == ".pc2":

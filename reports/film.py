@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.results import ResultsError, RunFolder, replacing
+from benchmarks.results import RunFolder, replacing
 from reports.render import camera_axes, vertex_normals
+from snug.command_line import Parser, command
 
 if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
@@ -212,11 +213,11 @@ def demand_possible(path: Path) -> None:
 
 def make_parser() -> argparse.ArgumentParser:
     """The options of the command."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m reports.film",
         description="A film of methods side by side in a scene of a run.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+        epilog=EXAMPLES,
+    )
     parser.add_argument("run_dir", metavar="RUN", help="folder of a run that has kept its trajectories")
     parser.add_argument("--scene", required=True, help="as in results.csv, say tshirt/kick")
     parser.add_argument("--methods", required=True, metavar="NAME,...", help="as in results.csv")
@@ -229,24 +230,21 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+@command("reports.film")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     options = make_parser().parse_args(arguments)
     path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
-    try:
-        if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
-            raise ValueError("--speed is .01 to 10, --width 64 to 2000")
-        demand_possible(path)
-        from reports.kept import read_kept
+    if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
+        raise ValueError("--speed is .01 to 10, --width 64 to 2000")
+    demand_possible(path)
+    from reports.kept import read_kept
 
-        kept = read_kept(RunFolder(options.run_dir), options.scene, methods, options.seed)
-        dt = min(cloth.dt for cloth in kept.cloths.values())
-        rate = options.speed / dt if dt > 0.0 else 1.0
-        with replacing(path) as temporary:
-            WRITERS[path.suffix](temporary, pictures(kept, options.width, options.azimuth), rate)
-    except (ResultsError, ValueError, OSError) as error:
-        print(f"reports.film: {error}", file=sys.stderr)
-        return 2
+    kept = read_kept(RunFolder(options.run_dir), options.scene, methods, options.seed)
+    dt = min(cloth.dt for cloth in kept.cloths.values())
+    rate = options.speed / dt if dt > 0.0 else 1.0
+    with replacing(path) as temporary:
+        WRITERS[path.suffix](temporary, pictures(kept, options.width, options.azimuth), rate)
     print(path)
     return 0
 

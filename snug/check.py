@@ -6,8 +6,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
+from snug.command_line import Parser, command
 from snug.garment_file import GarmentFile, add_garment_options, garment_file
 
 if TYPE_CHECKING:
@@ -29,22 +30,13 @@ weight_23 of a PLY, are skinning weights that are kept as they are.
 exit status: 0 all can be used, 1 one cannot, 2 one cannot be read"""
 
 
-class _Parser(argparse.ArgumentParser):
-    """One clear line for a wrong word, in place of the whole usage."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(UNREADABLE, f"{PROGRAM}: {message}; see --help\n")
-
-
 def make_parser() -> argparse.ArgumentParser:
     """The options of the command."""
-    parser = _Parser(
+    parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Read garments as benchmarks.run and snug.train do, and say in a short table what was "
         "found: size, place on the body, rest shape, winding, openings, weights, and what mends them.",
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ, PLY, VTK, STL or OFF")
     parser.add_argument("--body", metavar="FILE", help="an own body (default: that of the package)")
@@ -56,17 +48,10 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+@command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     options = make_parser().parse_args(arguments)
-    try:
-        return _run(options)
-    except (ValueError, OSError) as error:
-        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
-        return UNREADABLE
-
-
-def _run(options: argparse.Namespace) -> int:
     files = [garment_file(path, options) for path in options.files]
     if options.picture and not options.picture.parent.is_dir():
         raise ValueError(f"--picture {options.picture}: no such folder")

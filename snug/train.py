@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from snug.command_line import command
 from snug.garment_file import demand_a_file, garment_file, is_file_name
 from snug.motion_options import reading_of
 from snug.recipes import TRAININGS, find_recipe
@@ -25,21 +26,10 @@ if TYPE_CHECKING:
     from snug.trained_model import TrainedModel
 
 
+@command("snug.train", goes_on="--resume goes on from there")
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     options = parse(arguments)
-    try:
-        return _run(options)
-    except (ValueError, OSError) as error:
-        from reference_sim.whole_file import disk_full
-
-        if line := disk_full(error):
-            print(f"snug.train: {line}; --resume goes on once there is room", file=sys.stderr)
-            return 1
-        print(f"snug.train: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-
-
-def _run(options: argparse.Namespace) -> int:
     import torch
 
     from snug.body import Body

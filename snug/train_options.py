@@ -6,6 +6,7 @@ import argparse
 import os
 from collections.abc import Sequence
 
+from snug.command_line import Parser
 from snug.garment_file import add_garment_options
 from snug.motion_options import add_motion_options
 from snug.recipes import RECIPES, TRAININGS
@@ -29,10 +30,9 @@ it was built with."""
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m snug.train",
         description="Train a garment network on a dressed body and write it to one file.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog=EXAMPLES,
     )
     add = parser.add_argument_group("what").add_argument

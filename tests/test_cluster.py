@@ -23,6 +23,7 @@ pytest.importorskip("distributed")
 from cluster_by_hand import PATH, Cluster, cluster, finish, write
 
 from benchmarks import run
+from benchmarks.request.make_plan import choose_scheduler
 from benchmarks.request.plan import PlanError
 from benchmarks.results import RunFolder, digest_of_file
 from benchmarks.runner import cluster as runner_side
@@ -254,7 +255,7 @@ def test_a_scheduler_that_does_not_answer_is_refused_in_one_line(tmp_path, monke
 def test_what_a_cluster_cannot_do_is_refused(option, value):
     plain = {"scheduler": "tcp://127.0.0.1:1", "device": "cpu", "rollout": []}
     with pytest.raises(PlanError, match=f"--{option}.*leave out --scheduler"):
-        run.choose_scheduler(argparse.Namespace(**plain | {option: value}))
+        choose_scheduler(argparse.Namespace(**plain | {option: value}))
 
 
 # --- what dies ---------------------------------------------------------------------------------------------

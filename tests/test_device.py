@@ -248,7 +248,7 @@ def test_the_harness_hands_the_device_on(tmp_path):
     """An absent device is refused where the plan is made, and would be refused where training starts."""
     from tasks_by_hand import assets_of, context, training
 
-    from benchmarks.run import check_device
+    from benchmarks.request.make_plan import check_device
 
     dressed, motion = tube_dress(), swaying(12)
     task = training("snug", motion.name, steps=2, device="cuda")

@@ -15,6 +15,8 @@ from other_bodies import lowered, plain_arrays, read_again
 
 from benchmarks import run as run_command
 from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.request.make_plan import make_plan
+from benchmarks.request.options import make_parser
 from benchmarks.request.plan import PlanError
 from benchmarks.request.presets import find_preset
 from benchmarks.runner.schedule import Schedule
@@ -307,7 +309,7 @@ def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_pa
 
 
 def planned(*words):
-    return run_command.make_plan(run_command.make_parser().parse_args(words), words)
+    return make_plan(make_parser().parse_args(words), words)
 
 
 def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, tube):

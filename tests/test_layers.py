@@ -21,6 +21,7 @@ ALLOWED = {
         "reports",
         "benchmarks.results",
         "benchmarks.frame_energies",
+        "snug.command_line",
         "reference_sim.trajectory",
         "reference_sim.array_file",
         "reference_sim.point_cache",

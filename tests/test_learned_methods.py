@@ -9,10 +9,11 @@ from tasks_by_hand import assets_of, context, training
 
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.learned import LEARNED
+from benchmarks.request.make_plan import make_plan
+from benchmarks.request.options import make_parser
 from benchmarks.request.presets import PRESETS, find_preset
 from benchmarks.request.suites import SUITES
 from benchmarks.results import RunFolder, model_path
-from benchmarks.run import make_parser, make_plan
 from snug.recipe import TERMS
 from snug.recipes import ABLATIONS, RECIPES, TRAININGS
 from snug.trained_model import TrainedModel

@@ -16,6 +16,7 @@ from misbehaving import interrupt_at
 from benchmarks import methods, run
 from benchmarks.methods import METHODS
 from benchmarks.request import selection
+from benchmarks.request.make_plan import choose_folder
 from benchmarks.request.plan import Motions, PlanError
 from benchmarks.request.presets import PRESETS
 from benchmarks.request.suites import SUITES, Extent
@@ -151,7 +152,7 @@ def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monk
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(PlanError, match="cannot be written"):
-        run.choose_folder(str(tmp_path / "new"))
+        choose_folder(str(tmp_path / "new"))
 
 
 # --- a run -----------------------------------------------------------------------------------------------

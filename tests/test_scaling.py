@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import scaling
-from benchmarks.results import RunFolder
+from benchmarks.results import FORMAT, RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.scaling import Costs, Measured, outlook, stage_seconds, study
 from benchmarks.tasks.ground_truth import SimulateMotion
@@ -97,12 +97,15 @@ def test_a_data_set_is_read_too(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ([], "no finished task"),
+        ([], "no finished task of this version"),
         (["--kinds", "dta"], "no task of kind 'dta'"),
         (["--workers", "0"], "posi"),
     ],
 )
-def test_what_cannot_be_simulated_is_one_line(tmp_path, capsys, options, words):
+def test_what_cannot_be_simulated_is_one_line(tmp_path, capsys, monkeypatch, options, words):
+    with monkeypatch.context() as before:
+        before.setattr("benchmarks.runner.cache.FORMAT", FORMAT - 1)
+        finished(RunFolder(tmp_path), "one", 3.0)
     assert scaling.main([str(tmp_path), *options]) == 2
     said = capsys.readouterr().err
     assert words in said and said.count("\n") == 1

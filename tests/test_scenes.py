@@ -268,7 +268,8 @@ def key_of(task) -> str:
 
 
 def planned(*words):
-    from benchmarks.run import make_parser, make_plan
+    from benchmarks.request.make_plan import make_plan
+    from benchmarks.request.options import make_parser
 
     return make_plan(make_parser().parse_args(list(words)), words)
 

@@ -12,10 +12,10 @@ from test_cell_tasks import plan_of
 
 from benchmarks import provenance
 from benchmarks.methods import find_method
+from benchmarks.request.make_plan import choose_garment
 from benchmarks.request.options import make_parser
 from benchmarks.request.plan import Motions, Network, OwnGarment
 from benchmarks.results import RunFolder, digest_of_file
-from benchmarks.run import choose_garment
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.metrics import _training_poses

@@ -18,6 +18,8 @@ from benchmarks.export_files import _write_obj, write_scene
 from benchmarks.methods import find_method
 from benchmarks.methods.stored_roll_out import entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.request.make_plan import make_plan
+from benchmarks.request.options import make_parser
 from benchmarks.request.plan import Motions, Plan, PlanError
 from benchmarks.request.presets import find_preset
 from benchmarks.results import RunFolder
@@ -101,7 +103,7 @@ def test_without_a_reference_the_reason_is_said(made, tmp_path):
 
 def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_changed(made, tmp_path):
     def planned() -> Cell:
-        plan = run.make_plan(run.make_parser().parse_args(words), words)
+        plan = make_plan(make_parser().parse_args(words), words)
         (stored,) = (cell for cell in plan.cells if cell.method == "mine")  # the flag has no file
         return digest(Schedule(plan).cell(stored).inputs), stored
 

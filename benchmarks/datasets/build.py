@@ -19,11 +19,11 @@ from .. import provenance
 from ..assets import embedded_motions, open_assets
 from ..methods import METHODS
 from ..registry import by_name
+from ..request.make_plan import WORKERS, choose_body, choose_garment, choose_states, split
 from ..request.plan import Motions, Plan, PlanError
 from ..request.presets import find_preset
 from ..request.roles import FEWEST
 from ..results import RunFolder
-from ..run import WORKERS, choose_body, choose_garment, choose_states, split
 from ..runner.cache import Cache
 from ..runner.execution import executor_of
 from ..runner.lock import held

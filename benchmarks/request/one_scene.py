@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..run import make_plan
+from .make_plan import make_plan
 from .options import add_scene_options, make_parser
 from .plan import Plan, PlanError
 

@@ -6,13 +6,12 @@ Light, so that --help answers at once.
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
+from snug.command_line import Parser
 from snug.garment_file import add_garment_options
 from snug.motion_options import add_motion_options
 
 from ..roll_outs.option import HELP as ROLL_OUT_HELP
-from .plan import PlanError
 from .presets import PRESETS
 
 PROGRAM = "benchmarks.run"
@@ -51,17 +50,6 @@ exit status: 0 when every cell ended as ok or as an explained skip (in extremes 
   and the rest went on; 2 when the request cannot be met, also where another run is going on in the
   folder: one line says why and nothing is left behind; 130 when it was interrupted: what had ended is
   in the folder, whole, and the same command goes on from there."""
-
-
-class Parser(argparse.ArgumentParser):
-    """One clear line for a wrong word, in place of the whole usage; examples stay as they are written."""
-
-    def __init__(self, **options: Any) -> None:
-        plain = argparse.RawDescriptionHelpFormatter
-        super().__init__(formatter_class=plain, allow_abbrev=False, **options)
-
-    def error(self, message: str):
-        raise PlanError(f"{message}; see --help")
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..json_file import ResultsError, read_json
-from ..results import RunFolder, digest_of_file, replacing
+from ..results import FORMAT, RunFolder, digest_of_file, replacing
 from ..tasks.task import Outcome, Task, TaskId
 from .source import code_of, data_of, digest, packages_of
 
@@ -78,6 +78,7 @@ class Cache:
         files = {name: digest_of_file(self.folder.path / name) for name in outcome.files}
         outcome = dataclasses.replace(outcome, digests=files, origin={**self.origin, **outcome.origin})
         entry = {
+            "format": FORMAT,
             "task": task.title,
             "stage": task.stage,
             "alone": bool(task.process),
@@ -111,7 +112,7 @@ class Cache:
             return "missing", "", {}
         entry = read_entry(path)
         if entry is None or entry["task"] != task.title:
-            return "missing", "its entry is damaged", {}
+            return "missing", "its entry is damaged or of another version", {}
         outcome, parts, needs = Outcome(**entry["outcome"]), entry["parts"], entry["needs"]
         if damage := damaged(self.folder, entry["files"]):
             return "missing", damage, {}
@@ -126,12 +127,13 @@ class Cache:
 
 
 def read_entry(path: Path) -> dict[str, Any] | None:
-    """An entry as it was written, or None where it is damaged."""
+    """An entry as it was written, or None where it is damaged or of another format."""
     try:
         entry = read_json(path)
     except ResultsError:
         return None
-    return entry if entry.pop("digest", "") == digest(_text(entry).encode()) else None
+    whole = entry.pop("digest", "") == digest(_text(entry).encode())
+    return entry if whole and entry.get("format") == FORMAT else None
 
 
 def damaged(folder: RunFolder, files: Mapping[str, str]) -> str:
