@@ -193,7 +193,9 @@ SUITES = (
         "where it is named, or at preset paper",
         scenes=_shapes,
         methods=lambda extent: ["simulation", "skinning", "snug", SHAPED, "pbns", *CHEAP],
-        more_methods=tuple(entry.name for entry in LEARNED if entry.batched and entry.name != SHAPED),
+        more_methods=(
+            *(entry.name for entry in LEARNED if entry.batched and entry.name != SHAPED), *AGAIN,
+        ),
     ),
     Suite(
         name="performance",
