@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from reference_sim.array_file import read_arrays
-from snug.formats.smpl_body import read_smpl
 from snug.skeleton import JOINT_NAMES, BodyError, joint_transforms, rotation_matrices
 
 BAKED = Path(__file__).parent / "data" / "body.npz"
@@ -56,6 +55,8 @@ class Body:
     @staticmethod
     def from_file(path: str | Path) -> "Body":
         """A user's body: .npz or .pkl, see snug.formats.smpl_body. Raises BodyError."""
+        from snug.formats.smpl_body import read_smpl
+
         return Body(**read_smpl(Path(path)))
 
     @property

@@ -7,8 +7,9 @@ import numpy as np
 
 from snug.body import Body
 from snug.garment_cuts import SEAM_CUT, CutPlane, armhole_cut, level_cut, neck_cut
-from snug.garments import SHIRT_BONES, Garment, GarmentError, sewn
-from snug.tailoring import joint, legs_part
+from snug.garments import Garment, GarmentError
+from snug.sewing import sewn
+from snug.tailoring import SHIRT_BONES, joint, legs_part
 
 TSHIRT = "tshirt"  # the garment that a command takes where none is named
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from snug.body import Body
 from snug.dressed_body import DressedBody
-from snug.garments import Garment, nearest_body_vertices
+from snug.garments import Garment
 from snug.motion import Motion
+from snug.sewing import nearest_body_vertices
 
 AROUND, RINGS = 15, 10
 

@@ -64,6 +64,10 @@ class InProcess:
                 outcome = task.run(context, needed)
                 yield task, dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
 
+    def begin(self, tasks):
+        for task, _ in tasks:
+            task.begin(self._named.setdefault(task.process, self.context()))
+
     def alone(self, task, needed):
         return task.run(self._named.setdefault(task.process, self.context()), needed)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import signal
+import time
 
 from own_memory import needs_proc, own_memory
 
@@ -29,6 +30,22 @@ class Add(Task):
     stage = "adding"
     terms: tuple = (1, 2)
     how: str = ""
+
+    def begin(self, context):
+        if self.how == "die at once":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.how == "raise":
+            raise OSError("no such body")
+        context.memo["done"] = [f"{self.name} begun beside {self._others(context.folder.path)}"]
+
+    def _others(self, folder) -> int:
+        """How many others have begun once one has, or after a while."""
+        (folder / self.name).touch()
+        for _ in range(100):
+            if (others := len(list(folder.iterdir())) - 1) > 0:
+                return others
+            time.sleep(0.1)
+        return 0
 
     def warm_up(self) -> None:
         if self.how == "cold":
@@ -117,3 +134,22 @@ def test_a_named_process_is_kept_until_it_is_released(tmp_path):
         assert alone.alone(second, {}).result["memo"] == ["second"]
     finally:
         alone.close()
+
+
+def test_timed_tasks_begin_side_by_side_and_what_goes_wrong_there_is_their_outcome(tmp_path):
+    two = LocalExecutor(RunFolder(tmp_path), None, 2)
+    tasks = [
+        add("one", process="a"), add("other", process="b"),
+        add("dies", process="c", how="die at once"), add("raises", process="d", how="raise", terms=(1, "x")),
+    ]  # fmt: skip
+    try:
+        two.begin([(task, {}) for task in tasks])
+        assert not two._crew
+        one, other, dies, raises = (two.alone(task, {}) for task in tasks)
+        assert one.result["memo"] == ["one begun beside 1", "one"]
+        assert other.result["memo"] == ["other begun beside 1", "other"]
+        assert dies.status == "out-of-memory" and "SIGKILL" in dies.reason
+        assert raises.reason.startswith("TypeError")
+        assert two.alone(add("dies", process="c"), {}).result["memo"] == ["dies"]  # in a new process
+    finally:
+        two.close()

@@ -12,6 +12,7 @@ import queue
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from typing import Any, Protocol
 
 from ..assets import Assets
@@ -34,8 +35,11 @@ class Executor(Protocol):
     def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
         """Batches of untimed tasks, some side by side. bar: is told of units of progress."""
 
+    def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
+        """Timed tasks begin, some side by side, each in the process that it names."""
+
     def alone(self, task: Task, needed: Needed) -> Outcome:
-        """A timed task, nothing beside it, in the process that it names."""
+        """A timed task, nothing at work beside it, in the process that it names."""
 
     def release(self, process: str) -> None:
         """No other task wants that process."""
@@ -54,6 +58,7 @@ class LocalExecutor:
     def __init__(self, folder: RunFolder, assets: Assets | None, workers: int) -> None:
         self.folder, self.assets, self.workers = folder, assets, workers
         self._named: dict[str, IsolatedProcess] = {}
+        self._troubles: dict[str, Outcome] = {}  # process -> how it died before its task's turn
         self._crew: list[TaskProcess] = []
 
     def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
@@ -92,13 +97,33 @@ class LocalExecutor:
                 self._crew.clear()
                 raise
 
+    def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
+        self._dismiss()
+        with ThreadPoolExecutor(self.workers) as threads:
+            begun = {
+                task.process: threads.submit(
+                    _called, self._process(task), _begin, task, needed, seconds=task.deadline
+                )
+                for task, needed in tasks
+            }
+            try:
+                self._troubles |= {name: died for name, own in begun.items() if (died := own.result())}
+            except BaseException:
+                _end(set(begun.values()))
+                raise
+
     def alone(self, task: Task, needed: Needed) -> Outcome:
         self._dismiss()
-        process = self._named.get(task.process)
-        if process is None:
+        if trouble := self._troubles.pop(task.process, None):
+            return trouble
+        return _called(self._process(task), _perform, task, needed, seconds=task.deadline)
+
+    def _process(self, task: Task) -> IsolatedProcess:
+        """The one that a timed task names."""
+        if task.process not in self._named:
             context = Context(self.folder, task.assets(self.assets))
-            process = self._named[task.process] = IsolatedProcess(begin_tasks, context)
-        return _called(process, _perform, task, needed, seconds=task.deadline)
+            self._named[task.process] = IsolatedProcess(begin_tasks, context)
+        return self._named[task.process]
 
     def release(self, process: str) -> None:
         if process in self._named:
@@ -198,6 +223,13 @@ def begin_tasks(context: Context, progress: Any = None) -> None:
 def _forget() -> None:
     _context.memo.clear()
     give_back()
+
+
+def _begin(task: Task, needed: Needed) -> None:
+    for outcome in needed.values():
+        _verify(outcome.digests)
+    with suppress(Exception):  # it is raised again, and told, when it is the task's turn
+        task.begin(_context)
 
 
 def _perform(task: Task, needed: Needed) -> Outcome:

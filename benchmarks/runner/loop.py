@@ -6,7 +6,7 @@ Dry run, resume, failures, what an interrupt leaves and exclusive timing are dec
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, nullcontext
 from itertools import groupby
 from typing import Any, Protocol
@@ -16,6 +16,7 @@ from .cache import Cache, Found
 from .executor import Executor
 
 BLOCKED = "blocked"  # in the result of a task whose needs had failed
+AHEAD = 8  # timed tasks that begin together: each holds its scene in memory until its turn
 LEFT_OUT = "not asked for: --only names other states"
 
 
@@ -89,14 +90,28 @@ class Runner:
             bar.update(bar.total - bar.n)
 
     def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
+        begun: set[str] = set()  # processes
         with _bar(tasks[0], len(tasks)) as bar:
             for place, task in enumerate(tasks):
                 if self.decide(task):
+                    if task.process not in begun:
+                        soon = self._soon(tasks[place:], begun)
+                        executor.begin([(other, self._needed(other)) for other in soon])
+                        begun |= {other.process for other in soon}
                     task.clear(self.cache.folder)
                     self._keep(task, executor.alone(task, self._needed(task)))
                 if not any(self._comes(other, task.process) for other in tasks[place + 1 :]):
                     executor.release(task.process)
                 bar.update()
+
+    def _soon(self, tasks: Sequence[Task], begun: Set[str]) -> list[Task]:
+        """The next that are to be run and need nothing that is not there, each in another new process."""
+        soon: dict[str, Task] = {}
+        for task in tasks:
+            there = task.process not in begun and all(id in self.outcomes for id in task.needs)
+            if len(soon) < AHEAD and task.process not in soon and there and self.decide(task):
+                soon[task.process] = task
+        return list(soon.values())
 
     def _comes(self, task: Task, process: str) -> bool:
         """Whether the task will want that process."""

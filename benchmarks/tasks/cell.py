@@ -99,8 +99,13 @@ class CellTask(Task):
             context.memo["scene"] = built(self.cell.scene, context)
         return context.memo["scene"]
 
+    def begin(self, context: Context) -> None:
+        context.memo["ready"] = self.ready(context)
+
     def ready(self, context: Context) -> Method:
         """A fresh method, prepared."""
+        if "ready" in context.memo:
+            return context.memo.pop("ready")
         cell = self.cell
         method = cell.entry.make(models=context.folder.models_of(cell.scene.garment), seed=cell.seed)
         method.prepare(self.scene(context))

@@ -100,6 +100,9 @@ class Task:
         """What of the assets its own process needs."""
         return None
 
+    def begin(self, context: Context) -> None:
+        """What a timed task does before its turn, beside others. What it raises, run() has to raise again."""
+
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """Do it. needed: the outcomes of `needs` and `reads` that are there. What is raised is a failure."""
         raise NotImplementedError
