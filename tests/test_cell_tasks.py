@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -23,20 +22,15 @@ from benchmarks.runner import execution
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.dry_run import describe
 from benchmarks.runner.executor import LocalExecutor
-from benchmarks.runner.loop import Runner
-from benchmarks.runner.schedule import tasks_of
+from benchmarks.runner.loop import NoLog, Runner
+from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import SCENES as DECLARED
 from benchmarks.tasks.cell import Cell
-from benchmarks.tasks.task import Outcome, failure
+from benchmarks.tasks.task import Context, Outcome, failure
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = {scene.name: scene for scene in DECLARED}
 TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1)
-
-
-class NoLog:
-    def stage(self, name):
-        return nullcontext()
 
 
 def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", **changes) -> Plan:
@@ -81,6 +75,14 @@ def rows_of_cell(runner: Runner, plan: Plan) -> list[Row]:
 
 
 # --- processes -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["still", "raise"])
+def test_a_cell_tells_the_bar_that_it_is_done(tmp_path, how):
+    plan, told = plan_of(tmp_path, "newton-1", how=how), []
+    task = Schedule(plan).cell(plan.cells[0])
+    task.run(Context(RunFolder(tmp_path), tell=told.append), {})
+    assert sum(told) == task.units
 
 
 def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_path):

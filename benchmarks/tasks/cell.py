@@ -157,6 +157,7 @@ class RunCell(CellTask):
         except Exception as error:
             self.clear(context.folder)  # nobody is to look at the frames of a cell that failed
             outcome = replace(failure(error), result={"peak": peak_memory()})
+        context.tell(self.units)
         return replace(outcome, result={**outcome.result, "modules": loaded()})
 
     def _run(self, context: Context) -> Outcome:
