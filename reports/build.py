@@ -10,15 +10,14 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.results import ResultsError, RunFolder, replacing
+from reports.read import read_run, read_trajectory
 from snug.command_line import Parser, command
 
 if TYPE_CHECKING:
-    from reference_sim.trajectory import Trajectory
     from reports.data import Run
     from reports.plotting import Picture
     from reports.training import History
@@ -66,20 +65,6 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     return folder.report_path, problems
 
 
-def read_run(folder: RunFolder) -> Run:
-    """The rows of the folder and their declarations. Raises ResultsError."""
-    if not folder.path.is_dir():
-        raise ResultsError(f"{folder.path}: no such folder")
-    config, rows = folder.read_config(), folder.read_rows()
-    if not rows:
-        raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
-    from reports.by_frame import read_frames
-    from reports.data import run_data
-
-    run = run_data(config, rows, folder.changed(config))
-    return replace(run, frames=read_frames(folder.frame_energies_path))
-
-
 def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: list[str]) -> list[Picture]:
     """Every figure that the run holds something for."""
     from reports import figures
@@ -101,25 +86,6 @@ def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: li
     for trained in (held_out_curves, training_curves):
         pictures += trained(folder.figures, run, histories)
     return pictures + convergence_curve(folder, problems)
-
-
-def read_trajectory(folder: RunFolder, path: Path, problems: list[str]) -> Trajectory | None:
-    """A trajectory of the run with its curves, None where there is none; what cannot be read is a problem."""
-    from reference_sim.array_file import read_arrays
-    from reference_sim.trajectory import Trajectory, TrajectoryError
-
-    try:
-        if not path.is_file():
-            return None
-        trajectory = Trajectory.load(path)
-        if (curves := path.with_suffix(".npz")).is_file():
-            trajectory = replace(trajectory, frame_fields=trajectory.frame_fields | read_arrays(curves))
-        if trajectory.frames:
-            return trajectory
-        problems.append(f"{path.relative_to(folder.path)}: holds no whole frame")
-    except (TrajectoryError, ValueError, OSError) as error:
-        problems.append(str(error).replace(f"{folder.path}/", ""))
-    return None
 
 
 def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Picture:

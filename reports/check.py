@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 import pandas as pd
 
 from benchmarks.results import RunFolder
-from reports.build import read_run
 from reports.data import Run
 from reports.pareto import REPEATS, TIME
+from reports.read import read_run
 from snug.command_line import Parser, command
 
 SHOWN = 4  # names in a line

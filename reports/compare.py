@@ -13,11 +13,11 @@ from fnmatch import fnmatchcase
 import pandas as pd
 
 from benchmarks.results import ResultsError, RunFolder
-from reports.build import read_run
 from reports.data import SUITES, Metric, Run
 from reports.means import Mean, means
 from reports.numbers import number, with_spread
 from reports.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
+from reports.read import read_run
 from reports.significance import LEVEL, Effect, effect_on, holm, within_uncertainty
 from snug.command_line import Parser, command
 

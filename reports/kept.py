@@ -8,9 +8,9 @@ from pathlib import Path
 
 from benchmarks.results import ResultsError, RunFolder
 from reference_sim.trajectory import Trajectory
-from reports.build import read_run, read_trajectory
 from reports.data import Run
 from reports.page.roll_outs import finite_frames
+from reports.read import read_run, read_trajectory
 
 
 @dataclass(frozen=True)

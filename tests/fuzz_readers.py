@@ -204,8 +204,8 @@ def read_header(path: Path) -> None:
 
 def read_rows(path: Path, name: str = "results.csv") -> None:
     """That file of a run beside whole other ones; up to the tables of the report."""
-    from reports.build import read_run
     from reports.document import document
+    from reports.read import read_run
     from reports.tables import make_tables
 
     folder = RunFolder(path.parent / "run")

@@ -19,11 +19,11 @@ from report_folder import declaration, row, sheet, skipped, write_mesh
 
 from benchmarks.metrics import curvature
 from benchmarks.results import RunFolder
-from reports import build
 from reports.page.choice import groups
 from reports.page.pack import Pack
 from reports.page.vertex_values import area_change, depth, distance, mean_curvature, skin_of
 from reports.page.write import write_page
+from reports.read import read_run, read_trajectory
 from reports.tables import make_tables
 
 NASTY = '</script><script>window.hacked=1</script><img src=x onerror="window.hacked=1">\'" & мантия 裾'
@@ -97,11 +97,9 @@ def folder(tmp_path_factory) -> RunFolder:
 def write(run: RunFolder, **options) -> list[str]:
     """The page alone, without a PDF; returns what could not be read."""
     problems: list[str] = []
-    data = build.read_run(run)
+    data = read_run(run)
     tables = make_tables(data)
-    write_page(
-        run, data, tables, problems, lambda path: build.read_trajectory(run, path, problems), **options
-    )
+    write_page(run, data, tables, problems, lambda path: read_trajectory(run, path, problems), **options)
     return problems
 
 
@@ -227,7 +225,7 @@ def test_scenes_of_one_motion_share_the_body(folder):
 
 
 def test_clips_come_first_and_leading_methods_before_others(folder):
-    order = [(group.scene, list(group.paths)) for group in groups(folder, build.read_run(folder))]
+    order = [(group.scene, list(group.paths)) for group in groups(folder, read_run(folder))]
     leading = ["simulation", "skinning", "snug", "pbns"]
     assert order == [
         *((scene, leading) for scene in CLIPS), *((scene, ["newton-4"]) for scene in CLIPS),

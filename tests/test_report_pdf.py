@@ -11,6 +11,7 @@ from report_folder import METHODS, SCENES, TERMS, all_rows, declaration, row, sh
 from benchmarks.results import RunFolder
 from reports import build
 from reports.document import document
+from reports.read import read_run
 from reports.tables import make_tables
 
 pdfium = pytest.importorskip("pypdfium2", reason="the test extra is not installed")
@@ -72,7 +73,7 @@ def report(request, tmp_path_factory):
         for method in {r.method for r in rows} & {*METHODS, *HOSTILE}:
             fields = {f"energy/{t}": np.linspace(0, v, 5) for t, v in TERMS.items()}
             write_mesh(run.trajectory_path(scene, method), *sheet(0.1), fields)
-    read, problems = build.read_run(run), []
+    read, problems = read_run(run), []
     made = make_tables(read)
     build.typeset(run, document(read, made, build.draw(run, read, [], problems), problems))
     assert not problems

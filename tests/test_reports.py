@@ -27,6 +27,7 @@ from reports import build, training
 from reports.data import run_data
 from reports.document import document
 from reports.means import Mean
+from reports.read import read_run, read_trajectory
 from reports.tables import make_tables
 
 
@@ -161,11 +162,11 @@ def test_curves_beside_a_trajectory_are_its_own(tmp_path):
     path = run.trajectory_path(SCENES[0], "snug")
     write_mesh(path, *sheet(0.1), {"energy/strain": np.zeros(FRAMES), "iterations": np.ones(FRAMES)})
     np.savez(run.curves_path(SCENES[0], "snug"), **{"energy/strain": np.ones(FRAMES)})
-    fields = build.read_trajectory(run, path, []).frame_fields
+    fields = read_trajectory(run, path, []).frame_fields
     assert fields["energy/strain"].tolist() == fields["iterations"].tolist() == [1.0] * FRAMES
     run.curves_path(SCENES[0], "snug").write_bytes(b"no archive")
     problems = []
-    assert build.read_trajectory(run, path, problems) is None and "snug.npz" in problems[0]
+    assert read_trajectory(run, path, problems) is None and "snug.npz" in problems[0]
 
 
 def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
@@ -173,10 +174,10 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     run.write_rows(all_rows())
     digests = {"results.csv": digest_of_file(run.rows_path), "trajectories/gone.vtkhdf": "0"}
     run.write_config(declaration(all_rows(), digests=digests))
-    assert build.read_run(run).changed == []
-    assert document(build.read_run(run), {}, [], [])["first"]["changed"] == ""
+    assert read_run(run).changed == []
+    assert document(read_run(run), {}, [], [])["first"]["changed"] == ""
     run.write_rows(all_rows()[:-1])
-    said = document(build.read_run(run), {}, [], [])["first"]["changed"]
+    said = document(read_run(run), {}, [], [])["first"]["changed"]
     assert said.startswith("Not as the run wrote them: results.csv.")
 
 
@@ -229,7 +230,7 @@ def test_the_command_answers_without_loading_anything_heavy():
         "import sys, reports.build\n"
         "try:\n    reports.build.main(['--help'])\nexcept SystemExit:\n    pass\n"
         "heavy = {'numpy', 'pandas', 'scipy', 'matplotlib', 'torch', 'h5py', 'typst', 'pyvista'}\n"
-        "heavy |= {'reference_sim', 'snug'}\n"
+        "heavy |= {'reference_sim', 'snug.body'}\n"
         "sys.exit(bool(heavy & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=60).returncode == 0

@@ -13,7 +13,7 @@ from report_folder import all_rows, declaration, row
 from benchmarks import results
 from benchmarks.results import RunFolder
 from reports import build, dictionary, latex
-from reports.build import read_run
+from reports.read import read_run
 from reports.tables import make_tables
 
 TOP = r"\begin{tabular}[t]{@{}r@{}}"
