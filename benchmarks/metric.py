@@ -119,7 +119,7 @@ class RollOut(Kept):
         self.status, self.suites, self.trajectory = status, suites, trajectory
         self.quasi_static, self.counterpart = quasi_static, counterpart
         self.training_poses: np.ndarray | None = None
-        self.positions = finite_frames(trajectory.positions)
+        self.positions = trajectory.finite().positions
 
     @property
     def scene(self) -> BuiltScene:
@@ -186,12 +186,6 @@ class SceneRollOuts(Kept):
     def positions(self) -> list[np.ndarray]:
         """Of each roll-out."""
         return [roll_out.positions for roll_out in self.roll_outs]
-
-
-def finite_frames(positions: np.ndarray) -> np.ndarray:
-    """The frames (T',V,3) of positions (T,V,3) before the first that is not finite."""
-    bad = np.flatnonzero(~np.isfinite(positions).all(axis=(1, 2)))
-    return positions[: bad[0]] if len(bad) else positions
 
 
 def skinned(group: SceneRollOuts) -> np.ndarray | None:

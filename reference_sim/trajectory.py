@@ -100,6 +100,19 @@ class Trajectory:
         """The same frames with another status."""
         return replace(self, status=status, reason=reason)
 
+    def first(self, count: int) -> Trajectory:
+        """That many of its frames, or all that there are."""
+        return replace(
+            self, positions=self.positions[:count], times=self.times[:count],
+            frame_seconds=self.frame_seconds[:count],
+            frame_fields={name: values[:count] for name, values in self.frame_fields.items()},
+        )  # fmt: skip
+
+    def finite(self) -> Trajectory:
+        """The frames before the first in which a position is not finite."""
+        whole = np.isfinite(self.positions).all(axis=(1, 2))
+        return self if whole.all() else self.first(int(np.argmin(whole)))
+
 
 def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:
     """The first `frames` frames of an open file, default all that are whole; raises one of UNREADABLE."""

@@ -168,11 +168,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     path = Path(options.out)
     demand_writable(path)
     from reports.kept import read_kept
-    from reports.page.roll_outs import first_frames
 
     kept = read_kept(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
     cloth = kept.cloths[options.method]
-    meshes = {"garment": cloth} | ({"body": first_frames(kept.body, cloth.frames)} if kept.body else {})
+    meshes = {"garment": cloth} | ({"body": kept.body.first(cloth.frames)} if kept.body else {})
     write(path, meshes)
     sizes = ", ".join(f"{name} of {mesh.positions.shape[1]} vertices" for name, mesh in meshes.items())
     print(f"{path}: {cloth.frames} frames, {sizes}")

@@ -9,7 +9,6 @@ from pathlib import Path
 from benchmarks.results import ResultsError, RunFolder
 from reference_sim.trajectory import Trajectory
 from reports.data import Run
-from reports.page.roll_outs import finite_frames
 from reports.read import read_run, read_trajectory
 
 
@@ -49,7 +48,7 @@ def _read(folder: RunFolder, path: Path) -> Trajectory:
     found = read_trajectory(folder, path, problems)
     if found is None:
         raise ResultsError(problems[0] if problems else f"{path}: this run kept no such roll-out")
-    if not (found := finite_frames(found)).frames:
+    if not (found := found.finite()).frames:
         raise ResultsError(f"{path}: its first frame is not finite")
     return found
 

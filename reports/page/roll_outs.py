@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Container, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,7 +62,7 @@ def embed(folder: RunFolder, run: Run, budget: int, read: Reader) -> Embedded:
             found.missing[group.scene] = found.missing.get(group.scene, 0) + len(group.paths)
             continue
         read_ones = {method: read(path) for method, path in group.paths.items()}
-        whole = {method: finite_frames(cloth) for method, cloth in read_ones.items() if cloth is not None}
+        whole = {method: cloth.finite() for method, cloth in read_ones.items() if cloth is not None}
         cloths = {method: cloth for method, cloth in whole.items() if cloth.frames}
         if run.reference in cloths:
             references[group.scene] = cloths[run.reference]
@@ -93,21 +93,6 @@ def _kept(texts: dict[str, str], pack: Pack) -> dict[str, Any]:
     name = "b" + hashlib.sha256(text.encode()).hexdigest()[:16]
     texts[name] = text
     return {"text": name, "arrays": pack.entries}
-
-
-def finite_frames(cloth: Trajectory) -> Trajectory:
-    """Its frames before the first that is not finite."""
-    whole = np.isfinite(cloth.positions).all(axis=(1, 2))
-    return cloth if whole.all() else first_frames(cloth, int(np.argmin(whole)))
-
-
-def first_frames(cloth: Trajectory, count: int) -> Trajectory:
-    """That many of its frames, or all that there are."""
-    fields = {name: values[:count] for name, values in cloth.frame_fields.items()}
-    return replace(
-        cloth, positions=cloth.positions[:count], times=cloth.times[:count],
-        frame_seconds=cloth.frame_seconds[:count], frame_fields=fields,
-    )  # fmt: skip
 
 
 def _ending(cloth: Trajectory) -> str:
