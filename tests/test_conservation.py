@@ -20,7 +20,7 @@ from benchmarks.scene import Dressed
 from benchmarks.scenes import find_scene
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.task import Outcome
-from reference_sim import simulate
+from reference_sim import Trajectory, simulate
 
 SMOKE = find_preset("smoke")
 
@@ -156,7 +156,8 @@ def as_if_dressed(scene):
 
 def measured(scene, x, *, method="simulation", converged=None):
     converged = np.ones(len(x)) if converged is None else converged
-    trajectory = SimpleNamespace(positions=x, frames=len(x), frame_fields={"converged": converged})
+    fields = {"converged": np.asarray(converged)}
+    trajectory = Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt, frame_fields=fields)
     group = SceneRollOuts(scene)
     group.roll_outs.append(RollOut(group, find_method(method), trajectory))
     return conservation.measure(group.roll_outs[0])

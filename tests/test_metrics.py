@@ -31,7 +31,7 @@ from benchmarks.metrics.time_error import time_errors
 from benchmarks.results import Row
 from benchmarks.rows import remarked
 from benchmarks.validation.meshes import cylinder_patch, icosphere, right_grid, torus
-from reference_sim import Obstacle, simulate
+from reference_sim import Obstacle, Trajectory, simulate
 from snug.skeleton import JOINT
 
 
@@ -172,7 +172,9 @@ def test_inertia_follows_the_body_where_the_cloth_is_shaken_as_the_body_is():
         cloth = SimpleNamespace(masses=masses)
         scene = SimpleNamespace(**{"dt": 0.1, "cloth": cloth, "warm_up": 2, "kept": None} | scene)
         group = SimpleNamespace(scene=scene, kept=lambda make: shaken(jumps))
-        roll_out = RollOut(group, None, SimpleNamespace(positions=positions))
+        roll_out = RollOut(
+            group, None, Trajectory(positions, np.zeros((0, 3), int), np.arange(len(positions)) * 0.1)
+        )
         return correlation_with_body(roll_out)
 
     assert accelerations(shaken(jumps), masses, 0.1)[2:] == pytest.approx(100.0 * jumps)
