@@ -55,9 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     options = make_export_parser().parse_args(words)
+    from reference_sim.whole_file import demand_new
+
     folder = Path(options.out)
-    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
-        raise PlanError(f"--out {folder}: is there already; name a new folder")
+    demand_new(folder)
     plan = plan_of(options)
     try:
         scene, assets = built(plan)

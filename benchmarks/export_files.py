@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +11,7 @@ import numpy as np
 from reference_sim import Trajectory
 from reference_sim.material import GRAVITY
 from reference_sim.point_cache import write_point_cache
+from reference_sim.whole_file import new_folder
 
 from .methods import find_method
 
@@ -29,7 +28,7 @@ Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 def write_scene(
     folder: Path, plan: Plan, scene: BuiltScene, assets: Assets | None, *, score: str, reference: bool
 ) -> None:
-    """Write everything into a folder beside, then put that in place. score: the command that judges.
+    """Write everything into a new folder. score: the command that judges.
 
     Raises ValueError where --reference is asked of a scene that nobody simulates, RuntimeError where the
     garment does not settle.
@@ -37,10 +36,7 @@ def write_scene(
     declared = plan.scenes[0]
     if reference and declared.networks_only:
         raise ValueError(f"--reference: nobody simulates {declared.name}: it is for networks alone")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    part.mkdir()
-    try:
+    with new_folder(folder) as part:
         files = [*_cloth(part, scene), *_obstacle(part, scene)]
         if scene.dressed is not None:
             files += _motion(part, scene.dressed)
@@ -48,11 +44,6 @@ def write_scene(
         facts = description(plan, scene)
         (part / "scene.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
         (part / "README.txt").write_text(readme(scene, facts, files, score), encoding="utf-8")
-        if folder.exists():
-            folder.rmdir()
-        os.replace(part, folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def write_for_program(folder: Path, scene: BuiltScene) -> None:

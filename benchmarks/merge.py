@@ -10,8 +10,7 @@ from __future__ import annotations
 import shlex
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -96,6 +95,8 @@ def merge(paths: Sequence[Path], out: Path, *, command: str = "") -> list[Row]:
     config = _joined(runs, command)
     check_entries([run.folder for run in runs])
     rows = joined_rows({str(run.folder.path): run.rows for run in runs})
+    from reference_sim.whole_file import new_folder
+
     with new_folder(out) as part:
         folder, digests = RunFolder(part), dict[str, str]()
         for run in runs:
@@ -224,21 +225,6 @@ def _compare(one: tuple[Row, str], other: tuple[Row, str]) -> None:
             row = one[0]
             cell = f"{row.scene} x {row.method} seed {row.seed} / {row.metric}"
             raise MergeError(f"{cell}: {column} {a} in {one[1]}, {b} in {other[1]}")
-
-
-@contextmanager
-def new_folder(out: Path) -> Iterator[Path]:
-    """A folder to fill, there under its name once it is whole. Raises MergeError where that is taken."""
-    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise MergeError(f"--out {out}: is there already; name a new folder")
-    part = out.resolve().with_name(f".{out.resolve().name}.part")
-    shutil.rmtree(part, ignore_errors=True)  # of a merge that was killed
-    part.mkdir(parents=True)
-    try:
-        yield part
-        part.replace(out.resolve())
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def copied(name: str, digest: str, source: Path, target: Path) -> dict[str, str]:

@@ -254,15 +254,19 @@ def _curves(row: Row) -> tuple[str, ...]:
 
 
 def rises(gaps: Iterable[Row]) -> dict[str, str]:
-    """For each method whose gap is above that of a coarser one of its family: a remark that says so."""
+    """For each method whose gap is above that of a coarser one of its family: a remark that says so.
+
+    By more than two standard errors of both, where gaps are known from some of the frames.
+    """
     remarks: dict[str, str] = {}
-    lowest = ("", math.inf)
+    lowest = ("", math.inf, 0.0)
     for row in sorted(gaps, key=_fineness):
         assert row.value is not None
-        if row.value > max(lowest[1], ROUND_OFF):
+        error = row.uncertainty or 0.0
+        if row.value > max(lowest[1] + 2.0 * math.hypot(error, lowest[2]), ROUND_OFF):
             remarks[row.method] = f"{NOT_FALLING}: {lowest[0]}, the coarser one, has a gap of {lowest[1]:.2g}"
         if row.value < lowest[1]:
-            lowest = row.method, row.value
+            lowest = row.method, row.value, error
     return remarks
 
 

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, also where the disk is full."""
+"""Files and folders that appear whole or not at all, also where the disk is full."""
 
 from __future__ import annotations
 
@@ -32,6 +32,31 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def demand_new(folder: Path) -> None:
+    """Raises ValueError where something is there that a new folder would replace."""
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise ValueError(f"{folder}: is there already; name a new folder")
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """A folder to fill: under its name once the block ends well, gone when it does not. Raises ValueError
+    where something is there.
+    """
+    demand_new(folder)
+    whole = folder.resolve()
+    part = whole.with_name(f".{whole.name}.part")
+    shutil.rmtree(part, ignore_errors=True)  # of work that was killed
+    part.mkdir(parents=True)
+    try:
+        yield part
+        if whole.is_dir():  # and empty; not every system replaces it
+            whole.rmdir()
+        part.replace(whole)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def disk_full(error: BaseException) -> str:

@@ -6,8 +6,6 @@ A whole scene to be simulated elsewhere is what python -m benchmarks.export writ
 from __future__ import annotations
 
 import argparse
-import os
-import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -106,10 +104,12 @@ def demand_writable(path: Path) -> None:
             raise ValueError(f"{path}: needs pip install 'neural-garment-benchmark[{extra}]'")
     elif path.suffix not in (".pc2", ""):
         raise ValueError(f"{path}: give a name that ends in .abc, .usdc or .pc2, or a folder for .obj files")
-    if path.suffix == "" and path.exists() and not (path.is_dir() and not any(path.iterdir())):
-        raise ValueError(f"{path}: is there already; name a new folder")
     if path.suffix != "" and path.is_dir():
         raise ValueError(f"{path}: is a folder; name a file")
+    if path.suffix == "":
+        from reference_sim.whole_file import demand_new
+
+        demand_new(path)
 
 
 def write(path: Path, meshes: Meshes) -> None:
@@ -129,19 +129,12 @@ def write(path: Path, meshes: Meshes) -> None:
 
 def _write_frames(folder: Path, meshes: Meshes) -> None:
     from reference_sim.point_cache import write_obj
+    from reference_sim.whole_file import new_folder
 
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    part.mkdir()
-    try:
+    with new_folder(folder) as part:
         for name, mesh in meshes.items():
             for frame, positions in enumerate(mesh.positions):
                 write_obj(part / f"{name}_{frame:04d}.obj", positions, mesh.faces)
-        if folder.exists():
-            folder.rmdir()
-        os.replace(part, folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def make_parser() -> argparse.ArgumentParser:

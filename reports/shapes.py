@@ -10,18 +10,29 @@ import pandas as pd
 from reports.data import Run
 from reports.means import means
 from reports.numbers import number
-from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
+from reports.plotting import (
+    PAGE_WIDTH,
+    Picture,
+    grid,
+    legend_above,
+    log_axis,
+    new_figure,
+    power_text,
+    save,
+)  # fmt: skip
 from reports.styles import style
 from reports.table import Cell, Column, Table, metric_column, table
 
 SHAPE, TOTAL = "body/shape", "energy/total"
 SHOWN = (TOTAL, "energy/strain", "energy/collision", "penetration/vertices")
-LINEAR = (TOTAL, "penetration/vertices")
+LINEAR = ("penetration/vertices",)
+OTHERS = "other shapes"
 LEAST = 1e-4  # [J]: what is less is drawn here
 
 
 def shapes(run: Run) -> list[Table]:
-    """Each method on the mean body, on each other one, and their mean; and its total above the simulation's.
+    """Each method on the mean body and on all others together, then on each body; and its total above the
+    simulation's.
 
     Without a simulation, or a scene of another shape, there is none.
     """
@@ -30,9 +41,8 @@ def shapes(run: Run) -> list[Table]:
     if rows.empty or not columns:
         return []
     found = means(rows, "scene", "method", "metric")
-    other = rows[rows["scene"].map(sizes) > 0.0]
-    others = means(other, "method", "metric")
-    methods = run.ordered(set(rows["method"]))
+    others = means(rows[rows["scene"].map(sizes) > 0.0], "method", "metric")
+    methods = run.ordered(set(rows["method"]) - set(run.twins))
 
     def line(of: pd.Series, *key: str) -> tuple[Cell, ...]:
         values = [of.get((*key, metric.name)) for metric in columns]
@@ -41,27 +51,44 @@ def shapes(run: Run) -> list[Table]:
         return (above, *values)
 
     ordered = sorted(sizes.index, key=lambda scene: sizes[scene])
-    lines: list[tuple[Cell, ...]] = [
+    each: list[tuple[Cell, ...]] = [
         (scene, float(sizes[scene]), method, *line(found, scene, method))
         for scene in ordered
         for method in methods
     ]
-    together = [("other shapes", None, method, *line(others, method)) for method in methods]
+    together: list[tuple[Cell, ...]] = [(OTHERS, None, method, *line(others, method)) for method in methods]
+    of_mean = [own for own in each if own[1] == 0.0]
     heads = (
         Column("scene", "Scene", text=True), Column("shape", "Norm of the shape"),
         Column("method", "Method", text=True, method=True),
-        Column("above", "Above the simulation", "J"),
+        Column("above", "Above the simulation", "J"), *map(metric_column, columns),
     )  # fmt: skip
-    caption = "Body shapes: means over the other shapes, then scene by scene."
-    return table(
-        "shapes", (*heads, *map(metric_column, columns)), [*together, *lines], caption,
-        grouped_by=("scene",),
-    )  # fmt: skip
+    return [
+        *table(
+            "shapes", heads, [*together, *of_mean], "Body shapes: means over the others, and the mean body."
+        ),
+        *table("shapes_by_scene", heads, each, "Body shapes, body by body.", grouped_by=("scene",)),
+    ]
+
+
+def on_other_bodies(run: Run) -> str:
+    """What networks, and skinning alone, have above the simulation, in a sentence; empty without a number."""
+    made = next(iter(shapes(run)), None)
+    above = {line[2]: line[3] for line in made.rows if line[0] == OTHERS} if made else {}
+    told = [f"{run.label(name)} {number(value)}" for name, value in above.items()
+            if isinstance(name, str) and isinstance(value, float)
+            and run.methods[name].role in ("baseline", "network", "ablation")]  # fmt: skip
+    where = f"on {(_rows(run)[1] > 0.0).sum()} other bodies [J]"
+    return f"Total energy above the simulation's {where}: {', '.join(told)}." if told else ""
 
 
 def against_shape(folder: Path, run: Run) -> list[Picture]:
-    """A panel for each number, a mark for each method and body, bodies in the order of their norms."""
+    """A panel for each number, a mark for each method and body, bodies in the order of their norms.
+
+    The zero of the total is a choice: it is drawn above that of the simulation.
+    """
     rows, sizes = _rows(run)
+    rows = rows[~rows["method"].isin(run.twins)]
     shown = [name for name in SHOWN if name in set(rows["metric"])]
     if not shown:
         return []
@@ -71,9 +98,13 @@ def against_shape(folder: Path, run: Run) -> list[Picture]:
     drawn: set[str] = set()
     for number_, name in enumerate(shown, start=1):
         axes = figure.add_subplot(-(-len(shown) // 2), min(2, len(shown)), number_)
-        own = rows[rows["metric"] == name]
-        for method, line in own.groupby("method"):
-            values, look = line.groupby("scene")["value"].mean().reindex(ordered), style(run, str(method))
+        own = rows[rows["metric"] == name].groupby(["method", "scene"])["value"].mean().unstack(0)
+        own, heading = own.reindex(ordered), run.metrics[name].heading
+        if name == TOTAL and run.reference in own:
+            own = own.drop(columns=run.reference).sub(own[run.reference], axis=0)
+            heading = f"{run.metrics[name].title} above the simulation [{run.metrics[name].unit}]"
+        for method, values in own.items():
+            look = style(run, str(method))
             least = values if name in LINEAR else values.clip(lower=LEAST)
             axes.plot(
                 places, least.to_numpy(), color=look.colour, marker=look.marker, markersize=4, linewidth=0.5
@@ -81,12 +112,15 @@ def against_shape(folder: Path, run: Run) -> list[Picture]:
             drawn.add(str(method))
         axes.set_xticks(places, [number(sizes[scene], 2) for scene in ordered], fontsize=7)
         axes.set(xlabel="norm of the shape")
-        axes.set_ylabel(run.metrics[name].heading)
+        axes.set_ylabel(heading)
         if name not in LINEAR:
             log_axis(axes, "y")
         grid(axes)
     legend_above(figure, [style(run, method) for method in run.ordered(drawn)], lines=False)
-    caption = "One motion on the mean body (norm 0) and on others that no training has drawn."
+    caption = (
+        "One motion on the mean body (norm 0) and on others that no training has drawn. On axes that are "
+        f"logarithmic what is below {power_text(LEAST)} J is drawn there."
+    )
     return [save(figure, folder, "against_shape", caption=caption, kind="shapes")]
 
 

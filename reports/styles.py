@@ -49,6 +49,7 @@ KNOWN = {
     "snug": Style("", "#0072B2", "o"),
     "snug-paper": Style("", "#94A000", "o", "-."),
     "snug-dynamic": Style("", "#CC3311", "o"),
+    "snug-shapes": Style("", "#EE3377", "o", ":"),
     "newton": Style("Newton", "#D55E00", "P"),
     "lbfgs": Style("L-BFGS", "#CC79A7", "X"),
     "fast-lbfgs": Style("Fast L-BFGS", "#BB5566", "X", "--"),

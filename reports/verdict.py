@@ -12,6 +12,7 @@ from reports.narrative import fronts, unbroken
 from reports.numbers import number, with_spread
 from reports.overview import LEARNED, leads
 from reports.pareto import indistinct, run_time
+from reports.shapes import on_other_bodies
 from reports.significance import LEVEL, effect_on, within_uncertainty
 from reports.tables import BAD
 
@@ -21,7 +22,7 @@ MOST = 5  # of failures said on page one
 
 
 def verdict(run: Run) -> list[tuple[str, str]]:
-    """(topic, sentence) on how near, at what cost, and how certain: what the run holds numbers for."""
+    """(topic, sentence) on how near, at what cost, how certain, other bodies: where the run has numbers."""
     scenes = next(iter(run.garments(run.worn).values()), [])
     worn = run.worn[run.worn["scene"].isin(scenes)]
     cells = run.cells("speed", "garments")
@@ -29,7 +30,7 @@ def verdict(run: Run) -> list[tuple[str, str]]:
     timed = cells[cells["scene"].isin(compared)] if compared else worn
     said = {
         "How near": _near(run, worn), "At what cost": _cost(run, timed, compared),
-        "How certain": _trust(run, worn, timed),
+        "How certain": _trust(run, worn, timed), "On other bodies": on_other_bodies(run),
     }  # fmt: skip
     return [(topic, unbroken(sentence)) for topic, sentence in said.items() if sentence]
 

@@ -377,6 +377,8 @@ def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
     assert [r.method for r in found if r.reason] == ["newton-8"]
     assert found[2].reason == "the error does not fall here: newton-4, the coarser one, has a gap of 0.1"
     assert remarked([dataclasses.replace(rising[0], reason="kept"), *falling])[0].reason == "kept"
+    known_roughly = [dataclasses.replace(r, uncertainty=0.04) for r in (falling[1], rising[0])]
+    assert remarked(known_roughly) == known_roughly  # .1 and .2, by less than two standard errors of both
 
 
 def test_families_hold_every_level_from_coarse_to_fine():

@@ -27,7 +27,7 @@ from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.methods.program import program
 from benchmarks.registry import DeclarationError
-from benchmarks.request import outside
+from benchmarks.request import outside, selection
 from benchmarks.request.plan import Motions, Plan
 from benchmarks.results import RunFolder
 from benchmarks.runner.schedule import Schedule
@@ -220,7 +220,7 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
         installed(tmp_path / "site", module, name=name)
     monkeypatch.syspath_prepend(tmp_path / "site")
     with monkeypatch.context() as patch:
-        case = dataclasses.replace(run.MEASURED[0], name="membrane/uniaxial")
+        case = dataclasses.replace(selection.MEASURED[0], name="membrane/uniaxial")
         patch.setattr("benchmarks.request.selection.MEASURED", (case,))
         assert run.main(["--scenes", "free_fall", option, word, "-o", "out"]) == 2
     error = capsys.readouterr().err

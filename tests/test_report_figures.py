@@ -276,27 +276,34 @@ def shaped(method, metric, values, **more):
 def test_energies_are_drawn_and_listed_against_the_shape(tmp_path, monkeypatch):
     rows = shaped("simulation", "body/shape", (0.0, 6.0, 4.0), unit="1")
     rows += shaped("simulation", "energy/total", (0.3, 0.5, 0.4))
+    twin = {"family": "simulation-perturbed", "level": 1e-6}
+    rows += shaped("simulation-perturbed-1e-6", "energy/total", (0.3, 0.5, 0.4), **twin)
     rows += shaped("snug", "energy/total", (0.35, 0.8, 0.6)) + shaped(
         "snug", "energy/strain", (0.1, 0.4, 0.2)
     )
     (figure,) = drawn_by(monkeypatch, shapes.against_shape, tmp_path, run_of(rows))
-    lines = {tuple(line.get_ydata()) for line in figure.axes[0].get_lines()}
-    assert lines == {(0.3, 0.4, 0.5), (0.35, 0.6, 0.8)} and len(figure.axes) == 2
+    lines = [tuple(line.get_ydata()) for line in figure.axes[0].get_lines()]
+    assert lines == [pytest.approx((0.05, 0.2, 0.3))] and len(figure.axes) == 2  # above the simulation
+    assert figure.axes[0].get_ylabel().startswith("Total above the simulation")
     labels = [label.get_text() for label in figure.axes[0].get_xticklabels()]
     assert all(list(line.get_xdata()) == [0, 1, 2] for line in figure.axes[0].get_lines())
     assert [float(label) for label in labels] == [0.0, 4.0, 6.0]
 
-    (made,) = shapes.shapes(run_of(rows))
-    names = [column.name for column in made.columns]
+    together, each = shapes.shapes(run_of(rows))
+    names = [column.name for column in together.columns]
     assert names == ["scene", "shape", "method", "above", "energy/total", "energy/strain"]
-    found = {(line[0], line[2]): line for line in made.rows}
+    assert len(each.rows) == 6 and set(together.rows[2:]) <= set(each.rows)
+    found = {(line[0], line[2]): line for line in (*together.rows, *each.rows)}
     assert list(found)[:4] == [(s, m) for s in ("other shapes", "shapes/0") for m in ("simulation", "snug")]
     together = found["other shapes", "snug"]
     assert together[3] == pytest.approx(0.7 - 0.45) and together[4].value == pytest.approx(0.7)
     assert found["shapes/2", "snug"][1] == 4.0 and found["shapes/2", "snug"][3] == pytest.approx(0.2)
     assert found["shapes/2", "simulation"][3] is None and found["shapes/2", "simulation"][5] is None
 
+    said = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.250."
+    assert shapes.on_other_bodies(run_of(rows)) == said
     one = [r for r in rows if r.scene == "shapes/0"]
+    assert shapes.on_other_bodies(run_of(one)) == ""
     assert shapes.shapes(run_of(one)) == shapes.against_shape(tmp_path, run_of(one)) == []
 
 

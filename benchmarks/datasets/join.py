@@ -8,7 +8,7 @@ from pathlib import Path
 
 from snug.dataset import MISSING, DataSet, SimulatedSequence
 
-from ..merge import MergeError, check_entries, copied, new_folder
+from ..merge import MergeError, check_entries, copied
 from ..results import RunFolder
 from ..runner.cache import read_entry
 from ..tasks.sequence import SimulateSequence
@@ -30,6 +30,8 @@ def merge(paths: Sequence[Path], out: Path) -> DataSet:
                 raise MergeError(f"sequence {line.name}: other bytes in {found.folder} than in {where}")
     commands = dict.fromkeys(command for found in sets for command in found.commands)
     lines = tuple(line for line, _ in taken.values())
+    from reference_sim.whole_file import new_folder
+
     with new_folder(out) as part:
         for line, source in taken.values():
             for name, digest in line.digests.items():
