@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -85,6 +86,13 @@ def cluster(folder: Path, workers: int) -> Iterator[Cluster]:
         started.close()
 
 
+def worker() -> int:
+    """Who has asked for this process: not its parent, which is the server that forked it."""
+    asking = multiprocessing.parent_process()
+    assert asking is not None and asking.pid is not None
+    return asking.pid
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Write(Task):
     """A file of so many random numbers, plus those of what it needs; `how` says what it does besides."""
@@ -101,13 +109,13 @@ class Write(Task):
     def run(self, context, needed):
         if self.mark:
             with open(self.mark, "a") as file:
-                file.write(f"{os.getppid()} {os.getpid()}\n")
+                file.write(f"{worker()} {os.getpid()}\n")
         if self.how == "raise":
             raise ValueError("broken on purpose")
         if self.how == "die":
             os.kill(os.getpid(), signal.SIGKILL)
         if self.how == "die with the worker":
-            os.kill(os.getppid(), signal.SIGKILL)
+            os.kill(worker(), signal.SIGKILL)
             time.sleep(60)
         time.sleep(self.seconds)
         numbers = np.random.default_rng(self.seed).random(self.count)
