@@ -85,6 +85,16 @@ def test_a_cell_tells_the_bar_that_it_is_done(tmp_path, how):
     assert sum(told) == task.units
 
 
+def test_only_a_method_of_the_project_is_prepared_before_its_turn(tmp_path):
+    plan = plan_of(tmp_path, "newton-1", how="still")
+    own = dataclasses.replace(plan.cells[0].entry, declared_in="mine.py")
+    for entry, names in ((plan.cells[0].entry, {"scene", "ready"}), (own, set())):
+        context = Context(RunFolder(tmp_path))
+        cell = dataclasses.replace(plan.cells[0], entry=entry)
+        dataclasses.replace(Schedule(plan).cell(plan.cells[0]), cell=cell).begin(context)
+        assert set(context.memo) == names
+
+
 def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_path):
     plan = plan_of(tmp_path, "simulation", scene="hanging_sheet")
     outcome = outcome_of(plan)

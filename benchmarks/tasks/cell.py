@@ -100,7 +100,11 @@ class CellTask(Task):
         return context.memo["scene"]
 
     def begin(self, context: Context) -> None:
-        context.memo["ready"] = self.ready(context)
+        """The scene, and the method prepared: one of the project's own, which is still until it is run. What
+        others leave at work would count against whoever is timed meanwhile.
+        """
+        if not self.cell.entry.declared_in:
+            context.memo["ready"] = self.ready(context)
 
     def ready(self, context: Context) -> Method:
         """A fresh method, prepared."""
