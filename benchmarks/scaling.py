@@ -1,8 +1,9 @@
 """How a study would spread over many workers: the runner's schedule simulated with the seconds of a run.
 
-A stage ends before the next begins, the longest tasks go first, and one runner hands out every task, takes
-every result back and writes it. Timed cells run alone on one machine. Networks between machines, disks that
-are shared and workers that die are left out.
+The longest tasks go first, and one runner hands out every task, takes every result back and writes it. Timed
+cells run alone on one machine. What a task needs is not known here: so a stage ends before the next begins,
+where the runner fills the wait with whatever is ready. Networks between machines, disks that are shared and
+workers that die are left out.
 """
 
 from __future__ import annotations

@@ -56,8 +56,9 @@ class InProcess:
     def context(self) -> Context:
         return Context(self.folder, self.assets)
 
-    def together(self, batches, bar):
-        for tasks, needed in batches:
+    def together(self, ready, bar):
+        while batch := ready():
+            tasks, needed = batch
             context = self.context()
             for task in tasks:
                 clock = time.perf_counter()

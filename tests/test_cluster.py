@@ -59,8 +59,9 @@ def folder(tmp_path):
 
 def together(folder: RunFolder, address: str, *batches, needed=None) -> dict[str, Outcome]:
     executor = ClusterExecutor(folder, None, 1, address)
+    left = [(batch, needed or {}) for batch in reversed(batches)]
     try:
-        found = executor.together([(batch, needed or {}) for batch in batches], Bar())
+        found = executor.together(lambda: left.pop() if left else None, Bar())
         return {task.name: outcome for task, outcome in found}
     finally:
         executor.close()

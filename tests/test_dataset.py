@@ -53,8 +53,8 @@ class Here(InProcess):
     def __init__(self, plan, folder, assets) -> None:
         super().__init__(folder, assets)
 
-    def together(self, batches, bar):
-        for one in super().together(batches, bar):
+    def together(self, ready, bar):
+        for one in super().together(ready, bar):
             Here.done += 1
             yield one
             if Here.done >= Here.most:

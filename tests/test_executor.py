@@ -74,7 +74,9 @@ def add(name: str, **fields) -> Add:
 
 def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Bar]:
     bar = Bar()
-    done = LocalExecutor(RunFolder(folder), None, workers).together([(batch, {}) for batch in batches], bar)
+    left = [(batch, {}) for batch in reversed(batches)]
+    executor = LocalExecutor(RunFolder(folder), None, workers)
+    done = executor.together(lambda: left.pop() if left else None, bar)
     return {task.name: outcome for task, outcome in done}, bar
 
 

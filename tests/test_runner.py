@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from misbehaving import interrupt_at
+from tasks_by_hand import InProcess
 from test_cell_tasks import TINY, NoLog, found_of, of_session, outcome_of, plan_of
 
 from benchmarks import run
@@ -144,6 +145,50 @@ def run_tasks(folder: Path, *tasks: Task, only=("stale", "missing")) -> Runner:
     runner = Runner(tasks, Cache(RunFolder(folder), only=only))
     runner.run(LocalExecutor(RunFolder(folder), None, 1), NoLog())
     return runner
+
+
+class TwoAtOnce(InProcess):
+    """Two workers, of which the one that began first ends first; writes down what is at work at a time."""
+
+    def __init__(self, folder: RunFolder) -> None:
+        super().__init__(folder)
+        self.at_work: list[list[str]] = []
+
+    def together(self, ready, bar):
+        begun = []
+        while True:
+            while len(begun) < 2 and (batch := ready()):
+                begun.append(batch)
+            if not begun:
+                return
+            self.at_work.append([task.name for tasks, _ in begun for task in tasks])
+            tasks, needed = begun.pop(0)
+            for task in tasks:
+                yield task, task.run(self.context(), needed)
+
+    def alone(self, task, needed):
+        self.at_work.append([task.name])
+        return super().alone(task, needed)
+
+
+def test_workers_that_would_wait_begin_what_comes_later_and_nothing_is_beside_a_timed_task(tmp_path):
+    def ids(*names: str) -> tuple[tuple[str, str], ...]:
+        return tuple(("network", name) for name in names)
+
+    tasks = (
+        task("short"), task("long", units=5), task("next", needs=ids("short", "long")),
+        task("timed", needs=ids("next"), process="own"),
+        task("after", needs=ids("timed")), task("one", needs=ids("short"), batch="both"),
+        task("two", needs=ids("long"), batch="both"), task("three", needs=ids("next")),
+    )  # fmt: skip
+    folder = RunFolder(tmp_path)
+    runner, executor = Runner(tasks, Cache(folder)), TwoAtOnce(folder)
+    runner.run(executor, NoLog())
+    assert executor.at_work == [
+        ["long", "short"], ["short"], ["next", "one", "two"], ["one", "two"], ["timed"],
+        ["after", "three"], ["three"],
+    ]  # fmt: skip
+    assert all(outcome.status == "ok" for outcome in runner.outcomes.values())
 
 
 def test_a_task_whose_process_is_killed_is_kept_as_failed_and_done_again_when_asked(tmp_path):

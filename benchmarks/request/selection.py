@@ -148,7 +148,8 @@ def _pairs(request: Request) -> Iterator[tuple[str, str, MethodEntry]]:
             continue
         more = suite.more_methods if request.methods or request.preset.further else ()
         further = suite.named_methods if request.methods else ()
-        methods = (*suite.methods(extent), *more, *further, *sorted(own_methods))
+        asked = replace(extent, full=extent.full or bool(request.methods))
+        methods = (*suite.methods(asked), *more, *further, *sorted(own_methods))
         for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
             # Networks for a second garment double the training: only for whoever names its scenes.
             plain = not extent.further and declared[scene].garment not in ("", extent.motions.first_garment)
@@ -163,14 +164,16 @@ def _pairs(request: Request) -> Iterator[tuple[str, str, MethodEntry]]:
 
 
 def _cases(request: Request) -> Iterator[Case]:
-    """Those of the suites; the smallest preset runs those marked, unless they are named.
+    """Those of the suites; the smallest preset runs those marked, unless they are named, and a run that names
+    no suite those that are not long.
 
     Naming methods without the simulation leaves them out.
     """
     if named(METHOD, request.methods):
         for case in CASES:
             small = case.smoke or request.scenes or not request.preset.smallest
-            if small and case.suite in request.suites and named(case.name, request.scenes):
+            short = request.extent.full or not case.long
+            if small and short and case.suite in request.suites and named(case.name, request.scenes):
                 yield case
 
 
@@ -206,7 +209,7 @@ def _unlisted_scenes(request: Request) -> dict[str, str]:
 
 def _listed_methods() -> set[str]:
     """Every method that some suite lists at some preset."""
-    extents = [Extent(preset, Motions()) for preset in PRESETS]
+    extents = [Extent(preset, Motions(), full=True) for preset in PRESETS]
 
     def of_suite(suite: Suite) -> set[str]:
         return {

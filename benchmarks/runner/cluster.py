@@ -27,7 +27,7 @@ from ..tasks.task import Outcome, RunStopped, Task, TaskId, failure, one_line
 from . import cluster_worker
 from .cache import damaged
 from .cluster_worker import ASSETS, PIECE, Gone, Unfit
-from .executor import POLL, Done, LocalExecutor, Needed
+from .executor import POLL, Done, LocalExecutor, Needed, Ready
 from .source import digest
 
 ATTEMPTS = 3  # workers that may die of a task
@@ -97,15 +97,16 @@ class ClusterExecutor(LocalExecutor):
         self._died: dict[TaskId, list[str]] = {}  # addresses of the workers that died of a task
         self._waiting: deque[tuple[deque[Task], Needed]] = deque()
         self._finished: deque[Done] = deque()
+        self._ready: Ready = lambda: None
         self._opened = False  # whether any worker has begun with the run
         self._looked = 0.0
         self._said_alone = False
 
-    def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
-        self._waiting.extend((deque(batch), needed) for batch, needed in batches)
-        self._looked = 0.0  # whoever went since the last stage would be asked in vain for half a minute
+    def together(self, ready: Ready, bar: Any) -> Iterator[Done]:
+        self._ready = ready
+        self._looked = 0.0  # whoever has gone meanwhile would be asked in vain for half a minute
         try:
-            while self._waiting or self._busy() or self._finished:
+            while self._fill() or self._busy() or self._finished:
                 self._look(bar)
                 self._hand_out()
                 ended = [(worker, lane) for worker, lane in self._busy() if lane.future.done()]
@@ -124,6 +125,12 @@ class ClusterExecutor(LocalExecutor):
     def close(self) -> None:
         super().close()
         self._client.close()
+
+    def _fill(self) -> bool:
+        """Whether a batch waits for a thread; asks for one where none does."""
+        if not self._waiting and (batch := self._ready()):
+            self._waiting.append((deque(batch[0]), batch[1]))
+        return bool(self._waiting)
 
     def _dismiss(self) -> None:
         """Cancel what the cluster does, and let it forget the run: none of it is beside a timed task."""
@@ -221,12 +228,12 @@ class ClusterExecutor(LocalExecutor):
         """A batch to each thread that has none."""
         for worker in list(self._workers.values()):
             for lane in worker.lanes:
-                if self._waiting and self._knows(worker) and not lane.batch:
+                if self._knows(worker) and not lane.batch:
                     self._go_on(worker, lane)
 
     def _go_on(self, worker: _Worker, lane: _Lane) -> None:
         """The next task of its batch to a thread, or the first of another."""
-        if not lane.batch and self._waiting:
+        if not lane.batch and self._fill():
             lane.batch, lane.needed = self._waiting.popleft()
             lane.fresh = True
         if lane.batch:

@@ -79,11 +79,11 @@ def close_run(run: str) -> None:
         shutil.rmtree(left.folder, ignore_errors=True)
 
 
-def progress(run: str) -> int:
-    """Units of progress since the last call."""
+def progress(run: str) -> float:
+    """Progress since the last call, in seconds that it was expected to take."""
     there = _runs.get(run)
     if there is None:
-        return 0
+        return 0.0
     there.asked = time.monotonic()
     return sum(process.told() for process in list(there.processes.values()))
 

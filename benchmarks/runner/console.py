@@ -37,7 +37,7 @@ def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
         if kept:
             counts = {s: sum(row.status == s for row in kept) for s in dict.fromkeys(r.status for r in kept)}
             parts.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in counts.items()))
-    parts.append("stages: " + ", ".join(f"{stage['name']} {stage['seconds']:.0f} s" for stage in stages))
+    parts.append("stages: " + "; ".join(f"{stage['name']} {stage['seconds']:.0f} s" for stage in stages))
     return "\n\n".join(parts)
 
 

@@ -10,7 +10,7 @@ import multiprocessing
 import os
 import queue
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from typing import Any, Protocol
@@ -26,14 +26,20 @@ POLL = 0.2  # [s] between looks at the progress
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
 
 Needed = Mapping[TaskId, Outcome]
+Batch = tuple[Sequence[Task], Needed]
 Done = tuple[Task, Outcome]
+Ready = Callable[[], Batch | None]
 
 
 class Executor(Protocol):
     """Executes tasks whose needs are there; gives outcomes, in any order."""
 
-    def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
-        """Batches of untimed tasks, some side by side. bar: is told of units of progress."""
+    def together(self, ready: Ready, bar: Any) -> Iterator[Done]:
+        """Batches of untimed tasks, some side by side, until none is at work and none is ready.
+
+        ready: the next batch that can begin, None where there is none before further outcomes are known.
+        bar: is told of progress.
+        """
 
     def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
         """Timed tasks begin, some side by side, each in the process that it names."""
@@ -51,7 +57,7 @@ class Executor(Protocol):
 class LocalExecutor:
     """Single-threaded processes of this machine, at most `workers` side by side.
 
-    Workers stay for the next stage, which then loads and compiles nothing again; none is there beside a timed
+    Workers stay for the next batch, which then loads and compiles nothing again; none is there beside a timed
     task.
     """
 
@@ -61,41 +67,44 @@ class LocalExecutor:
         self._troubles: dict[str, Outcome] = {}  # process -> how it died before its task's turn
         self._crew: list[TaskProcess] = []
 
-    def together(self, batches: Sequence[tuple[Sequence[Task], Needed]], bar: Any) -> Iterator[Done]:
-        count = min(self.workers, len(batches))
-        context = Context(self.folder, self.assets)
-        self._crew += [TaskProcess(begin_tasks, context) for _ in range(count - len(self._crew))]
-        crew = self._crew[:count]
-        idle: queue.SimpleQueue[TaskProcess] = queue.SimpleQueue()
-        for worker in crew:
-            idle.put(worker)
-
+    def together(self, ready: Ready, bar: Any) -> Iterator[Done]:
         finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
 
-        def do(batch: Sequence[Task], needed: Needed) -> None:
-            worker = idle.get()
-            try:
-                worker.forget()
-                for task in batch:
-                    finished.put((task, worker.do(task, dict(needed))))
-            finally:
-                idle.put(worker)
+        def do(worker: TaskProcess, batch: Batch) -> None:
+            worker.forget()
+            tasks, needed = batch
+            for task in tasks:
+                finished.put((task, worker.do(task, dict(needed))))
 
-        with ThreadPoolExecutor(max(count, 1)) as threads:  # one waits for each worker
-            left = {threads.submit(do, *batch) for batch in batches}
+        at_work: dict[Future[None], TaskProcess] = {}
+        with ThreadPoolExecutor(self.workers) as threads:  # one waits for each worker
             try:
-                while left:
-                    ended, left = wait(left, timeout=POLL, return_when=FIRST_COMPLETED)
-                    for worker in crew:
+                while True:
+                    while len(at_work) < self.workers and (batch := ready()):
+                        worker = self._idle(at_work.values())
+                        at_work[threads.submit(do, worker, batch)] = worker
+                    if not at_work:
+                        break
+                    ended, _ = wait(at_work, timeout=POLL, return_when=FIRST_COMPLETED)
+                    for worker in at_work.values():
                         bar.update(min(worker.told(), bar.total - bar.n))
                     for future in ended:
+                        del at_work[future]
                         future.result()
                     while not finished.empty():
                         yield finished.get()
             except BaseException:
-                _end(left)
+                _end(set(at_work))
                 self._crew.clear()
                 raise
+
+    def _idle(self, at_work: Collection[TaskProcess]) -> TaskProcess:
+        """A worker that does nothing, a new one where all are at work."""
+        for worker in self._crew:
+            if worker not in at_work:
+                return worker
+        self._crew.append(TaskProcess(begin_tasks, Context(self.folder, self.assets)))
+        return self._crew[-1]
 
     def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
         self._dismiss()
@@ -179,12 +188,12 @@ class TaskProcess:
             self.warm.add((task.kind, task.modules[0]))
         return trouble
 
-    def told(self) -> int:
-        """Units of progress since the last call."""
-        progress, units = self.progress, 0  # the worker may get another meanwhile
+    def told(self) -> float:
+        """Progress since the last call, in seconds that it was expected to take."""
+        progress, seconds = self.progress, 0.0  # the worker may get another meanwhile
         while not progress.empty():
-            units += progress.get()
-        return units
+            seconds += progress.get()
+        return seconds
 
 
 def _called(process: IsolatedProcess, function: Callable[..., Any], *arguments: Any, seconds: Any) -> Any:
@@ -212,9 +221,9 @@ _verified: set[tuple[str, str]] = set()  # files that this process has compared 
 
 
 def begin_tasks(context: Context, progress: Any = None) -> None:
-    """Keep what a process knows. progress: a queue of units, None where nobody follows them."""
+    """Keep what a process knows. progress: a queue of expected seconds, None where nobody follows them."""
     global _context
-    tell: Callable[[int], None] = tell_nobody if progress is None else progress.put
+    tell: Callable[[float], None] = tell_nobody if progress is None else progress.put
     if progress is not None:
         os.environ["TQDM_DISABLE"] = "1"  # one bar for all that are side by side is enough
     _context = dataclasses.replace(context, tell=tell, memo={})
@@ -235,9 +244,10 @@ def _begin(task: Task, needed: Needed) -> None:
 def _perform(task: Task, needed: Needed) -> Outcome:
     for outcome in needed.values():
         _verify(outcome.digests)
+    context = dataclasses.replace(_context, tell=lambda units: _context.tell(units * task.unit_seconds))
     clock = time.perf_counter()
     try:
-        outcome = task.run(_context, needed)
+        outcome = task.run(context, needed)
     except Exception as error:
         outcome = failure(error)
     return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)

@@ -8,12 +8,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, nullcontext
-from itertools import groupby
+from itertools import takewhile
 from typing import Any, Protocol
 
 from ..tasks.task import Outcome, Task, TaskId, failure
 from .cache import Cache, Found
-from .executor import Executor
+from .executor import Batch, Executor
 
 BLOCKED = "blocked"  # in the result of a task whose needs had failed
 AHEAD = 8  # timed tasks that begin together: each holds its scene in memory until its turn
@@ -55,43 +55,57 @@ class Runner:
     # --- running -------------------------------------------------------------------------------------------
 
     def run(self, executor: Executor, log: Log) -> None:
-        """All tasks, stage by stage."""
+        """All tasks: the timed ones one by one, the others side by side before, between and after them."""
+        left = self.tasks
         try:
-            for stage, group in groupby(self.tasks, key=lambda task: task.stage):
-                with log.stage(stage):
-                    self._stage(list(group), executor)
+            while left:
+                due = tuple(takewhile(lambda task: not task.process, left))
+                if due:
+                    later = [task for task in left[len(due) :] if not task.process]
+                    with log.stage(_titles(due)):
+                        self._side_by_side(due, later, executor)
+                else:
+                    due = tuple(takewhile(lambda task: task.process and task.stage == left[0].stage, left))
+                    with log.stage(_titles(due)):
+                        self._alone(due, executor)
+                left = tuple(task for task in left if task.id not in self.outcomes)
         finally:
             executor.close()
 
-    def _stage(self, tasks: Sequence[Task], executor: Executor) -> None:
-        if tasks[0].process:
-            self._alone(tasks, executor)
-        while tasks and not tasks[0].process:  # those that need one another, one after another
-            left = {task.id for task in tasks}
-            later = [task for task in tasks if left & {*task.needs, *task.reads}]
-            self._together([task for task in tasks if task not in later], executor)
-            tasks = later
+    def _side_by_side(self, due: Sequence[Task], later: Sequence[Task], executor: Executor) -> None:
+        """Those due, each as soon as what it needs is there; a worker that would wait begins later ones."""
+        for task in due:
+            if self._is_ready([task]):
+                self.decide(task)
+        with _bar(due, sum(task.expected_seconds for task in due if task.id not in self.outcomes)) as bar:
+            waiting = [*_batches(due), *_batches(later)]
 
-    def _together(self, tasks: Sequence[Task], executor: Executor) -> None:
-        wanted = [task for task in tasks if self.decide(task)]
-        if not wanted:
-            return
-        batches: dict[str, list[Task]] = {}
-        for task in wanted:
-            batches.setdefault(task.batch or task.name, []).append(task)
-        # The longest first: the workers then end at about the same time.
-        ordered = sorted(batches.values(), key=lambda batch: -sum(task.units for task in batch))
-        handed = [(batch, self._needed(*batch)) for batch in ordered]
-        for task in wanted:
-            task.clear(self.cache.folder)
-        with _bar(tasks[0], sum(task.units for task in wanted)) as bar:
-            for task, outcome in executor.together(handed, bar):
+            def ready() -> Batch | None:
+                if all(task.id in self.outcomes for task in due):
+                    return None
+                for batch in list(waiting):
+                    if self._is_ready(batch):
+                        waiting.remove(batch)
+                        if wanted := [task for task in batch if self.decide(task)]:
+                            if wanted[0] not in due:
+                                bar.total += sum(task.expected_seconds for task in wanted)
+                            for task in wanted:
+                                task.clear(self.cache.folder)
+                            return wanted, self._needed(*wanted)
+                return None
+
+            for task, outcome in executor.together(ready, bar):
                 self._keep(task, outcome)
             bar.update(bar.total - bar.n)
 
+    def _is_ready(self, batch: Sequence[Task]) -> bool:
+        """Whether what became of all that the tasks build upon is known."""
+        ids = (id for task in batch for id in (*task.needs, *task.reads))
+        return all(id in self.outcomes or id not in self.titles for id in ids)
+
     def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
         begun: set[str] = set()  # processes
-        with _bar(tasks[0], len(tasks)) as bar:
+        with _bar(tasks, len(tasks)) as bar:
             for place, task in enumerate(tasks):
                 if self.decide(task):
                     if task.process not in begun:
@@ -211,7 +225,26 @@ class Runner:
         }
 
 
-def _bar(task: Task, total: int) -> Any:
+def _titles(tasks: Sequence[Task]) -> str:
+    return ", ".join(dict.fromkeys(task.stage for task in tasks))
+
+
+def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
+    """What is handed out together: stage by stage, the longest first, so that workers end at about the same
+    time.
+    """
+    found: dict[tuple[str, str], list[Task]] = {}
+    for task in tasks:
+        found.setdefault((task.kind, task.batch or task.name), []).append(task)
+    stages = list(dict.fromkeys(task.stage for task in tasks))
+    return sorted(
+        found.values(),
+        key=lambda batch: (stages.index(batch[0].stage), -sum(task.expected_seconds for task in batch)),
+    )
+
+
+def _bar(tasks: Sequence[Task], total: float) -> Any:
     from reference_sim.progress import progress_bar
 
-    return progress_bar(total=total, desc=task.stage, unit=task.unit, smoothing=0.05)
+    shown = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
+    return progress_bar(total=total, desc=_titles(tasks), bar_format=shown, smoothing=0.05)

@@ -20,7 +20,7 @@ class RunCase(Task):
 
     kind = "case"
     stage = "validation"
-    unit = "case"
+    unit_seconds = 0.5
     case: Case
 
     def warm_up(self) -> None:

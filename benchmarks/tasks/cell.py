@@ -86,7 +86,7 @@ class CellTask(Task):
     """
 
     stage = "cells"
-    unit = "cell"
+    unit_seconds = 2.0
     cell: Cell
     least: float = 0.0
 

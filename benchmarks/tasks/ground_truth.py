@@ -29,7 +29,7 @@ class SettleStart(Task):
     kind = "start"
     silent = True
     stage = "ground truth"
-    unit = "frame"
+    unit_seconds = 0.07
     scene: Scene
 
     def clear(self, folder: RunFolder) -> None:
@@ -84,7 +84,7 @@ class SimulateMotion(Task):
     kind = "data"
     silent = True
     stage = "ground truth"
-    unit = "frame"
+    unit_seconds = 0.07
     scene: Scene
     entry: MethodEntry
 
@@ -119,7 +119,7 @@ class SimulateClips(Task):
     kind = "clips"
     silent = True
     stage = "ground truth"
-    unit = "frame"
+    unit_seconds = 0.07
     scene: Scene
     entry: MethodEntry
     motions: tuple[str, ...]
@@ -177,7 +177,7 @@ class SimulateQuasiStatic(Task):
     kind = "quasi-static"
     silent = True
     stage = "quasi-static answers"
-    unit = "frame"
+    unit_seconds = 0.07
     scene: Scene
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:

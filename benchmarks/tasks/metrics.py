@@ -33,7 +33,7 @@ class MeasureCell(Task):
 
     kind = "metrics"
     stage = "metrics"
-    unit = "cell"
+    unit_seconds = 2.5
     cell: Cell
     cells: tuple[Cell, ...]
     gap_samples: int

@@ -24,7 +24,6 @@ class RunMicrobenchmark(Task):
 
     kind = "microbenchmark"
     stage = SUITE
-    unit = "case"
     benchmark: Microbenchmark
     entry: MethodEntry
     settings: Settings

@@ -40,7 +40,7 @@ class Outcome:
     remark: str = ""
 
 
-def tell_nobody(units: int) -> None:
+def tell_nobody(units: float) -> None:
     """Where no one follows the progress."""
 
 
@@ -50,7 +50,7 @@ class Context:
 
     folder: RunFolder
     assets: Assets | None = None
-    tell: Callable[[int], None] = tell_nobody
+    tell: Callable[[float], None] = tell_nobody
     memo: dict[Any, Any] = field(default_factory=dict)
 
 
@@ -66,8 +66,8 @@ class Task:
     """
 
     kind: ClassVar[str]
-    stage: ClassVar[str]  # title of what is done at a time
-    unit: ClassVar[str] = "task"
+    stage: ClassVar[str]  # title of what it belongs to
+    unit_seconds: ClassVar[float] = 1.0  # that one of its units takes, roughly: for progress and order
     silent: ClassVar[bool] = False  # whether no row of the results speaks of it: a failure is then said apart
 
     name: str
@@ -84,6 +84,11 @@ class Task:
     @property
     def id(self) -> TaskId:
         return self.kind, self.name
+
+    @property
+    def expected_seconds(self) -> float:
+        """That it takes, roughly."""
+        return self.units * self.unit_seconds
 
     @property
     def title(self) -> str:

@@ -41,7 +41,7 @@ class TrainNetwork(Task):
     kind = "network"
     silent = True
     stage = "training"
-    unit = "step"
+    unit_seconds = 0.04
     training: str
     chosen: Training | None
     home: str = ""

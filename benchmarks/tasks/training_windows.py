@@ -39,7 +39,7 @@ class CompareWindows(Task):
 
     kind = "windows"
     stage = "training windows"
-    unit = "network"
+    unit_seconds = 3.0
     training: TrainNetwork
     entry: MethodEntry
 

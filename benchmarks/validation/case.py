@@ -33,6 +33,7 @@ class Case:
         name: unique over all cases, and the row's scene unless `scene` is given.
         module: dotted; with all that it imports it is what the row depends on.
         smoke: whether the smallest preset runs it.
+        long: whether it is left out where no suite is named.
         seconds: after which the case's process is ended; None: never.
         map_point: (factor on the stiffness, time step [s]) of a point of a stability map, which its scene is.
     """
@@ -50,6 +51,7 @@ class Case:
     tolerance: float | None = None
     reason: str = ""
     smoke: bool = False
+    long: bool = False
     seconds: float | None = None
     map_point: tuple[float, float] | None = None
 

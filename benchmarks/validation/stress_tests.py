@@ -37,11 +37,13 @@ def _solved(
     )  # fmt: skip
 
 
-def stability_map(name: str, what: str, module: str, function: str) -> tuple[Case, ...]:
+def stability_map(
+    name: str, what: str, module: str, function: str, *, long: bool = False
+) -> tuple[Case, ...]:
     """Iterations of one step at every stiffness and time step, the rows of one scene."""
     return tuple(
         Case(
-            name=f"{name}/{factor:g}/{dt:.3g}", scene=name, suite="extremes", seconds=DEADLINE,
+            name=f"{name}/{factor:g}/{dt:.3g}", scene=name, suite="extremes", seconds=DEADLINE, long=long,
             description=f"{what}: stiffness x{factor:g}, dt = {dt:.3g} s",
             module=f"benchmarks.validation.{module}", function=function,
             options={"stiffness": factor, "dt": dt}, map_point=(factor, dt),
@@ -189,7 +191,7 @@ STEPS = (
 
 MAPS = {
     "map_sheet": stability_map("map_sheet", "the sheet", "stress_steps", "sheet_iterations"),
-    "map_shirt": stability_map("map_shirt", "the T-shirt", "stress_tshirt", "shirt_iterations"),
+    "map_shirt": stability_map("map_shirt", "the T-shirt", "stress_tshirt", "shirt_iterations", long=True),
 }
 
 CASES = (*STEPS, *MAPS["map_sheet"], *MAPS["map_shirt"])
