@@ -13,10 +13,10 @@ import pandas as pd
 from reports.by_frame import half_of, share_of_frames, with_shares
 from reports.data import Metric, Run
 from reports.means import Mean, pair
-from reports.significance import LEVEL, Effect, effect, effect_on, holm, within_uncertainty
+from reports.significance import LESS, MORE, OPEN, TIED, Effect, effect, effect_on, holm, standing
 from reports.table import Cell, Column, Table, table
 
-HOLDS, FAILS, EQUAL, OPEN = "holds", "does not hold", "tie", "cannot be told"
+HOLDS, FAILS = "holds", "does not hold"  # or TIED, or OPEN
 # The sum of PARTS.
 BEFORE = Metric("cost/before", "s", "Data, setup and training", lower_is_better=True, of="machine")
 PARTS = ("cost/data", "cost/setup", "cost/train")
@@ -157,7 +157,7 @@ def counts(run: Run) -> Counter[str]:
 
 def in_words(found: Counter[str]) -> str:
     """As "holds 3, tie 1"."""
-    return ", ".join(f"{word} {found[word]}" for word in (HOLDS, FAILS, EQUAL, OPEN) if found[word])
+    return ", ".join(f"{word} {found[word]}" for word in (HOLDS, FAILS, TIED, OPEN) if found[word])
 
 
 def judged(run: Run) -> list[Judged]:
@@ -206,14 +206,12 @@ def _effect(
 
 def verdict(claim: Claim, one: Mean, other: Mean, found: Effect, p: float | None) -> str:
     """In words, by the p-value after Holm's correction; None where nothing was repeated."""
-    if (claim.factor != 1.0 and not found.ratio) or found.one_seed:
-        return OPEN  # no factor between numbers of which some are zero; no scatter of what one seed gave
-    equal = found.equal(claim.factor)
-    if within_uncertainty(one, other, claim.factor) or (equal and (p is None or p >= LEVEL or claim.on_par)):
-        return HOLDS if claim.on_par else EQUAL
-    if p is not None and p >= LEVEL:
-        return OPEN
-    return HOLDS if found.above(claim.factor) < 0.0 else FAILS
+    if claim.factor != 1.0 and not found.ratio:
+        return OPEN  # no factor between numbers of which some are zero
+    stands = standing(one, other, found, p, claim.factor)
+    if claim.on_par and not found.one_seed and (stands == TIED or found.equal(claim.factor)):
+        return HOLDS
+    return {LESS: HOLDS, MORE: FAILS}.get(stands, stands)
 
 
 def of_diverged(

@@ -18,7 +18,7 @@ from reports.means import Mean, means
 from reports.numbers import number, with_spread
 from reports.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
 from reports.read import read_run
-from reports.significance import LEVEL, Effect, effect_on, holm, within_uncertainty
+from reports.significance import OPEN, TIED, Effect, effect_on, holm, standing
 from snug.command_line import Parser, command
 
 CELL = ["scene", "method", "seed", "metric"]
@@ -155,7 +155,7 @@ def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
     changes = []
     for (place, method, metric, mean, new, far), alone in zip(found, p_values):
         p = None if alone is None else next(corrected)
-        noise = within_uncertainty(mean, new) or far.equal() or (p is not None and p >= LEVEL)
+        noise = standing(new, mean, far, p) in (TIED, OPEN) or far.equal()
         if not noise and not (metric.of == "machine" and _machine(mean, far)):
             verdict = _side(metric, far)
             changes.append(Change(verdict, place, method, metric.name, _said(metric, mean, new, far, p)))

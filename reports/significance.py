@@ -15,6 +15,7 @@ from reports.means import Mean, pair
 
 TIE = 0.05  # share of the larger of two values up to which they count as equal
 LEVEL = 0.05  # of the two-sided tests, and what an interval leaves out
+TIED, OPEN, LESS, MORE = "tie", "cannot be told", "less", "more"  # how one mean stands to another
 DRAWS, SEED = 10_000, 20220619  # of the bootstrap; the same draws for every comparison
 
 
@@ -145,6 +146,23 @@ def within_uncertainty(one: Mean, other: Mean, factor: float = 1.0) -> bool:
     """
     moved = factor * (one.uncertainty or 0.0) + (other.uncertainty or 0.0)
     return moved > 0.0 and abs(factor * one.value - other.value) <= moved
+
+
+def standing(one: Mean, other: Mean, found: Effect, p: float | None, factor: float = 1.0) -> str:
+    """How `factor` times the first stands to the second: TIED, OPEN, LESS or MORE.
+
+    p: of found.p_value(factor), corrected where the comparison is one of a family.
+    """
+    if found.one_seed:
+        return OPEN  # nobody knows how far another would move it
+    if within_uncertainty(one, other, factor):
+        return TIED
+    if p is None or p >= LEVEL:
+        if found.equal(factor):
+            return TIED
+        if p is not None:
+            return OPEN
+    return LESS if found.above(factor) < 0.0 else MORE
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

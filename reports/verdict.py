@@ -13,7 +13,7 @@ from reports.numbers import number, with_spread
 from reports.overview import LEARNED, leads
 from reports.pareto import indistinct, run_time
 from reports.shapes import on_other_bodies
-from reports.significance import LEVEL, effect_on, within_uncertainty
+from reports.significance import OPEN, TIED, effect_on, standing
 from reports.tables import BAD
 
 TOTAL, CURVATURE, DISTANCE, SWING = "energy/total", "curvature/error", "distance/rms", "dynamics/amplitude"
@@ -59,15 +59,15 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
 def _apart(run: Run, rows: pd.DataFrame, one: Mean, other: Mean) -> str:
     """Which way, in how many roll-outs, and whether others may show the contrary. The other has no seeds."""
     found = effect_on(run.metrics[TOTAL], one, other, run, rows)
-    if not found.one_seed and (within_uncertainty(one, other) or found.equal()):
+    stands = standing(one, other, found, found.p_value())
+    if stands == TIED:
         return ": a tie"
     higher, beside = one.value > other.value, {scene: value for (scene, _), value in other.cells.items()}
     above = [(value > beside[scene]) is higher for (scene, _), value in one.cells.items()]
     text = f": {'higher' if higher else 'lower'} in {sum(above)} of {len(above)} roll-outs"
     if found.one_seed:
         return f"{text} of one seed, which judges no network"
-    p = found.p_value()
-    return text if p is None or p < LEVEL else f"{text}; of other motions and seeds it cannot be told"
+    return f"{text}; of other motions and seeds it cannot be told" if stands == OPEN else text
 
 
 def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:

@@ -12,7 +12,7 @@ from scipy import stats
 
 from reports import significance
 from reports.means import Mean, mean_of, pair
-from reports.significance import TIE, effect, holm, within_uncertainty
+from reports.significance import MORE, OPEN, TIE, TIED, Effect, effect, holm, standing, within_uncertainty
 
 
 def mean_over(grid, method="snug"):
@@ -219,3 +219,18 @@ def test_a_difference_within_what_another_reference_would_change():
         one, other = pair(frame.assign(uncertainty=moved), "snug", "pbns", "energy/strain")
         assert one.uncertainty == moved and within_uncertainty(one, other) == within
         assert not within_uncertainty(one, other, factor=3.0)
+
+
+def test_one_rule_says_how_two_means_stand():
+    one, other = (Mean(value, None, 1, 3, 3) for value in (1.0, 1.2))
+
+    def stands(value: float, p: float | None, moved: float = 0.0, *, one_seed: bool = False) -> str:
+        error = None if p is None else 0.01
+        found = Effect(value, ratio=True, error=error, freedom=10.0, one_seed=one_seed)
+        return standing(replace(one, uncertainty=moved), other, found, p)
+
+    assert [stands(0.01, p) for p in (None, 0.04, 0.06)] == [TIED, MORE, TIED]  # all within 5 %
+    assert [stands(0.20, p) for p in (None, 0.04, 0.06)] == [MORE, MORE, OPEN]
+    assert [stands(-0.20, p) for p in (None, 0.04, 0.06)] == [significance.LESS, significance.LESS, OPEN]
+    assert stands(0.20, 1e-6, moved=0.21) == TIED and stands(0.20, 1e-6, moved=0.19) == MORE
+    assert stands(0.20, 1e-6, one_seed=True) == stands(0.01, 0.5, moved=0.21, one_seed=True) == OPEN

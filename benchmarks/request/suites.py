@@ -95,7 +95,7 @@ def _clips(extent: Extent) -> list[str]:
 
 
 def _solvers(extent: Extent) -> list[str]:
-    """The reference, truncated solvers and everything learned; the quick subset has fewer of the slow ones."""
+    """The reference, truncated solvers and everything learned; the quick subset has fewer slow ones."""
     full, budgets = extent.full, extent.preset.iteration_budgets
     levels = {family: [scale * budget for budget in budgets] for family, scale in FAMILIES}
     some = budgets if full else budgets[::2]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, nullcontext
-from itertools import takewhile
+from itertools import groupby
 from typing import Any, Protocol
 
 from ..tasks.task import Outcome, Task, TaskId, failure
@@ -59,15 +59,14 @@ class Runner:
         left = self.tasks
         try:
             while left:
-                due = tuple(takewhile(lambda task: not task.process, left))
-                if due:
-                    later = [task for task in left[len(due) :] if not task.process]
-                    with log.stage(_titles(due)):
-                        self._side_by_side(due, later, executor)
-                else:
-                    due = tuple(takewhile(lambda task: task.process and task.stage == left[0].stage, left))
-                    with log.stage(_titles(due)):
+                _, group = next(groupby(left, key=lambda task: task.stage if task.process else ""))
+                due = tuple(group)
+                with log.stage(_titles(due)):
+                    if due[0].process:
                         self._alone(due, executor)
+                    else:
+                        later = [task for task in left[len(due) :] if not task.process]
+                        self._side_by_side(due, later, executor)
                 left = tuple(task for task in left if task.id not in self.outcomes)
         finally:
             executor.close()
