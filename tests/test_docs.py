@@ -115,7 +115,7 @@ def test_every_example_is_tested():
 
 
 def test_every_metric_is_defined_as_declared():
-    text = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "metrics.md").read_text(encoding="utf-8")
     escaped = {name: metric.definition.replace("|", "\\|") for name, metric in declared().items()}
     lines = [f"| `{name}` | {metric.unit} | {escaped[name]} |" for name, metric in declared().items()]
     table = re.findall(r"^\| `[^`|]+/[^`|]+` \|.*$", text, re.M)
