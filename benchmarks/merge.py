@@ -19,9 +19,8 @@ from typing import Any
 from snug.command_line import Parser, command
 
 from .performance.microbenchmark import SUITE
-from .results import ResultsError, Row, RunFolder, digest_of_file
+from .results import BEFORE_FRAMES, ResultsError, Row, RunFolder, digest_of_file
 from .runner.cache import read_entry
-from .runner.execution import OF_TRAINING
 
 PROGRAM = "benchmarks.merge"
 EXAMPLES = """examples:
@@ -35,7 +34,6 @@ exit status: 0 written; 2 the runs differ in what has to be the same, or a file 
   which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
 LIKE_TIMES = ("cost/spread", "cost/peak")  # of repeats, and of a process
-BEFORE = ("cost/data", *OF_TRAINING)  # each may be of its own machine; all other times are of one
 SAME = ("format", "preset", "preset_values", "split", "body", "garment")  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
 JOINED = (*STRICT, "tasks", "outdated")  # which hold times and remarks
@@ -195,7 +193,7 @@ def joined_rows(runs: Mapping[str, Sequence[Row]]) -> list[Row]:
             there = kept.get(key)
             if there:
                 _compare(there, (row, where))
-            kind = row.metric if row.metric in BEFORE else ""
+            kind = row.metric if row.metric in BEFORE_FRAMES else ""
             timed = of_a_machine(row) and row.value is not None
             if timed and machine.setdefault(kind, row.hardware) != row.hardware:
                 row = _told(row, machine[kind])

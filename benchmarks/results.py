@@ -30,6 +30,8 @@ ROLES = (
     "warm-started", "",
 )  # fmt: skip
 
+OF_TRAINING = ("cost/setup", "cost/train")  # [s] a network, on the machine that trained it
+BEFORE_FRAMES = ("cost/data", *OF_TRAINING)  # [s] all that it costs before its first frame
 REFERENCE_TOLERANCE = 1e-6  # of the reference's minimisations
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from benchmarks.results import BEFORE_FRAMES
 from reports.data import Run
 from reports.means import mean_of, value_of
 from reports.numbers import number
@@ -39,9 +40,7 @@ class Cost:
 def cost_of(frame: pd.DataFrame, method: str, scenes: Sequence[str]) -> Cost | None:
     """The cost of a method on the scenes given, or None where it was not timed there, or not in full."""
     time = value_of(frame, method, run_time(frame[frame["scene"].isin(list(scenes))]), scenes)
-    data, setup, train = (
-        value_of(frame, method, f"cost/{what}", scenes) for what in ("data", "setup", "train")
-    )
+    data, setup, train = (value_of(frame, method, name, scenes) for name in BEFORE_FRAMES)
     if time is None or (train is not None and data is None):
         return None  # what its simulations took is not known any more
     return Cost(method, (data or 0.0) + (setup or 0.0) + (train or 0.0), time / 1e3)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from benchmarks.results import BEFORE_FRAMES
 from reports.by_frame import half_of, share_of_frames, with_shares
 from reports.data import Metric, Run
 from reports.means import Mean, pair
@@ -17,9 +18,8 @@ from reports.significance import LESS, MORE, OPEN, TIED, Effect, effect, effect_
 from reports.table import Cell, Column, Table, table
 
 HOLDS, FAILS = "holds", "does not hold"  # or TIED, or OPEN
-# The sum of PARTS.
+# The sum of BEFORE_FRAMES.
 BEFORE = Metric("cost/before", "s", "Data, setup and training", lower_is_better=True, of="machine")
-PARTS = ("cost/data", "cost/setup", "cost/train")
 
 
 @dataclass(frozen=True)
@@ -230,9 +230,9 @@ def of_diverged(
 
 def with_before(frame: pd.DataFrame) -> pd.DataFrame:
     """The rows, and what each trained network cost before its first frame, where all parts are known."""
-    rows = frame[frame["usable"] & frame["metric"].isin(PARTS)]
+    rows = frame[frame["usable"] & frame["metric"].isin(BEFORE_FRAMES)]
     cell = ["scene", "method", "seed"]
     parts = rows.groupby(cell)["value"]
-    whole = rows.assign(value=parts.transform("sum"))[parts.transform("size") == len(PARTS)]
+    whole = rows.assign(value=parts.transform("sum"))[parts.transform("size") == len(BEFORE_FRAMES)]
     before = whole.drop_duplicates(cell).assign(metric=BEFORE.name, unit=BEFORE.unit)
     return pd.concat([frame, before], ignore_index=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.results import BEFORE_FRAMES
 from reports.data import Run
 from reports.means import mean_of, value_of
 from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
@@ -19,7 +20,6 @@ from reports.table import Cell, Column, Table, metric_column, table
 from reports.training import History
 
 FRAMES, STEPS = "cost/train_frames", "cost/train_steps"
-SPENT = ("cost/data", "cost/setup", "cost/train")
 JUDGED = ("energy/total", "energy/strain", "penetration/vertices", "curvature/error")
 DRAWN = ("energy/total", "curvature/error")
 WIDE = 2.0  # from the lower to the upper end of an axis that is logarithmic
@@ -36,14 +36,14 @@ def members(run: Run) -> list[str]:
 
 def equal_data(run: Run) -> list[Table]:
     """Frames, steps and seconds of each method of the block, and how good it is; the reference first."""
-    metrics = [run.metrics[name] for name in (FRAMES, STEPS, *SPENT, *JUDGED) if name in run.metrics]
+    metrics = [run.metrics[name] for name in (FRAMES, STEPS, *BEFORE_FRAMES, *JUDGED) if name in run.metrics]
     lines: list[tuple[Cell, ...]] = []
     block = members(run)
     for garment in run.garments(run.worn) if block else ():
         rows = run.worn[run.worn["garment"] == garment]
         for method in filter(None, (run.reference, *block)):
             found = {metric.name: mean_of(rows, method, metric.name) for metric in metrics}
-            spent = [found[name] for name in SPENT if found.get(name)]
+            spent = [found[name] for name in BEFORE_FRAMES if found.get(name)]
             total = sum(mean.value for mean in spent if mean) if spent else None
             mixed = run.methods[method].level
             head = (garment, method, None if mixed is None else int(mixed), total)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import frame_energies, provenance
 from ..request.plan import Plan, runs
-from ..results import Row, RunFolder, digest_of_file, with_provenance
+from ..results import OF_TRAINING, Row, RunFolder, digest_of_file, with_provenance
 from ..roll_outs.option import MODULE
 from ..rows import described, rows_of
 from ..tasks.task import RunStopped, one_line
@@ -26,7 +26,6 @@ from .source import digest
 if TYPE_CHECKING:
     from ..assets import Assets
 
-OF_TRAINING = ("cost/setup", "cost/train")
 KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier run in the folder
 
 
