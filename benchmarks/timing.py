@@ -84,15 +84,19 @@ def clocked(
         first = False
         runs.append(seconds)
         if earlier is not None and _same(of(earlier), of(made)):
-            return made, Reading(tuple(runs), "run() gave again what it had given before")
+            again = "run() gave again what it had given before: each call of run() has to do all of the "
+            return made, Reading(tuple(runs), again + "work, and to return an array of its own")
         if sum(runs) >= least or len(runs) == MOST:
             break
         earlier = made  # held beyond the next run, so that what is new lies elsewhere
     seconds, used = sum(runs), time.process_time() - used
     if used > CROWDED * seconds + GRAIN:
-        crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked"
+        crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked: "
+        crowd += "leave the number of threads alone: one is set, see OMP_NUM_THREADS"
         return made, Reading(tuple(runs), crowd)
-    return made, Reading(tuple(runs), _still_at_work(of(made), before, children))
+    late = _still_at_work(of(made), before, children)
+    late += ": wait in run() for all threads, processes and devices; leave none behind" if late else ""
+    return made, Reading(tuple(runs), late)
 
 
 @contextmanager

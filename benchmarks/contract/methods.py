@@ -20,11 +20,6 @@ LEAST = 0.02  # [s] to be measured: run() is called twice at least, unless it ta
 COPIES = 3  # bodies at once
 NEAR = 1e-6  # [m] of what should be in its place; times a frame's length in float32
 SLACK = 1.1  # of the clock: what frames say of themselves may be more by so much, in all
-REMEDIES = {
-    "gave again": "each call of run() has to do all of the work, and to return an array of its own",
-    "more than one thread": "leave the number of threads alone: one is set, see OMP_NUM_THREADS",
-    "after run() had come back": "wait in run() for all threads, processes and devices; leave none behind",
-}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,7 +50,7 @@ class CheckMethod(CellTask):
             else:
                 trajectory, reading = method.run(), Reading((float("nan"),))
         if reading.complaint:
-            found.wrong.append(_remedied(f"{UNBELIEVABLE}{reading.complaint}"))
+            found.wrong.append(f"{UNBELIEVABLE}{reading.complaint}")
         elif _shapes(found, trajectory, scene):
             self._places(found, trajectory, scene)
             self._numbers(found, trajectory, reading, scene)
@@ -167,7 +162,7 @@ class CheckMethod(CellTask):
         with found.call("batch()"):
             positions, reading = clocked(method.batch(COPIES), of=lambda made: made, least=LEAST)
         if reading.complaint:
-            found.wrong.append(_remedied(f"batch(): {UNBELIEVABLE}{reading.complaint}"))
+            found.wrong.append(f"batch(): {UNBELIEVABLE}{reading.complaint}")
         due = (scene.frames, COPIES, scene.cloth.vertex_count, 3)
         found.demand(
             np.shape(positions) == due, f"batch({COPIES}) gives {np.shape(positions)}, {due} are due"
@@ -214,8 +209,3 @@ def _shapes(found: Findings, trajectory: Any, scene: BuiltScene, what: str = "")
             found.notes.append(f"{what}ends as diverged: {trajectory.reason}")
         return not len(bad)
     return False
-
-
-def _remedied(complaint: str) -> str:
-    remedy = next((words for symptom, words in REMEDIES.items() if symptom in complaint), "")
-    return f"{complaint}: {remedy}" if remedy else complaint
