@@ -85,7 +85,8 @@ def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
 
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
 def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
-    found = choose(Request(suites=("validation",), preset=preset, motions=Motions()))[0]
+    request = Request(suites=("validation",), preset=preset, motions=Motions())
+    found = choose(dataclasses.replace(request, full=True))[0]
     sizes = preset.dependence
     assert {cell.scene.name for cell in found} == {
         *(f"dependence/mesh/{count}" for count in sizes.meshes),
@@ -95,6 +96,7 @@ def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
     printed = {"simulation-printed-bending"} if preset.further else set()
     assert {cell.method for cell in found} == {"simulation", "skinning", "newton-1"} | printed
     assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
+    assert choose(request)[0] == (() if preset.name == "quick" else found)  # where no suite is named
 
 
 def test_drapes_of_each_size_and_family_run_where_they_are_named():

@@ -20,7 +20,7 @@ from benchmarks.results import RunFolder, model_path
 from benchmarks.rows import rows_of_cell
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import find_scene, out_of_distribution
-from benchmarks.scenes.further import ORDINARY, OUT_OF_DISTRIBUTION, SMALL
+from benchmarks.scenes.further import FEW, FEWEST, ORDINARY, OUT_OF_DISTRIBUTION
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.metrics import measured
 from benchmarks.tasks.task import Context, Outcome
@@ -228,13 +228,14 @@ def cells(**words):
 
 
 def test_suite_extremes_trains_what_it_needs():
-    found = cells()
+    assert {cell.scene.name for cell in cells()} == set(FEW)
+    found = cells(full=True)
     assert {cell.scene.name for cell in found} == {scene.name for scene in OUT_OF_DISTRIBUTION}
     methods = {"simulation", "skinning", "snug", "supervised", "pbns", *CHEAP}
     assert {cell.method for cell in found} == methods
     alone = {cell.method for cell in found if cell.scene.name == "out_of_distribution/long"}
     assert alone == {"snug", "supervised", "pbns"}
-    assert {cell.scene.name for cell in cells(preset="smoke")} == set(SMALL)
+    assert {cell.scene.name for cell in cells(preset="smoke")} == set(FEWEST)
     assert {c.scene.name for c in cells(preset="smoke", scenes=("*splits",))} == {
         "out_of_distribution/splits"
     }

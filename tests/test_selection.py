@@ -65,6 +65,18 @@ def test_patterns_choose_scenes_methods_and_cases():
     assert sum(case.suite == "extremes" for case in cases) >= 8
 
 
+def test_what_is_left_out_of_a_default_run_is_there_where_its_suite_or_itself_is_named():
+    both = ("speed", "extremes")
+    slow = {"newton-2", "lbfgs-40", "gradient-descent-10", "simulation-dt/8"}
+    for words, there in (({}, False), ({"full": True}, True), ({"methods": ("*",)}, True)):
+        found, cases = chosen(both, **words)
+        assert (slow & {cell.method for cell in found}) == (slow if there else set())
+        assert bool({*MAPS["map_shirt"]} & {*cases}) == ("full" in words)
+        assert {*MAPS["map_sheet"]} <= {*cases}
+    assert {cell.method for cell in chosen(both, methods=("lbfgs-40",))[0]} == {"lbfgs-40"}
+    assert chosen(("extremes",), scenes=("map_shirt/1/1",))[1]
+
+
 def dynamic(suites, **changes):
     motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
     words = {name: tuple(value) for name, value in changes.items()}

@@ -10,7 +10,8 @@ from ..methods.equal_data import EQUAL_DATA
 from ..methods.learned import LEARNED, RECIPE_DEVIATIONS
 from ..scenes import GARMENT_SCENES
 from ..scenes.further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
-from ..scenes.further import SMALL as SMALL_OUT_OF_DISTRIBUTION
+from ..scenes.further import FEW as FEW_OUT_OF_DISTRIBUTION
+from ..scenes.further import FEWEST as FEWEST_OUT_OF_DISTRIBUTION
 from .plan import Motions
 from .presets import Preset
 
@@ -109,11 +110,12 @@ def _solvers(extent: Extent) -> list[str]:
 
 
 def _dependence(extent: Extent) -> list[str]:
-    """Meshes and steps of the preset, of the T-shirt alone; drapes of up to 16,000 vertices where scenes are
-    named, or at paper.
+    """Meshes and steps of the preset, of the T-shirt alone, not in the quick subset of preset quick; drapes of
+    up to 16,000 vertices where scenes are named, or at paper.
     """
     tailored = extent.motions.first_garment == GARMENT_SCENES[0].garment
-    meshes = meshes_and_steps(extent.preset.dependence) if tailored else []
+    wanted = extent.full or extent.further or extent.preset.smallest
+    meshes = meshes_and_steps(extent.preset.dependence) if tailored and wanted else []
     return [scene.name for scene in (*meshes, *(DRAPES if extent.further else ()))]
 
 
@@ -121,9 +123,12 @@ def _dependence(extent: Extent) -> list[str]:
 
 
 def _out_of_distribution(extent: Extent) -> list[str]:
+    """All; the quick subset is some of them, fewer at the smallest preset."""
     if extent.preset.smallest and not extent.further:
-        return list(SMALL_OUT_OF_DISTRIBUTION)
-    return [scene.name for scene in OUT_OF_DISTRIBUTION]
+        return list(FEWEST_OUT_OF_DISTRIBUTION)
+    if extent.full or extent.further:
+        return [scene.name for scene in OUT_OF_DISTRIBUTION]
+    return list(FEW_OUT_OF_DISTRIBUTION)
 
 
 # --- body shapes --------------------------------------------------------------------------------------------
