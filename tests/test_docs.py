@@ -18,7 +18,7 @@ from benchmarks.metrics import declared
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 PAPER = ROOT / "docs" / "paper.md"
-FINDINGS = ROOT / "reports" / "published" / "quick" / "tables" / "findings.csv"
+PUBLISHED = ROOT / "reports" / "published"
 SAID = {"holds": "reproduced", "does not hold": "refuted", "tie": "tie", "cannot be told": "cannot be told"}
 EXTEND = ROOT / "docs" / "extend.md"
 FILE = re.compile(r"File `([^`]+)`:$")
@@ -147,18 +147,27 @@ def test_the_page_of_the_paper_counts_its_own_verdicts():
     assert f"| of {judged.total()} claims |" in PAPER.read_text(encoding="utf-8")
 
 
+def findings(run: str) -> list[tuple[str, str]]:
+    """(verdict, effect) of each published finding, as docs/paper.md writes it; of those with an interval."""
+    with (PUBLISHED / run / "tables" / "findings.csv").open(newline="", encoding="utf-8") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["effect_low"] != "-"]
+    names = ("effect", "effect_low", "effect_high")
+    texts = [[effect_text(row["effect_kind"], row["metric"], row[name]) for name in names] for row in rows]
+    return [
+        (SAID[row["verdict"]], f"{effect} ({low} to {high})") for row, (effect, low, high) in zip(rows, texts)
+    ]
+
+
 def test_the_page_of_the_paper_says_what_the_published_findings_say():
-    with FINDINGS.open(newline="", encoding="utf-8") as stream:
-        published = list(csv.DictReader(stream))
+    published = findings("quick")
     judged = [row for row in table_rows(PAPER) if row[-1] == "findings"]
-    for found in published:
-        effect, low, high = (
-            effect_text(found["effect_kind"], found["metric"], found[name])
-            for name in ("effect", "effect_low", "effect_high")
-        )
-        verdict, words = SAID[found["verdict"]], f"{effect} ({low} to {high})"
+    for verdict, words in published:
         assert any(row[1] == verdict and words in row[2] for row in judged), f"{verdict}: {words}"
     assert len(judged) == len(published)
+    for row in table_rows(PAPER):
+        if row[-1] == "its findings":
+            said = [(verdict, words) for verdict, words in findings("ablations") if words in row[2]]
+            assert said and {verdict for verdict, _ in said} == {row[1]}, row
 
 
 def heading_anchors(path: Path) -> set[str]:
