@@ -110,8 +110,8 @@ def _solvers(extent: Extent) -> list[str]:
 
 
 def _dependence(extent: Extent) -> list[str]:
-    """Meshes and steps of the preset, of the T-shirt alone, not in the quick subset of preset quick; drapes of
-    up to 16,000 vertices where scenes are named, or at paper.
+    """Meshes and steps of the preset, of the T-shirt alone, not in the quick subset of preset quick; drapes
+    of up to 16,000 vertices where scenes are named, or at paper.
     """
     tailored = extent.motions.first_garment == GARMENT_SCENES[0].garment
     wanted = extent.full or extent.further or extent.preset.smallest
