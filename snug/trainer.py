@@ -66,6 +66,7 @@ class Trainer:
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
+        self.posed_by = FastSkin.apply if self.kernels else skin
         mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
         drawn = recipe.shape_range and dressed.body.shape_count and how.features == "motion" and how.physics
         self.shaped = bool(drawn) and recipe.shape_of == "window"
@@ -178,7 +179,7 @@ class Trainer:
         if self.loss is None:
             assert self.targets is not None
             with self.clock.part("forward"):
-                terms = self.targets.terms(self.network, batch, state)
+                terms = self.targets.terms(self.network, batch, state, self.posed_by)
             means, _ = self._update(number, windows, terms)
         else:
             frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
@@ -250,8 +251,7 @@ class Trainer:
             offsets, after = self._callable(batch.features, state)
         with self.clock.part("skinning"):
             # Offsets first: the sum then lies in memory as they do.
-            posed_by = FastSkin.apply if self.kernels else skin
-            return posed_by(offsets + batch.rest, self.weights, batch.transforms), after
+            return self.posed_by(offsets + batch.rest, self.weights, batch.transforms), after
 
     def _set_rate(self, number: int) -> None:
         recipe, share = self.recipe, 1.0

@@ -13,6 +13,7 @@ from benchmarks.request.plan import Motions, PlanError
 from benchmarks.request.presets import find_preset
 from benchmarks.request.roles import choose_motions
 from benchmarks.request.selection import Request, choose
+from benchmarks.request.suites import FEW_MOTIONS
 from benchmarks.validation.stress_tests import MAPS
 
 SMOKE = find_preset("smoke")
@@ -81,6 +82,21 @@ def dynamic(suites, **changes):
     motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
     words = {name: tuple(value) for name, value in changes.items()}
     return choose(Request(suites=tuple(suites), preset=find_preset("quick"), motions=motions, **words))[0]
+
+
+def test_the_quick_subset_has_some_motions_and_all_where_the_suite_or_they_are_named():
+    def motions(full=False, preset="quick", **choice):
+        of = choose_motions([], choice.get("tests", []), find_preset(preset), **choice.get("split", {}))
+        request = Request(suites=("garments",), full=full, preset=find_preset(preset), motions=of)
+        return {cell.scene.motion for cell in choose(request)[0] if cell.scene.part == "whole"}
+
+    everything = set(choose_motions([], [], find_preset("quick")).test)
+    assert len(everything) == 5 and motions(full=True) == motions(preset="paper") >= everything
+    assert motions() < everything and len(motions()) == FEW_MOTIONS
+    named = ["kick", "punch", "walk", "bow"]
+    assert motions(tests=named) == set(named)
+    assert motions(split={"validation_names": named, "split": "validation"}) == set(named)
+    assert len(motions(tests=["walk"], split={"split": "validation"})) == FEW_MOTIONS
 
 
 def test_networks_of_a_second_garment_are_left_out_with_a_reason_until_its_scenes_are_named():

@@ -29,7 +29,7 @@ METHODS = (
     ),
     network("untrained", "SNUG, untrained",
             "the SNUG network with a random last layer (SNUG itself starts as skinning)",
-            role="baseline", conserving=False),
+            role="baseline", conserving=False, timed=False),  # a frame of it costs what one of SNUG does
     network("snug", "SNUG", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
     network("supervised", "Supervised", "the SNUG network trained on simulated vertices instead"),
     network("pbns", "PBNS", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),

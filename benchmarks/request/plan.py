@@ -88,7 +88,8 @@ class Motions:
     """Names of the motions of a run, by their roles, and those that came from files.
 
     dynamic_*: the same for garments that swing. worn: the garments that do them; the first is that of a run
-    where none is named. split: the role whose motions stand in the suites' scenes, "test" or "validation".
+    where none is named. split: the role whose motions stand in the suites' scenes, "test" or "validation";
+    chosen: whether the user has named those.
     """
 
     train: tuple[str, ...] = ()
@@ -100,6 +101,7 @@ class Motions:
     validation: tuple[str, ...] = ()
     dynamic_validation: tuple[str, ...] = ()
     split: str = "test"
+    chosen: bool = False
 
     @property
     def measured(self) -> tuple[str, ...]:

@@ -67,6 +67,7 @@ def choose_motions(
     motions = Motions(
         train[:few], test, files, library.DYNAMIC_TRAIN[:few], library.DYNAMIC_TEST[:fewer],
         validation=validation, dynamic_validation=library.DYNAMIC_VALIDATION[:fewer], split=split,
+        chosen=bool(paths or (test_names if split == "test" else validation_names)),
     )  # fmt: skip
     if not motions.measured:
         raise PlanError(f"--split {split}: no motion has this role; name some by --{split}-motions")

@@ -72,9 +72,9 @@ class Request:
 
     @property
     def extent(self) -> Extent:
-        """Naming scenes reaches all of each suite."""
-        named = bool(self.scenes)
-        return Extent(self.preset, self.motions, self.full or named, named or self.preset.further)
+        """Naming scenes reaches all of each suite, and so does preset paper."""
+        further = bool(self.scenes) or self.preset.further
+        return Extent(self.preset, self.motions, self.full or further, further)
 
 
 def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Microbenchmark, ...]]:

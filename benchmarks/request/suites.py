@@ -18,7 +18,9 @@ from .presets import Preset
 
 @dataclass(frozen=True)
 class Extent:
-    """How much of a suite is asked for. full: more than its quick subset; further: what doubles the work."""
+    """How much of a suite is asked for. full: more than its quick subset; further: what doubles the work,
+    and all of the suite.
+    """
 
     preset: Preset
     motions: Motions
@@ -46,11 +48,16 @@ class Suite:
 
 # --- garments ----------------------------------------------------------------------------------------------
 
+FEW_MOTIONS = 3
+
 
 def _whole_motions(extent: Extent) -> list[str]:
-    """The first garment in each motion of the split; at preset paper also what swings; others where named."""
+    """The first garment in each motion of the split, in the quick subset in FEW_MOTIONS of those that nobody
+    has named; at preset paper also what swings; others where named.
+    """
     first, *others = extent.motions.worn
-    names = [first.scene(name).name for name in extent.motions.measured]
+    count = None if extent.full or extent.motions.chosen else FEW_MOTIONS
+    names = [first.scene(name).name for name in extent.motions.measured[:count]]
     names += [there_and_back(name, first.garment).name for name in extent.motions.measured[:1]]
     if extent.further:
         names += [o.scene(name).name for o in others if o.dynamic for name in extent.motions.dynamic_measured]
@@ -114,7 +121,7 @@ def _dependence(extent: Extent) -> list[str]:
     of up to 16,000 vertices where scenes are named, or at paper.
     """
     tailored = extent.motions.first_garment == GARMENT_SCENES[0].garment
-    wanted = extent.full or extent.further or extent.preset.smallest
+    wanted = extent.full or extent.preset.smallest
     meshes = meshes_and_steps(extent.preset.dependence) if tailored and wanted else []
     return [scene.name for scene in (*meshes, *(DRAPES if extent.further else ()))]
 
@@ -126,7 +133,7 @@ def _out_of_distribution(extent: Extent) -> list[str]:
     """All; the quick subset is some of them, fewer at the smallest preset."""
     if extent.preset.smallest and not extent.further:
         return list(FEWEST_OUT_OF_DISTRIBUTION)
-    if extent.full or extent.further:
+    if extent.full:
         return [scene.name for scene in OUT_OF_DISTRIBUTION]
     return list(FEW_OUT_OF_DISTRIBUTION)
 
@@ -138,7 +145,7 @@ SHAPED = "snug-shapes"
 
 def _shapes(extent: Extent) -> list[str]:
     """One motion on other bodies: where the suite or scenes are named, or at paper."""
-    motions = extent.motions.measured[:1] if extent.full or extent.further else ()
+    motions = extent.motions.measured[:1] if extent.full else ()
     return [scene.name for motion in motions for scene in shapes(motion, extent.motions.first_garment)]
 
 

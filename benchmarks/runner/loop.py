@@ -6,6 +6,7 @@ Dry run, resume, failures, what an interrupt leaves and exclusive timing are dec
 from __future__ import annotations
 
 import dataclasses
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, nullcontext
 from itertools import groupby
@@ -77,10 +78,12 @@ class Runner:
             if self._is_ready([task]):
                 self.decide(task)
         with _bar(due, sum(task.expected_seconds for task in due if task.id not in self.outcomes)) as bar:
-            waiting = [*_batches(due), *_batches(later)]
+            waiting, left = [*_batches(due), *_batches(later)], deque(due)
 
             def ready() -> Batch | None:
-                if all(task.id in self.outcomes for task in due):
+                while left and left[0].id in self.outcomes:
+                    left.popleft()
+                if not left:
                     return None
                 for batch in list(waiting):
                     if self._is_ready(batch):

@@ -14,7 +14,10 @@ from .cell import built
 from .task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from reference_sim import Trajectory
+    from snug.motion import Motion
 
 # With this time step [s] and no velocities inertia weighs a thousandth of what it weighs in a frame: a hem
 # that swings once in a second comes within 3 % of its static place, and there is still one minimum to go to.
@@ -141,26 +144,36 @@ class SimulateClips(Task):
             shared_clips(assets.named(self.motions), share, vertices=vertices, swinging=self.swinging)
             for share in (self.part, self.part + 1)
         )
-        for clip in clips[len(before) :]:
-            own = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
-            scene = replace(self.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(own)
-            try:
-                trajectory = simulated(scene, self.entry, run)
-            except RuntimeError as error:  # a pose that leaves the cloth no room
-                left_out[clip.name] = str(error)
-                continue
-            done = trajectory.status == "converged" or self.entry.truncated
-            if done and trajectory.frames == clip.frames and np.isfinite(trajectory.positions).all():
-                kept[clip.name] = trajectory.positions.astype(np.float32)  # as networks see it
+        own = clips[len(before) :]
+        for clip in own:
+            positions, reason = self._simulated(clip, context)
+            if reason:
+                left_out[clip.name] = reason
             else:
-                left_out[clip.name] = f"{trajectory.status}: {trajectory.reason}"
+                kept[clip.name] = positions.astype(np.float32)  # as networks see it
+            context.tell(self.units / len(own))
         path = run.clips_path(self.clips, self.entry.name, self.part)
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as temporary:
             np.savez(temporary, **kept)
-        context.tell(self.units)
         result = {"clips": list(kept), "left_out": left_out}
         return Outcome(result=result, files=(run.relative(path),))
+
+    def _simulated(self, clip: Motion, context: Context) -> tuple[np.ndarray, str]:
+        """Positions of a clip, and why they are not to be taught, or empty."""
+        import numpy as np
+
+        assets, garment = context.assets, self.scene.garment
+        assert assets is not None
+        own = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
+        scene = replace(self.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(own)
+        try:
+            trajectory = simulated(scene, self.entry, context.folder)
+        except RuntimeError as error:  # a pose that leaves the cloth no room
+            return np.empty(0), str(error)
+        done = trajectory.status == "converged" or self.entry.truncated
+        whole = trajectory.frames == clip.frames and np.isfinite(trajectory.positions).all()
+        return trajectory.positions, "" if done and whole else f"{trajectory.status}: {trajectory.reason}"
 
 
 def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Trajectory:

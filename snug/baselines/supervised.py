@@ -5,7 +5,7 @@ loss = mean over frames and vertices of |x - x_simulated|^2     [cm^2]
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,10 +71,12 @@ class VertexTargets:
             return self.vertices.cpu().numpy().tobytes()
         return self.vertices.fingerprint
 
-    def terms(self, network: Any, batch: Batch, state: Any) -> dict[str, Tensor]:
-        """Parts of the loss of each window and frame, name -> (N, T)."""
+    def terms(
+        self, network: Any, batch: Batch, state: Any, posed_by: Callable[..., Tensor] = skin
+    ) -> dict[str, Tensor]:
+        """Parts of the loss of each window and frame, name -> (N, T). posed_by: skin, or what is as good."""
         offsets, _ = network(batch.features, state)
-        x = skin(batch.rest + offsets, self.weights, batch.transforms)
+        x = posed_by(offsets + batch.rest, self.weights, batch.transforms)
         return {"vertices": vertex_loss(x, self.vertices[torch.as_tensor(batch.frames)])}
 
 

@@ -176,7 +176,8 @@ class BandTargets(VertexTargets):
         self.low = torch.as_tensor(low, dtype=torch.float32)
         self.high = offsets - self.low
 
-    def terms(self, network: Any, batch: Batch, state: Any) -> dict[str, Tensor]:
+    def terms(self, network: Any, batch: Batch, state: Any, *_: Any) -> dict[str, Tensor]:
+        """Of the offsets, which nothing poses."""
         rows = torch.as_tensor(batch.frames)
         low, high = network.bands(batch.features, state)
         return {"low": band_loss(low, self.low[rows]), "high": band_loss(high, self.high[rows])}
