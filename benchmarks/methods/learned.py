@@ -106,6 +106,7 @@ LEARNED = (
         module="benchmarks.methods.direct_optimisation",
         needs_body=True,
         gives_first_frame=True,
+        static_known=False,
         role="bound",
     ),
 )  # fmt: skip
