@@ -59,7 +59,8 @@ class Metric:
     nothing. of: what it is a number of: the "answer" of a method; the "method" itself, as its size; or the
     "machine", as every time. Another seed gives another answer; another machine, or the same when it is
     busy, another time. reference_tolerance: how far from zero the value of the reference simulation may be;
-    its row is then judged. declared_in: as of a MethodEntry. Raises ValueError for another `of`.
+    its row is then judged. declared_in: as of a MethodEntry. Raises ValueError for what is no word where one
+    is due, for no unit, and for another `of`.
     """
 
     name: str
@@ -74,8 +75,13 @@ class Metric:
     declared_in: str = ""
 
     def __post_init__(self) -> None:
+        for what in ("name", "unit", "title", "definition", "table"):
+            if not isinstance(word := getattr(self, what), str):
+                raise ValueError(f"metric '{self.name}': {what}={word!r}: give a string")
+        if not self.unit:
+            raise ValueError(f"metric '{self.name}' has no unit: say '1' where it has no dimension")
         if self.of not in NUMBERS_OF:
-            raise ValueError(f"metric {self.name}: of='{self.of}': use one of {', '.join(NUMBERS_OF)}")
+            raise ValueError(f"metric '{self.name}': of='{self.of}': use one of {', '.join(NUMBERS_OF)}")
 
 
 class Kept:

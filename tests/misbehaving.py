@@ -33,9 +33,13 @@ class Misbehaving(Method):
         scene = self.scene
         still = np.repeat(np.asarray(scene.start)[None], scene.frames, axis=0)
         getattr(self, f"_{self.how}", lambda _: None)(still)
+        if self.how == "late":  # a frame too many
+            still = np.concatenate([still[:1], still])
+        if self.how == "narrow":  # a vertex too few
+            still = still[:, 1:]
         return Trajectory(
-            positions=still, faces=np.asarray(scene.cloth.faces), times=np.arange(scene.frames) * scene.dt,
-            frame_seconds=np.full(scene.frames, 1e-6), status="ok",
+            positions=still, faces=np.asarray(scene.cloth.faces), times=np.arange(len(still)) * scene.dt,
+            frame_seconds=np.full(len(still), 1e-6), status="ok",
         )  # fmt: skip
 
     def batch(self, copies: int):
@@ -61,6 +65,9 @@ class Misbehaving(Method):
     def quasi_static(self) -> Trajectory | None:
         if self.how == "unheld":
             raise OSError("no room left for the held poses")
+        if self.how == "astray":
+            still = np.zeros((self.scene.frames, 2, 3))
+            return Trajectory(still, self.scene.cloth.faces, np.arange(len(still)) * self.scene.dt)
         return None
 
     def _hang(self, _) -> None:

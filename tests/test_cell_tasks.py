@@ -146,6 +146,9 @@ def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
         ("hungry", "out-of-memory", "no room"),
         ("early", "failed", "its time cannot be believed"),
         ("unheld", "failed", "OSError: no room left"),
+        ("late", "failed", "run() gives positions float64 (5, 16, 3): floats (4, 16, 3) are due"),
+        ("narrow", "failed", "run() gives positions float64 (4, 15, 3): floats (4, 16, 3) are due"),
+        ("astray", "failed", "quasi_static() gives positions float64 (4, 2, 3)"),
     ],
 )
 def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path):

@@ -160,7 +160,9 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
             still = network or (on_body and method in ("skinning", "simulation"))
             assert ("dynamics/quasi_static_difference" in values) == still
             # Of a solver that starts from a network's frame nobody knows what it answers to poses held still.
-            assert ("dynamics/amplitude" in values) == (on_body and entry.role not in ("warm-started", "bound"))
+            assert ("dynamics/amplitude" in values) == (
+                on_body and entry.role not in ("warm-started", "bound")
+            )
             assert ("dynamics/common_amplitude" in values) == on_body
             bounds = ("simulation", "skinning")
             asked = method in bounds or (network and method != "untrained") or "fast-lbfgs" in method

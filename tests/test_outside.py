@@ -31,7 +31,8 @@ from benchmarks.request import outside, selection
 from benchmarks.request.plan import Motions, Plan
 from benchmarks.results import RunFolder
 from benchmarks.runner.schedule import Schedule
-from benchmarks.runner.source import code_of
+from benchmarks.runner.source import code_of, digest
+from benchmarks.runner.task_inputs import declared
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.metrics import measured
@@ -172,6 +173,12 @@ PLAIN = 'name="a", description="b"'
         (HEAD + ENTRY.format('name="a b", description="c"') + MAKE, "method 'a b': use letters"),
         (HEAD + ENTRY.format('name="snug", description="c"') + MAKE,
          "method 'snug' is declared twice, by the project itself and by "),
+        (HEAD + ENTRY.format(PLAIN + ', files="gone.pt"') + MAKE, "files='gone.pt': give a tuple of strings"),
+        (HEAD + ENTRY.format(PLAIN + ', options={"at": open}') + MAKE, "method 'a': options: cannot tell"),
+        (HEAD + ENTRY.format('name="body", description="c"') + MAKE, "method 'body': files of the project"),
+        (HEAD + ENTRY.format(f'name="{"a" * 151}", description="c"') + MAKE, "more than 150 bytes"),
+        (HEAD + "METHODS = tuple(MethodEntry(name=n, description='b') for n in ('a/b', 'a-B'))\n" + MAKE,
+         "free_fall x a-B and free_fall x a/b would have the same files: rename one"),
         (HEAD + "from random_helper import f\n", "bad.py: line 2: ModuleNotFoundError"),
         ("\udcff", "bad.py: cannot be read"),
     ],
@@ -225,6 +232,33 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
         assert run.main(["--scenes", "free_fall", option, word, "-o", "out"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and words in error
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ('metrics=("energies",)', "scene 'lift': metrics=('energies',): choose from energy, "),
+        ('metrics="energy"', "scene 'lift': metrics='energy': give a tuple of strings"),
+        ('start_of="free_fal"', "scene 'lift': start_of='free_fal': name another scene"),
+        ('start_of="lift"', "scene 'lift': start_of='lift': name another scene"),
+        ('garment="tshirt", motion="wlak"', "no motion is called 'wlak'; did you mean walk?"),
+    ],
+)
+def test_what_a_scene_names_and_nobody_knows_is_one_line(said, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "named.py").write_text(SCENE_FILE.replace('sizes=("sheet_frames",)', said))
+    assert run.main(["--scenes", "named.py", "-o", "out"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and words in error and not (tmp_path / "out").exists()
+
+
+def test_a_scene_whose_file_has_changed_is_done_again(files):
+    said = SCENE_FILE.replace('sizes=("sheet_frames",)', 'sizes=("sheet_frames",), files=("a.txt",)')
+    (files / "lifted.py").write_text(said)
+    (scene,) = outside.entries_of(outside.SCENES, str(files / "lifted.py"))
+    before = digest(declared(scene))
+    (files / "a.txt").write_text("another cloth")
+    assert digest(declared(scene)) != before
 
 
 def test_two_files_of_one_name_are_refused(tmp_path):
@@ -288,14 +322,22 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
             outside._check_networks(wrong)
 
 
-def test_a_metric_that_raises_is_named_with_its_file(tmp_path):
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        ("1 / 0", r"split\.py: ZeroDivisionError: division by zero"),
+        ("None", r"split\.py: TypeError: height/highest is None: give a number or an Estimate"),
+        ("[1.0, 2.0]", r"split\.py: TypeError: height/highest is \[1.0, 2.0\]: give a number"),
+    ],
+)
+def test_a_metric_that_gives_no_number_is_named_with_its_file(number, words, tmp_path):
     home = tmp_path / "split.py"
-    home.write_text(METRIC_FILE.replace("float(", "1 / 0 + float("))
+    home.write_text(METRIC_FILE.replace("float(", f"{number} if True else float("))
     scene = SCENE["free_fall"].at(TINY).build()
     trajectory = Trajectory(scene.exact, scene.cloth.faces, np.arange(scene.frames) * scene.dt)
     group = metric.SceneRollOuts(scene)
     group.roll_outs.append(metric.RollOut(group, METHODS[0], trajectory, suites=("speed",)))
-    with pytest.raises(RuntimeError, match=r"split\.py: ZeroDivisionError: division by zero"):
+    with pytest.raises(RuntimeError, match=words):
         measured(group.roll_outs[0], (), (str(home),))
 
 

@@ -33,14 +33,10 @@ def test_a_name_stands_once(monkeypatch):
             (Metric(name="energy/total", unit="J", title="Mine", definition="mine"),),
             "'energy/total' is declared",
         ),
-        (
-            (Metric(name="mine/length", unit="", title="Mine", definition="mine"),),
-            "'mine/length' has no unit",
-        ),
         (None, "benchmarks.metrics.cost declares no METRICS"),
     ],
 )
-def test_a_metric_is_declared_once_and_with_its_unit(declared, word, monkeypatch):
+def test_a_metric_is_declared_once(declared, word, monkeypatch):
     metrics.declared.cache_clear()
     module = metrics.modules()["cost"]
     with monkeypatch.context() as patch:
@@ -51,6 +47,20 @@ def test_a_metric_is_declared_once_and_with_its_unit(declared, word, monkeypatch
         with pytest.raises(DeclarationError, match=word):
             metrics.declared()
     assert metrics.find_metric("cost/frame")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"unit": ""}, "metric 'mine/x' has no unit: say '1' where it has no dimension"),
+        ({"unit": 1}, "metric 'mine/x': unit=1: give a string"),
+        ({"table": None}, "metric 'mine/x': table=None: give a string"),
+        ({"of": "clock"}, "metric 'mine/x': of='clock'"),
+    ],
+)
+def test_a_metric_says_its_unit_and_says_it_in_words(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        Metric(**{"name": "mine/x", "unit": "J", "title": "Mine", "definition": "mine"} | wrong)
 
 
 def test_a_role_and_a_size_that_nobody_knows_are_named():

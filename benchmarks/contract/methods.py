@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..method import Method
 from ..scene import BuiltScene
-from ..tasks.cell import UNBELIEVABLE, CellTask, judge
+from ..tasks.cell import UNBELIEVABLE, CellTask, judge, misshapen
 from ..tasks.task import Context, Outcome, TaskId
 from ..timing import Reading, clocked
 from .findings import Broken, Connections, Findings, altered, fingerprints
@@ -180,11 +180,13 @@ def _shapes(found: Findings, trajectory: Any, scene: BuiltScene, what: str = "")
         f"{what}gives a {type(trajectory).__name__}: return a reference_sim.Trajectory",
     ):
         return False
-    x, due = np.asarray(trajectory.positions), (scene.frames, scene.cloth.vertex_count, 3)
-    ended = trajectory.status in ("diverged", "timeout", "stalled") and 0 < len(x) < scene.frames
-    fine = x.dtype.kind == "f" and (x.shape == due or (ended and x.shape[1:] == due[1:]))
-    fine = found.demand(
-        fine, f"{what}gives positions {x.dtype} {x.shape}: floats {due} are due, the start included"
+    x, wrong = np.asarray(trajectory.positions), misshapen(trajectory.positions, scene)
+    fine = found.demand(not wrong, f"{what}{wrong}")
+    ended = trajectory.status in ("diverged", "timeout", "stalled")
+    fine = fine and found.demand(
+        len(x) == scene.frames or (ended and len(x) > 0),
+        f"{what}gives {len(x)} frames and ends as {trajectory.status}: {scene.frames} are due, or a status "
+        "that says why it ended",
     )
     faces = np.asarray(trajectory.faces)
     found.demand(

@@ -57,9 +57,6 @@ def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
         if not hasattr(module, "METRICS"):
             raise DeclarationError(f"benchmarks.metrics.{name} declares no METRICS, a tuple of Metric")
         own += module.METRICS
-    for metric in own:
-        if not metric.unit:
-            raise DeclarationError(f"metric '{metric.name}' has no unit: say 1 where it has no dimension")
     others = [replace(metric, declared_in=home) for home in outside for metric in load(home).METRICS]
     return by_name("metric", (*own, *METRICS, *others))
 

@@ -20,7 +20,7 @@ from snug.recipes import TRAININGS, Training
 
 from ..method import MethodEntry
 from ..registry import DeclarationError, by_name, demand_that_it_is, load
-from ..runner.source import code_of, find_module, place_of
+from ..runner.source import code_of, digest, find_module, place_of
 from ..scene import Scene
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]*")
@@ -149,13 +149,27 @@ def _placed(kind: Kind, entry: Any, module: ModuleType, home: str) -> Any:
     """The entry, with where it was declared and all paths made absolute."""
     what = f"{home}: {kind.word[:-1]} '{entry.name}'"
     if kind is METRICS:
-        if not entry.unit:
-            raise DeclarationError(f"{what} has no unit: say 1 where it has no dimension")
         _demand(callable(getattr(module, kind.function, None)), f"{home}: has no function {kind.function}")
         return dataclasses.replace(entry, declared_in=home)
     if not NAME.fullmatch(entry.name):
         raise DeclarationError(f"{what}: use letters, digits and _ + - . / @ : in its name")
     folder = Path(find_module(home)).parent
+    for field in ("files", "sizes", "metrics"):
+        words = getattr(entry, field, None) or ()
+        listed = isinstance(words, tuple | list) and all(isinstance(word, str) for word in words)
+        _demand(listed, f"{what}: {field}={words!r}: give a tuple of strings")
+    if measured := set(getattr(entry, "metrics", None) or ()):
+        from ..metrics import MODULES, WHERE_NAMED  # loads numpy
+
+        known = (*MODULES, *WHERE_NAMED)
+        wrong = f"{what}: metrics={entry.metrics!r}: choose from {', '.join(known)}"
+        _demand(measured <= {*known}, wrong)
+    try:
+        digest(dict(entry.options))
+    except (TypeError, ValueError) as error:
+        raise DeclarationError(
+            f"{what}: options: {error}: give numbers, strings, and lists of them"
+        ) from None
     files = tuple(str((folder / name).resolve()) for name in entry.files)
     for file in files:
         _demand(Path(file).is_file(), f"{what}: {file}: no such file")

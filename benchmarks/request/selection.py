@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -13,6 +13,7 @@ from ..methods import METHODS
 from ..performance.microbenchmark import SUITE, Microbenchmark
 from ..performance.registry import MICROBENCHMARKS
 from ..registry import DeclarationError, by_name
+from ..results import LONGEST
 from ..scene import Scene
 from ..scenes import GARMENT_SCENES, all_scenes
 from ..tasks.cell import Cell
@@ -101,7 +102,48 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[
         (*found.values(), *stored),
         key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
     )
+    _check_names(cells)
+    scenes = {cell.scene.name: cell.scene for cell in cells}
+    known = {name: scene for name, scene in declared.items() if not scene.declared_in} | scenes
+    for own in (scene for scene in scenes.values() if scene.declared_in):
+        _check_words_of(own, known, request.motions)
     return tuple(cells), cases, microbenchmarks
+
+
+def _check_words_of(scene: Scene, known: Mapping[str, Scene], motions: Motions) -> None:
+    """Raises PlanError for what a user's scene names and nobody knows."""
+    if scene.start_of:
+        before = known.get(scene.start_of)
+        if before is None or before.start_of or before.name == scene.name:
+            raise PlanError(
+                f"{scene.declared_in}: scene '{scene.name}': start_of='{scene.start_of}': name another "
+                f"scene, one that settles by itself; {nearest(scene.start_of, [*known])}"
+            )
+    if scene.dressed:
+        from snug.motion_library import LIBRARY
+
+        if scene.motion not in (names := [*motions.files, *LIBRARY]):
+            raise PlanError(
+                f"{scene.declared_in}: scene '{scene.name}': no motion is called '{scene.motion}'; "
+                f"{nearest(scene.motion, names)}"
+            )
+
+
+def _check_names(cells: Sequence[Cell]) -> None:
+    """Raises PlanError where a name makes no file, or the files of another: slashes become hyphens, and a
+    seed stands behind a hyphen.
+    """
+    there: dict[str, Cell] = {}
+    for cell in cells:
+        for what, name in (("scene", cell.scene.name), ("method", cell.method)):
+            if len(name.encode()) > LONGEST:
+                raise PlanError(
+                    f"{what} '{name[:40]}...': its name has more than {LONGEST} bytes: shorten it"
+                )
+        if cell.method == "body" or cell.method.endswith("-quasi-static"):
+            raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")
+        if (other := there.setdefault(cell.name.lower(), cell)) is not cell:
+            raise PlanError(f"{cell.label} and {other.label} would have the same files: rename one")
 
 
 def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:

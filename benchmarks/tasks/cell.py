@@ -196,6 +196,8 @@ class RunCell(CellTask):
         replace(trajectory, provenance=trajectory.provenance | provenance).save(paths[0])
         quasi_static = method.quasi_static() if cell.scene.dynamic or not cell.scene.dressed else None
         if quasi_static is not None:
+            if wrong := misshapen(quasi_static.positions, scene):
+                raise ValueError(f"quasi_static() {wrong}")
             paths.append(cell.quasi_static(folder))
             quasi_static.save(paths[1])
         context.memo["method"] = method
@@ -281,6 +283,8 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
     import numpy as np
 
     reason = " ".join(trajectory.reason.split())
+    if wrong := misshapen(trajectory.positions, scene):
+        return "failed", f"run() {wrong}"
     if reading.complaint:
         return "failed", UNBELIEVABLE + reading.complaint
     if not np.isfinite(trajectory.positions).all():
@@ -296,6 +300,16 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
     return status, reason
+
+
+def misshapen(positions: Any, scene: BuiltScene) -> str:
+    """Why these are no positions (T,V,3) of the scene, or empty. There may be fewer frames, and no more."""
+    import numpy as np
+
+    x, due = np.asarray(positions), (scene.frames, scene.cloth.vertex_count, 3)
+    if x.dtype.kind == "f" and x.shape[1:] == due[1:] and len(x) <= due[0]:
+        return ""
+    return f"gives positions {x.dtype} {x.shape}: floats {due} are due, the start included"
 
 
 def loaded() -> list[str]:

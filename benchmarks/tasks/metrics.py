@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,7 +104,9 @@ def measured(
                 values = module.measure(roll_out) if hasattr(module, "measure") else {}
                 if hasattr(module, "compare"):
                     values |= compared(roll_out, module.compare)
-                metrics |= {find_metric(metric, outside).name: value for metric, value in values.items()}
+                metrics |= {
+                    find_metric(metric, outside).name: number(metric, v) for metric, v in values.items()
+                }
                 curves |= module.series(roll_out) if hasattr(module, "series") else {}
                 ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
         except Exception as error:
@@ -111,6 +114,15 @@ def measured(
                 raise RuntimeError(f"{name}: {one_line(error)}") from error
             raise
     return metrics, curves, ended
+
+
+def number(metric: str, value: Any) -> float | Estimate:
+    """The value as one, which JSON can keep. Raises TypeError."""
+    if isinstance(value, Estimate):
+        return Estimate(float(value.value), float(value.uncertainty))
+    if not isinstance(value, numbers.Real):
+        raise TypeError(f"{metric} is {value!r:.60}: give a number or an Estimate, or leave it out")
+    return float(value)
 
 
 def compared(
