@@ -172,7 +172,8 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
                 key = (path.relative_to(folder.cache), name) if own else name
                 before, where = seen.setdefault(key, (value, folder.path))
                 if before != value and name != MACHINE:
-                    raise MergeError(f"{entry['task']}: another {name} in {folder.path} than in {where}")
+                    told = f"{entry['task']}: another {name} in {folder.path} than in {where}"
+                    raise MergeError(f"{told}: run both by the same code; --fresh forgets what is older")
 
 
 def of_a_machine(row: Row) -> bool:
@@ -228,8 +229,10 @@ def _compare(one: tuple[Row, str], other: tuple[Row, str]) -> None:
 def copied(name: str, digest: str, source: Path, target: Path) -> dict[str, str]:
     """Copy a file of a folder into another; its name and digest, none where it is not there.
 
-    Raises ResultsError for one that is not as it was written.
+    Raises ResultsError for one that is not as it was written, or lies elsewhere.
     """
+    if not (source / name).resolve().is_relative_to(source.resolve()):
+        raise ResultsError(f"{source}: its run.json names {name}, which lies outside of the folder")
     if not (source / name).is_file():
         return {}
     path = target / name

@@ -24,6 +24,7 @@ takes to have it measured, written, tabulated and defined in the report.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -75,6 +76,8 @@ class Metric:
     declared_in: str = ""
 
     def __post_init__(self) -> None:
+        if not re.fullmatch(r"\w*", str(self.table)):
+            raise ValueError(f"metric '{self.name}': table='{self.table}': use letters, digits and _")
         for what in ("name", "unit", "title", "definition", "table"):
             if not isinstance(word := getattr(self, what), str):
                 raise ValueError(f"metric '{self.name}': {what}={word!r}: give a string")
@@ -118,12 +121,12 @@ class RollOut(Kept):
         status: str = "ok",
         suites: tuple[str, ...] = (),
         quasi_static: np.ndarray | None = None,
-        counterpart: np.ndarray | None = None,
     ) -> None:
         super().__init__()
         self.group, self.entry = group, entry
         self.status, self.suites, self.trajectory = status, suites, trajectory
-        self.quasi_static, self.counterpart = quasi_static, counterpart
+        self.quasi_static = quasi_static
+        self.counterpart: np.ndarray | None = None
         self.training_poses: np.ndarray | None = None
         self.positions = trajectory.finite().positions
 
@@ -162,11 +165,10 @@ class SceneRollOuts(Kept):
         roll_outs: to be filled before anything is measured.
     """
 
-    def __init__(
-        self, scene: BuiltScene, *, gap_samples: int = 0, quasi_static: np.ndarray | None = None
-    ) -> None:
+    def __init__(self, scene: BuiltScene, *, gap_samples: int = 0) -> None:
         super().__init__()
-        self.scene, self.gap_samples, self.quasi_static = scene, gap_samples, quasi_static
+        self.scene, self.gap_samples = scene, gap_samples
+        self.quasi_static: np.ndarray | None = None
         self.roll_outs: list[RollOut] = []
 
     def find(self, *, role: str, family: str | None = None, level: float | None = None) -> RollOut | None:

@@ -64,6 +64,6 @@ def load(module: str) -> ModuleType:
 def demand_that_it_is(name: str, path: Path) -> None:
     """Raises DeclarationError unless the module of that name is imported from that file."""
     spec = importlib.util.find_spec(name) if name.replace(".", "_").isidentifier() else None
-    if spec is None or spec.origin is None or not path.samefile(spec.origin):
+    if not (spec and spec.origin and Path(spec.origin).is_file() and path.samefile(spec.origin)):
         known = f"Python knows {name} as {spec.origin or 'another'}" if spec else "no module has such a name"
         raise DeclarationError(f"{path}: {known}: give the file another name")

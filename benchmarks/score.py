@@ -7,20 +7,21 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import re
 import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from snug.command_line import Parser
+from snug.command_line import Parser, command
 
 from .request.one_scene import plan_of_scene
 from .request.options import add_scene_options
 from .request.plan import Plan
 from .request.selection import stored_cells
 from .results import RunFolder
-from .roll_outs.option import RollOutOption, Stated, checked_ms
+from .roll_outs.option import CHARACTERS, RollOutError, RollOutOption, Stated, checked_ms
 from .run import carry_out
 from .tasks.cell import Cell
 from .timing import one_thread
@@ -77,16 +78,12 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+@command(PROGRAM, goes_on="the same command goes on from there")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
-    try:
-        options = make_parser().parse_args(words)
-        plan = make_plan(options, words)
-    except ValueError as error:
-        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
+    plan = make_plan(make_parser().parse_args(words), words)
     with contextlib.redirect_stdout(sys.stderr):
         status = carry_out(plan, program=PROGRAM)
     if status in (0, 1):
@@ -97,7 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     """A run of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
     stated = Stated(options.units, options.up, options.fps, options.match_vertices)
-    name = options.name or f"{Path(options.roll_out.rstrip('/')).stem.strip('*_-. ') or 'roll-out'}"
+    stem = Path(options.roll_out.rstrip("/")).stem.strip("*_-. ")
+    name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem) or "roll-out"
     option = RollOutOption(name, options.roll_out, stated, checked_ms(options.declared_ms))
     plan = plan_of_scene(options, options.scene or ANY_SCENE, ["simulation"], out=options.out)
     if options.rest_mesh:
@@ -133,7 +131,8 @@ def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
 
     stored = RollOutOption("reference", options.reference, Stated(), role="reference")
     entry = entry_of(stored, cell.scene.name)
-    assert entry is not None
+    if entry is None:
+        raise RollOutError(f"--reference {stored.path_for(cell.scene.name)}: no such file")
     return replace(cell, entry=replace(entry, label="Reference, from a file"))
 
 

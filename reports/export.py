@@ -104,6 +104,9 @@ def demand_writable(path: Path) -> None:
             raise ValueError(f"{path}: needs pip install 'neural-garment-benchmark[{extra}]'")
     elif path.suffix not in (".pc2", ""):
         raise ValueError(f"{path}: give a name that ends in .abc, .usdc or .pc2, or a folder for .obj files")
+    mesh = path.with_suffix(".obj")
+    if path.suffix == ".pc2" and mesh.exists() and not path.exists():
+        raise ValueError(f"{path}: {mesh.name}, which is to lie beside it, is there already: name another")
     if path.suffix != "" and path.is_dir():
         raise ValueError(f"{path}: is a folder; name a file")
     if path.suffix == "":

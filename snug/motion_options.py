@@ -41,6 +41,8 @@ def add_motion_options(add: Callable[..., Any]) -> None:
 def reading_of(options: argparse.Namespace) -> Reading:
     """The words of a command as a Reading. Raises ValueError for words without a file to read."""
     joint_map = Path(options.joint_map) if options.joint_map else None
+    if joint_map and not joint_map.is_file():
+        raise ValueError(f"--joint-map {joint_map}: no such file")
     reading = Reading(
         up=options.motion_up, fps=options.motion_fps, joint_map=joint_map, repair=options.repair
     )

@@ -20,6 +20,7 @@ Projection = Callable[[Array], Array]  # points (N,3) [m] onto a surface
 # mean at 2000 to 8000 vertices, power 3 leaves 0.52 to 1.9; it needs the short step, a full one oscillates.
 EVENNESS = 3
 STEP = 0.2
+ROUNDS = 40  # of relax
 
 
 def boundary_loops(faces: Index) -> list[Index]:
@@ -122,15 +123,13 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
     return faces
 
 
-def relax(
-    points: Array, faces: Index, held: NDArray[np.bool_], project: Projection, *, rounds: int = 40
-) -> tuple[Array, Index]:
+def relax(points: Array, faces: Index, held: NDArray[np.bool_], project: Projection) -> tuple[Array, Index]:
     """Even triangles by moving vertices towards larger triangles and by flips; `held` (V,) vertices stay.
 
     project: maps points (N,3) back onto the surface.
     """
     points = points.copy()
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         faces = delaunay_flips(points, faces, passes=1)
         pull = triangle_areas(points, faces) ** EVENNESS
         centroids = points[faces].mean(axis=1)

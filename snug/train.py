@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from snug.train_options import check, parse
 if TYPE_CHECKING:
     from snug.body import Body
     from snug.dataset import DataSet
+    from snug.dressed_body import DressedBody
     from snug.garment_kinds import GarmentTemplate
     from snug.garments import Garment
     from snug.parallel import Group
@@ -58,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     try:
         body = Body.from_file(options.body) if options.body else Body.load()
+        outs[0].parent.mkdir(parents=True, exist_ok=True)
         for template, out in zip(templates, outs):
             garment = (body, template)
             _train_one(options, garment, data, motions, held_out, out, str(device), group, stop)
@@ -88,12 +91,14 @@ def _outs(out: Path, templates: Sequence[Any]) -> list[Path]:
     outs = [out]
     if len(templates) > 1:
         outs = [out.with_name(f"{out.stem}-{template.name}{out.suffix}") for template in templates]
-    out.parent.mkdir(parents=True, exist_ok=True)
+    if twice := next((path for path in outs if outs.count(path) > 1), None):
+        raise ValueError(f"--garment: two of them would be {twice}: rename a file")
     for path in outs:
+        there = next(folder for folder in path.absolute().parents if folder.exists())
         if path.is_dir():
             raise ValueError(f"--out {path}: is a folder; name a file")
-        if not os.access(path.parent, os.W_OK | os.X_OK):
-            raise ValueError(f"--out {path}: {path.parent} cannot be written to; name another folder")
+        if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+            raise ValueError(f"--out {path}: {there} cannot be written to; name another folder")
     return outs
 
 
@@ -167,8 +172,9 @@ def _train_one(
     if data:
         data.check(settings_of(body, dressed.garment))
     trajectories = data.targets() if data and TRAININGS[options.model].simulated else None
+    learned_from = _digest(dressed, motions, held_out, trajectories or {})
     if options.resume and out.is_file() and not saving.path.is_file():
-        _check_ended(out, options, dressed.vertices)
+        _check_ended(out, options, dressed.vertices, learned_from)
         say(f"{out}: is there, and no checkpoint beside it; nothing to resume")
         return
     if out.is_file():
@@ -195,6 +201,7 @@ def _train_one(
         if curves:
             curves.close()
     if group.writes:
+        model.summary["learned_from"] = learned_from
         _tell(model)
         print(model.save(out))
         saving.done()
@@ -205,7 +212,22 @@ def _recipe(options: argparse.Namespace) -> Recipe:
     return find_recipe(options.recipe) if options.recipe else TRAININGS[options.model].recipe
 
 
-def _check_ended(out: Path, options: argparse.Namespace, vertices: int) -> None:
+def _digest(
+    dressed: DressedBody, motions: Sequence[Any], held_out: Sequence[Any], simulated: Mapping[str, Any]
+) -> str:
+    """Of body, garment, motions and simulated vertices, those that validate included."""
+    found = hashlib.sha256(dressed.rest().numpy().tobytes())
+    for array in (dressed.body.template, dressed.body.joint_template, dressed.body.skinning_weights):
+        found.update(array.tobytes())
+    for role, several in (("train", motions), ("validate", held_out)):
+        for motion in several:
+            found.update(f"{role} {motion.name} {motion.fps}".encode())
+            found.update(motion.poses.tobytes() + motion.translations.tobytes())
+    found.update("".join(simulated[name].content for name in sorted(simulated)).encode())
+    return found.hexdigest()[:16]
+
+
+def _check_ended(out: Path, options: argparse.Namespace, vertices: int, learned_from: str) -> None:
     """Raises ValueError where the model there is not what this command trains."""
     from snug.trained_model import TrainedModel
 
@@ -216,6 +238,7 @@ def _check_ended(out: Path, options: argparse.Namespace, vertices: int) -> None:
         "seed": (there.seed, options.seed),
         "vertices": (there.vertices, vertices),
         "number of steps": (there.steps, there.steps if options.patience else options.steps),
+        "body, garment or motions": (there.summary.get("learned_from"), learned_from),
     }
     if other := [name for name, (found, mine) in pairs.items() if found != mine]:
         raise ValueError(f"{out}: of another {other[0]}; name another --out, or leave out --resume")

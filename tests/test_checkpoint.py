@@ -244,6 +244,10 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
         assert said.count("\n") == 1 and f"small.safetensors: of another {name}" in said.replace(
             "number of ", ""
         )
+    for other in ([swaying(21)], [swaying(16, name="held")]), ([swaying(20)], []):
+        monkeypatch.setattr(module, "_motions", lambda options, data, other=other: other)
+        assert module.main(words) == 2 and "of another body, garment or motions" in capsys.readouterr().err
+    monkeypatch.setattr(module, "_motions", lambda options, data: (library[:1], library[1:]))
     assert out.read_bytes() == before
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
     assert module.main([*words[:-1], "--seed", "1"]) == 130

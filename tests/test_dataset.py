@@ -176,6 +176,19 @@ def test_halves_of_two_machines_are_the_whole(built, tube, here, tmp_path, monke
     assert "name a new folder" in capsys.readouterr().err
 
 
+def test_what_another_build_ends_while_this_one_makes_ready_is_kept(tube, here, tmp_path, monkeypatch):
+    out, open_assets = tmp_path / "both", build_dataset.open_assets
+
+    def beside(*given, **named):
+        monkeypatch.setattr(build_dataset, "open_assets", open_assets)
+        assert dataset.main(words(tube, out, "--sequences", "2")) == 0
+        return open_assets(*given, **named)
+
+    monkeypatch.setattr(build_dataset, "open_assets", beside)
+    assert dataset.main(words(tube, out, "--from", "2")) == 0
+    assert [line.usable for line in DataSet.read(out).sequences] == [True, True, True]
+
+
 def _entry(folder: Path, name: str, change) -> None:
     """Rewrite an entry of the cache as if it had been written so."""
     from benchmarks.runner.cache import _text, read_entry

@@ -132,17 +132,18 @@ def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path
     monkeypatch.setattr("benchmarks.runner.cache.code_of", lambda *_: {"benchmarks/json_file.py": "other"})
     two = folder("two", [row("energy/total", 1.0, seed=1)], cells=("other",))
     assert command.main([str(one), str(two), "-o", str(tmp_path / "both")]) == 2
-    assert "cell other: another benchmarks/json_file.py in" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "cell other: another benchmarks/json_file.py in" in error and "run both by the same code" in error
 
 
-@pytest.mark.parametrize("what", ["file", "entry", "no cache", "twice", "no run", "taken"])
+@pytest.mark.parametrize("what", ["file", "entry", "no cache", "twice", "no run", "taken", "outside"])
 def test_what_cannot_be_merged_is_named(folder, tmp_path, what, capsys):
     import shutil
 
     one, two = folder("one", [row("energy/total", 1.0)]), folder("two", [row("energy/total", 1.0)])
     names, said = [one, two], {"file": "kick.npy: is not as the run wrote it", "entry": "damaged",
         "no cache": "has no cache", "twice": "two or more different", "no run": "no such file",
-        "taken": "name a new folder"}[what]  # fmt: skip
+        "taken": "name a new folder", "outside": "../letter, which lies outside of the folder"}[what]  # fmt: skip
     if what == "file":
         (two / "trajectories" / "kick.npy").write_text("else")
     elif what == "entry":
@@ -150,6 +151,11 @@ def test_what_cannot_be_merged_is_named(folder, tmp_path, what, capsys):
         path.write_text(path.read_text().replace("ok", "no"))
     elif what == "no cache":
         shutil.rmtree(two / "cache")
+    elif what == "outside":
+        (tmp_path / "letter").write_text("dear")
+        config = RunFolder(two).read_config()
+        config["digests"]["../letter"] = digest_of_file(tmp_path / "letter")
+        RunFolder(two).write_config(config)
     elif what == "taken":
         (tmp_path / "both").mkdir()
         (tmp_path / "both" / "letter").write_text("dear")

@@ -129,9 +129,8 @@ def roll_outs(assets, models, name):
     for method in ("skinning", "snug"):
         x, there = positions(method, scene), positions(method, plain)
         entry = find_method(method)
-        group.roll_outs.append(
-            RollOut(group, entry, trajectory_of(scene, x), suites=("extremes",), counterpart=there)
-        )
+        group.roll_outs.append(RollOut(group, entry, trajectory_of(scene, x), suites=("extremes",)))
+        group.roll_outs[-1].counterpart = there
     return {roll_out.entry.name: roll_out for roll_out in group.roll_outs}
 
 
@@ -193,10 +192,8 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(assets, models, tmp_pa
     x = free.positions.copy()
     x[3, 7, 0] += far
     whole = bool(np.isfinite(far))
-    roll_out = RollOut(
-        free.group, find_method(method), trajectory_of(free.scene, x), suites=("extremes",),
-        counterpart=free.counterpart,
-    )  # fmt: skip
+    roll_out = RollOut(free.group, find_method(method), trajectory_of(free.scene, x), suites=("extremes",))
+    roll_out.counterpart = free.counterpart
     free.group.roll_outs.append(roll_out)
     values, _, ended = measured(roll_out, ("extrapolation",))
     # Of what is not finite the cell says so itself, and keeps its own words.

@@ -144,6 +144,13 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
     assert found == expected and found["penetration/vertices"] >= 0.0 and found["energy/collision"] > 0.0
     assert score.main([words[0], "--rest-mesh", words[0], "-o", str(tmp_path / "no")]) == 2
     assert capsys.readouterr().err.splitlines()[-1].count("pred.pkl") >= 1 and not (tmp_path / "no").exists()
+    # All of it in centimetres, and nobody says so: nothing in the file contradicts it but its size.
+    large = {**held, "pred": 100.0 * held["pred"], "obstacle": 100.0 * obstacle}
+    (tmp_path / "pred.pkl").write_bytes(pickle.dumps(large))
+    _write_obj(tmp_path / "rest.obj", 100.0 * scene.cloth.rest_positions, scene.cloth.faces, None)
+    assert score.main([*words, "--preset", "smoke", "-o", str(tmp_path / "no")]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "m across in --units m: say --units cm" in said and not (tmp_path / "no").exists()
 
 
 REFUSED = {
@@ -156,6 +163,9 @@ REFUSED = {
     "both": (["mine.npz", "--scene", "flag", "--reference", "a", "--no-reference"], "not allowed"),
     "shape": (["mine.npz", "--scene", "flag"], "has 5 vertices, the cloth of flag 49"),
     "taken": (["mine.npz", "--scene", "flag", "--name", "snug"], "a method has that name"),
+    "name": (["mine.npz", "--scene", "flag", "--name", "a, b"], "the name 'a, b' has other than letters"),
+    "long": (["mine.npz", "--scene", "flag", "--reference", "a" * 300 + ".npz"], "a" * 300),
+    "pattern": (["mine.npz", "--scene", "flag", "--reference", "r_{scene}.npz"], "r_flag.npz: no such file"),
 }
 
 

@@ -66,6 +66,11 @@ def test_patterns_choose_scenes_methods_and_cases():
     assert sum(case.suite == "extremes" for case in cases) >= 8
 
 
+def test_a_name_means_itself_whatever_is_in_it():
+    found, _ = chosen(("garments",), scenes=["tshirt/w[1]"], test=("w[1]", "w2"))
+    assert {cell.scene.name for cell in found} == {"tshirt/w[1]"}
+
+
 def test_what_is_left_out_of_a_default_run_is_there_where_its_suite_or_itself_is_named():
     both = ("speed", "extremes")
     slow = {"newton-2", "lbfgs-40", "gradient-descent-10", "simulation-dt/8"}

@@ -409,10 +409,13 @@ def test_command_line_refuses_what_it_could_not_do_before_any_work(capsys, tmp_p
         (["--seed", "-1"], "--seed -1: at least 0"),
         (["--checkpoint-minutes", "-1"], "--checkpoint-minutes -1.0: at least 0"),
         (["--patience", "3"], "--patience 3: add --validation NAME"),
+        (["--garment", "a/shirt.obj", "--garment", "b/shirt.obj"], "model-shirt.safetensors: rename a file"),
+        (["--motions", "nowhere", "-o", str(tmp_path / "new" / "sub" / "m.safetensors")], "nowhere"),
     ):
         assert main(["-o", str(tmp_path / "model.safetensors"), *words]) == 2
         error = capsys.readouterr().err
         assert error.count("\n") == 1 and said in error
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_each_model_has_a_file_of_its_own():

@@ -42,7 +42,7 @@ LONGEST = 1_000_000  # frames of a sequence
 def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
     """Simulate what the folder lacks. Raises ValueError, one line, before anything is written."""
     plan, entry = make_plan(options, words)
-    before = _there(plan.folder)
+    _there(plan.folder)  # a folder of other things is refused before any work
     garment = plan.motions.first_garment
     own = plan.garment.file if plan.garment else None
     motions = plan.motions.files.values()
@@ -50,12 +50,12 @@ def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
     settings = settings_of(assets.body, assets.garments[garment]) | {
         "frames_per_second": _rate(motions), "method": entry.name, "settle_frames": plan.preset.settle_frames,
     }  # fmt: skip
-    commands: tuple[str, ...] = (plan.command,)
-    if before:
-        before.check(settings)
-        commands = tuple(dict.fromkeys((*before.commands, plan.command)))
     tasks = tasks_of(plan, entry)
     with held(plan.folder):
+        before = _there(plan.folder)  # read where nobody else writes it
+        if before:
+            before.check(settings)
+        commands = tuple(dict.fromkeys((*(before.commands if before else ()), plan.command)))
         folder = RunFolder(plan.folder)
         folder.remove_parts()
         hardware = provenance.hardware_line(provenance.hardware())

@@ -13,7 +13,7 @@ from .solvers import warm_started
 
 
 def network(name: str, label: str, description: str, **changes: Any) -> MethodEntry:
-    """The entry of a network that snug.recipe.TRAININGS knows under the same name."""
+    """The entry of a network that snug.recipes.TRAININGS knows under the same name."""
     fields: dict[str, Any] = {
         "name": name,
         "label": label,

@@ -62,5 +62,5 @@ class Network(Method):
 
 
 def make(*, models: Path, seed: int, kind: str, precision: str = "float32") -> Network:
-    """The network of that name, "untrained" or one of snug.recipe.TRAININGS, and seed."""
+    """The network of that name, "untrained" or one of snug.recipes.TRAININGS, and seed."""
     return Network(model_path(models, kind, seed), precision)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snug.recipes import TRAININGS, Training
 
+from ..results import LONGEST
 from ..scene import Scene
 from ..scenes import GARMENT_SCENES, GarmentScenes, of_garment
 from ..tasks.cell import Cell
@@ -151,7 +153,7 @@ class Plan:
     body, garment: own ones; None: the package's. only: states of what the folder holds in which a task is
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
     metrics: modules of metrics that are not the project's, see benchmarks.request.outside. scheduler: address
-    of a cluster that does what is not timed; empty: this machine does.
+    of a cluster that does what is not timed; empty: this machine does. Raises PlanError, see check_names.
     """
 
     preset: Preset
@@ -171,6 +173,9 @@ class Plan:
     fresh: bool = False
     workers: int = 1
     scheduler: str = ""
+
+    def __post_init__(self) -> None:
+        check_names(self.cells)
 
     @property
     def scenes(self) -> tuple[Scene, ...]:
@@ -202,6 +207,23 @@ class Plan:
     def body_file(self) -> Path | None:
         """The file of an own body."""
         return self.body.path if self.body else None
+
+
+def check_names(cells: Sequence[Cell]) -> None:
+    """Raises PlanError where a name makes no file, or the files of another: slashes become hyphens, and a
+    seed stands behind a hyphen.
+    """
+    there: dict[str, Cell] = {}
+    for cell in cells:
+        for what, name in (("scene", cell.scene.name), ("method", cell.method)):
+            if len(name.encode()) > LONGEST:
+                raise PlanError(
+                    f"{what} '{name[:40]}...': its name has more than {LONGEST} bytes: shorten it"
+                )
+        if cell.method == "body" or cell.method.endswith("-quasi-static"):
+            raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")
+        if (other := there.setdefault(cell.name.lower(), cell)) is not cell:
+            raise PlanError(f"{cell.label} and {other.label} would have the same files: rename one")
 
 
 def runs(cell: Cell) -> bool:

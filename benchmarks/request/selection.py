@@ -13,7 +13,6 @@ from ..methods import METHODS
 from ..performance.microbenchmark import SUITE, Microbenchmark
 from ..performance.registry import MICROBENCHMARKS
 from ..registry import DeclarationError, by_name
-from ..results import LONGEST
 from ..scene import Scene
 from ..scenes import GARMENT_SCENES, all_scenes
 from ..tasks.cell import Cell
@@ -102,7 +101,6 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[
         (*found.values(), *stored),
         key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
     )
-    _check_names(cells)
     scenes = {cell.scene.name: cell.scene for cell in cells}
     known = {name: scene for name, scene in declared.items() if not scene.declared_in} | scenes
     for own in (scene for scene in scenes.values() if scene.declared_in):
@@ -127,23 +125,6 @@ def _check_words_of(scene: Scene, known: Mapping[str, Scene], motions: Motions) 
                 f"{scene.declared_in}: scene '{scene.name}': no motion is called '{scene.motion}'; "
                 f"{nearest(scene.motion, names)}"
             )
-
-
-def _check_names(cells: Sequence[Cell]) -> None:
-    """Raises PlanError where a name makes no file, or the files of another: slashes become hyphens, and a
-    seed stands behind a hyphen.
-    """
-    there: dict[str, Cell] = {}
-    for cell in cells:
-        for what, name in (("scene", cell.scene.name), ("method", cell.method)):
-            if len(name.encode()) > LONGEST:
-                raise PlanError(
-                    f"{what} '{name[:40]}...': its name has more than {LONGEST} bytes: shorten it"
-                )
-        if cell.method == "body" or cell.method.endswith("-quasi-static"):
-            raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")
-        if (other := there.setdefault(cell.name.lower(), cell)) is not cell:
-            raise PlanError(f"{cell.label} and {other.label} would have the same files: rename one")
 
 
 def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:
@@ -230,7 +211,7 @@ def _microbenchmarks(request: Request) -> Iterator[Microbenchmark]:
 
 def named(name: str, patterns: Sequence[str]) -> bool:
     """Whether some pattern means that name; without patterns all are meant."""
-    return not patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
+    return not patterns or name in patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def default_suites(method: str, preset: Preset) -> list[str]:
@@ -284,7 +265,7 @@ def names_no_motion(scenes: Sequence[str], own: Sequence[Scene] = ()) -> bool:
 
 def _check_words(what: str, patterns: Sequence[str], names: Sequence[str]) -> None:
     for pattern in patterns:
-        if not any(fnmatchcase(name, pattern) for name in names):
+        if not any(named(name, [pattern]) for name in names):
             hint = ""
             if what == "scene" and pattern.partition("/")[0] in {g.garment for g in GARMENT_SCENES}:
                 hint = " (scenes of a dressed body are the validation and test motions: see --test-motions)"

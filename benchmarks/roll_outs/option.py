@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import glob
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
 MODULE = "benchmarks.methods.stored_roll_out"
 PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
 HELP = (
@@ -49,6 +51,11 @@ class RollOutOption:
     declared_ms: float | None = None
     role: str = "external"
 
+    def __post_init__(self) -> None:
+        if not re.fullmatch(rf"[{CHARACTERS}]+", self.name):
+            wrong = f"the name '{self.name}' has other than letters, digits and _-+."
+            raise RollOutError(f"--rollout {self.name}={self.path}: {wrong}")
+
     @property
     def places(self) -> bool:
         """Whether it has a file for each of several scenes."""
@@ -64,8 +71,6 @@ def parse(text: str) -> RollOutOption:
     name, equals, path = (part.strip() for part in given.partition("="))
     if not (name and equals and path):
         raise RollOutError(f"--rollout {text}: give NAME=FILE, with ,units=cm and the like behind it")
-    if not all(c.isalnum() or c in "_-+." for c in name):
-        raise RollOutError(f"--rollout {text}: the name '{name}' has other than letters, digits and _-+.")
     said: dict[str, Any] = {}
     for word in words:
         key, _, value = (part.strip() for part in word.partition("="))

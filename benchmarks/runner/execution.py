@@ -40,7 +40,7 @@ def execute(plan: Plan) -> int:
             try:
                 assets = log.open_assets()
             except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
-                runner.refuse(("start", "data", "network"), one_line(error))
+                runner.refuse(("start", "data", "clips", "network"), one_line(error))
         runner.run(executor_of(plan, log.folder, assets), log)
     except (KeyboardInterrupt, RunStopped):
         log.note("interrupted", True)

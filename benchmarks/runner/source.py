@@ -130,7 +130,7 @@ class _Source:
 @cache
 def _source(path: str) -> _Source:
     try:
-        tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+        tree = ast.parse((ROOT / path).read_text(encoding="utf-8-sig"))
     except SyntaxError as error:
         raise DeclarationError(f"{path}: line {error.lineno}: {error.msg}") from None
     except (OSError, UnicodeDecodeError) as error:

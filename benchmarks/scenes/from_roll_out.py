@@ -9,13 +9,14 @@ import numpy as np
 
 from reference_sim import Cloth, Material, MeshError, Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
-from reference_sim.mesh_io import read_mesh, to_metres_y_up
+from reference_sim.mesh_io import METRES, read_mesh, to_metres_y_up
 
 from ..roll_outs.files import StoredRollOut, read_roll_out
 from ..roll_outs.option import RollOutError, RollOutOption, digest_of
 from ..scene import BuiltScene, Scene
 
 FPS = 30.0  # where neither the file nor the user says another rate
+SIZES = (0.05, 20.0)  # [m] across, of what is sewn and draped
 FEWEST = 4  # frames: two are not judged, and a mean is of more than one
 
 
@@ -51,6 +52,7 @@ def build(
                 "mesh that the roll-out was made with"
             )
         cloth = Cloth(to_metres_y_up(rest.positions, units=units, up=up), rest.faces, Material())
+        _demand_a_size(cloth.rest_positions, rest_mesh, units)
         obstacle = _obstacle(stored, units, up)
     except MeshError as error:
         raise RollOutError(f"{path} with {rest_mesh}: {error}") from None
@@ -64,6 +66,16 @@ def build(
         settle=lambda: np.ascontiguousarray(positions[0]),
         obstacle=obstacle,
     )
+
+
+def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> None:
+    """Raises RollOutError for a cloth (V,3) [m] of a size that none has: it is of another unit."""
+    across = float(np.linalg.norm(np.ptp(rest_positions, axis=0)))
+    smallest, largest = SIZES
+    if not smallest <= across <= largest:
+        fit = [f"--units {u}" for u, m in METRES.items() if smallest <= across / METRES[units] * m <= largest]
+        remedy = f"say {' or '.join(fit)}" if fit else "bring it to metres"
+        raise RollOutError(f"{rest_mesh}: the cloth is {across:.3g} m across in --units {units}: {remedy}")
 
 
 def _obstacle(stored: StoredRollOut, units: str, up: str) -> Obstacle | None:

@@ -9,9 +9,9 @@ FAMILIES = ("right", "cross", "union_jack", "equilateral", "delaunay")
 ROW = 2 / 3**0.5  # of the equilateral family: distance of neighbours in a column, over that of columns
 
 
-def jittered_patch(cells: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def jittered_patch(cells: int) -> tuple[np.ndarray, np.ndarray]:
     """A Delaunay mesh of the unit square in the plane: points (V,2) [m], faces (F,3), counter-clockwise."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
     points = np.stack([i, j], -1).astype(float)
     points[1:-1, 1:-1] += random.uniform(-0.3, 0.3, (cells - 1, cells - 1, 2))
