@@ -143,7 +143,7 @@ def test_what_cannot_be_merged_is_named(folder, tmp_path, what, capsys):
     one, two = folder("one", [row("energy/total", 1.0)]), folder("two", [row("energy/total", 1.0)])
     names, said = [one, two], {"file": "kick.npy: is not as the run wrote it", "entry": "damaged",
         "no cache": "has no cache", "twice": "two or more different", "no run": "no such file",
-        "taken": "name a new folder", "outside": "../letter, which lies outside of the folder"}[what]  # fmt: skip
+        "taken": "name a new folder", "outside": "which lies outside of the folder"}[what]  # fmt: skip
     if what == "file":
         (two / "trajectories" / "kick.npy").write_text("else")
     elif what == "entry":
