@@ -14,14 +14,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from snug.command_line import Parser, command
+from snug.command_line import Parser
 
 from .request.one_scene import plan_of_scene
 from .request.options import add_scene_options
 from .request.plan import Plan
 from .request.selection import stored_cells
 from .results import RunFolder
-from .roll_outs.option import CHARACTERS, RollOutError, RollOutOption, Stated, checked_ms
+from .roll_outs.option import CHARACTERS, PLACE, RollOutError, RollOutOption, Stated, checked_ms
 from .run import carry_out
 from .tasks.cell import Cell
 from .timing import one_thread
@@ -78,12 +78,15 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-@command(PROGRAM, goes_on="the same command goes on from there")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
-    plan = make_plan(make_parser().parse_args(words), words)
+    try:
+        plan = make_plan(make_parser().parse_args(words), words)
+    except (ValueError, OSError) as error:  # as in benchmarks.run
+        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
     with contextlib.redirect_stdout(sys.stderr):
         status = carry_out(plan, program=PROGRAM)
     if status in (0, 1):
@@ -94,8 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     """A run of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
     stated = Stated(options.units, options.up, options.fps, options.match_vertices)
-    stem = Path(options.roll_out.rstrip("/")).stem.strip("*_-. ")
-    name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem) or "roll-out"
+    stem = Path(options.roll_out.rstrip("/").replace(PLACE, "")).stem
+    name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-.") or "roll-out"
     option = RollOutOption(name, options.roll_out, stated, checked_ms(options.declared_ms))
     plan = plan_of_scene(options, options.scene or ANY_SCENE, ["simulation"], out=options.out)
     if options.rest_mesh:

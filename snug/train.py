@@ -215,15 +215,18 @@ def _recipe(options: argparse.Namespace) -> Recipe:
 def _digest(
     dressed: DressedBody, motions: Sequence[Any], held_out: Sequence[Any], simulated: Mapping[str, Any]
 ) -> str:
-    """Of body, garment, motions and simulated vertices, those that validate included."""
-    found = hashlib.sha256(dressed.rest().numpy().tobytes())
-    for array in (dressed.body.template, dressed.body.joint_template, dressed.body.skinning_weights):
-        found.update(array.tobytes())
+    """Of body, garment, motions, those that validate included, and simulated vertices."""
+    import numpy as np
+
+    from snug.dataset import settings_of
+
+    taught = sorted((name, simulated[name].content) for name in simulated)
+    found = hashlib.sha256(repr((settings_of(dressed.body, dressed.garment), taught)).encode())
     for role, several in (("train", motions), ("validate", held_out)):
         for motion in several:
             found.update(f"{role} {motion.name} {motion.fps}".encode())
-            found.update(motion.poses.tobytes() + motion.translations.tobytes())
-    found.update("".join(simulated[name].content for name in sorted(simulated)).encode())
+            for array in (motion.poses, motion.translations):  # the last bits are of the processor
+                found.update((np.round(array, 6) + 0.0).tobytes())
     return found.hexdigest()[:16]
 
 
@@ -232,13 +235,15 @@ def _check_ended(out: Path, options: argparse.Namespace, vertices: int, learned_
     from snug.trained_model import TrainedModel
 
     there, asked = TrainedModel.load(out), _recipe(options)
+    if "learned_from" not in there.summary:
+        raise ValueError(f"{out}: does not say what it learned from, as models of before; name another --out")
     pairs = {
         "model": (there.kind, options.model),
         "recipe": (there.recipe, asked),
         "seed": (there.seed, options.seed),
         "vertices": (there.vertices, vertices),
         "number of steps": (there.steps, there.steps if options.patience else options.steps),
-        "body, garment or motions": (there.summary.get("learned_from"), learned_from),
+        "body, garment or motions": (there.summary["learned_from"], learned_from),
     }
     if other := [name for name, (found, mine) in pairs.items() if found != mine]:
         raise ValueError(f"{out}: of another {other[0]}; name another --out, or leave out --resume")

@@ -222,7 +222,7 @@ def check_names(cells: Sequence[Cell]) -> None:
                 )
         if cell.method == "body" or cell.method.endswith("-quasi-static"):
             raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")
-        if (other := there.setdefault(cell.name.lower(), cell)) is not cell:
+        if (other := there.setdefault(cell.name, cell)) is not cell:
             raise PlanError(f"{cell.label} and {other.label} would have the same files: rename one")
 
 

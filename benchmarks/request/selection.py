@@ -14,7 +14,7 @@ from ..performance.microbenchmark import SUITE, Microbenchmark
 from ..performance.registry import MICROBENCHMARKS
 from ..registry import DeclarationError, by_name
 from ..scene import Scene
-from ..scenes import GARMENT_SCENES, all_scenes
+from ..scenes import GARMENT_SCENES, SCENES, all_scenes, further_scenes
 from ..tasks.cell import Cell
 from ..validation.case import METHOD
 from ..validation.registry import CASES
@@ -102,7 +102,8 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[
         key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
     )
     scenes = {cell.scene.name: cell.scene for cell in cells}
-    known = {name: scene for name, scene in declared.items() if not scene.declared_in} | scenes
+    settled = (*SCENES, *further_scenes(request.motions.first_garment))  # those that any run may start from
+    known = {scene.name: scene for scene in settled} | scenes
     for own in (scene for scene in scenes.values() if scene.declared_in):
         _check_words_of(own, known, request.motions)
     return tuple(cells), cases, microbenchmarks
@@ -110,13 +111,17 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[
 
 def _check_words_of(scene: Scene, known: Mapping[str, Scene], motions: Motions) -> None:
     """Raises PlanError for what a user's scene names and nobody knows."""
-    if scene.start_of:
-        before = known.get(scene.start_of)
-        if before is None or before.start_of or before.name == scene.name:
+    chain, last = {scene.name}, scene
+    while last.start_of:
+        before = known.get(last.start_of)
+        if before is None or not before.simulated or before.name in chain:
+            others = [name for name, other in known.items() if other.simulated and name not in chain]
             raise PlanError(
-                f"{scene.declared_in}: scene '{scene.name}': start_of='{scene.start_of}': name another "
-                f"scene, one that settles by itself; {nearest(scene.start_of, [*known])}"
+                f"{last.declared_in}: scene '{last.name}': start_of='{last.start_of}': name another scene "
+                f"whose garment settles, of the run or without a motion; {nearest(last.start_of, others)}"
             )
+        chain.add(before.name)
+        last = before
     if scene.dressed:
         from snug.motion_library import LIBRARY
 

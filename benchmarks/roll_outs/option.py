@@ -53,8 +53,7 @@ class RollOutOption:
 
     def __post_init__(self) -> None:
         if not re.fullmatch(rf"[{CHARACTERS}]+", self.name):
-            wrong = f"the name '{self.name}' has other than letters, digits and _-+."
-            raise RollOutError(f"--rollout {self.name}={self.path}: {wrong}")
+            raise RollOutError(f"{self.path}: the name '{self.name}' has other than letters, digits and _-+.")
 
     @property
     def places(self) -> bool:

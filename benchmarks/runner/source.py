@@ -26,6 +26,7 @@ from typing import Any
 from ..registry import DeclarationError
 from ..results import digest_of_file
 
+ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
 ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("reference_sim", "snug", "benchmarks")
 NO_DATA = (".py", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
@@ -130,7 +131,7 @@ class _Source:
 @cache
 def _source(path: str) -> _Source:
     try:
-        tree = ast.parse((ROOT / path).read_text(encoding="utf-8-sig"))
+        tree = ast.parse((ROOT / path).read_text(encoding=ENCODING))
     except SyntaxError as error:
         raise DeclarationError(f"{path}: line {error.lineno}: {error.msg}") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -240,7 +241,7 @@ def _defined(path: str) -> frozenset[str]:
 
 
 def _top_level(path: str) -> Iterator[ast.stmt]:
-    for node in ast.parse((ROOT / path).read_text(encoding="utf-8")).body:
+    for node in ast.parse((ROOT / path).read_text(encoding=ENCODING)).body:
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             continue
         yield node

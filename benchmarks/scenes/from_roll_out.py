@@ -16,7 +16,7 @@ from ..roll_outs.option import RollOutError, RollOutOption, digest_of
 from ..scene import BuiltScene, Scene
 
 FPS = 30.0  # where neither the file nor the user says another rate
-SIZES = (0.05, 20.0)  # [m] across, of what is sewn and draped
+LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn
 FEWEST = 4  # frames: two are not judged, and a mean is of more than one
 
 
@@ -69,13 +69,14 @@ def build(
 
 
 def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> None:
-    """Raises RollOutError for a cloth (V,3) [m] of a size that none has: it is of another unit."""
+    """Raises RollOutError for a cloth (V,3) [m] larger than any that is a garment in a smaller unit."""
     across = float(np.linalg.norm(np.ptp(rest_positions, axis=0)))
-    smallest, largest = SIZES
-    if not smallest <= across <= largest:
-        fit = [f"--units {u}" for u, m in METRES.items() if smallest <= across / METRES[units] * m <= largest]
-        remedy = f"say {' or '.join(fit)}" if fit else "bring it to metres"
-        raise RollOutError(f"{rest_mesh}: the cloth is {across:.3g} m across in --units {units}: {remedy}")
+    low, high = GARMENT
+    fit = [f"--units {unit}" for unit, m in METRES.items() if low <= across / METRES[units] * m <= high]
+    if across > LARGEST and fit:
+        raise RollOutError(
+            f"{rest_mesh}: the cloth is {across:.3g} m across in --units {units}: say {' or '.join(fit)}"
+        )
 
 
 def _obstacle(stored: StoredRollOut, units: str, up: str) -> Obstacle | None:
