@@ -228,9 +228,11 @@ class RunFolder:
         suffix = "" if seed == 0 else f"-seed{seed}"
         return self.trajectories / scene.replace("/", "-") / f"{method.replace('/', '-')}{suffix}.vtkhdf"
 
-    def quasi_static_path(self, scene: str, method: str, seed: int = 0) -> Path:
-        """A method's answer to each frame held still, beside its trajectory."""
-        return self.trajectory_path(scene, f"{method}-quasi-static", seed)
+    def quasi_static_path(self, scene: str, method: str = "", seed: int = 0) -> Path:
+        """A method's answer to each frame held still, beside its trajectory; without a method the
+        simulator's, which no cell of the scene writes or removes.
+        """
+        return self.trajectory_path(scene, f"{method}-quasi-static" if method else "quasi-static", seed)
 
     def curves_path(self, scene: str, method: str, seed: int = 0) -> Path:
         """What was measured of each frame of a trajectory, beside it: name -> (T,) or (T,V)."""

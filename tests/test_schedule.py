@@ -67,6 +67,21 @@ def test_a_networks_cell_is_measured_beside_the_poses_that_it_trained_on_mixed_o
     assert schedule.metrics(narrow).training is None
 
 
+def test_a_cell_that_begins_removes_nothing_that_another_task_of_its_scene_has_made(tmp_path):
+    scene, folder = dressed_scene("kick"), RunFolder(tmp_path)
+    cells = tuple(Cell(scene, find_method(name), 0, ("garments",)) for name in ("simulation", "snug"))
+    schedule = Schedule(plan_of(tmp_path, motions=MOTIONS, cells=cells))
+    paths = (folder.start_path, folder.body_path, folder.rest_areas_path, folder.quasi_static_path)
+    made = [path(scene.name) for path in paths]
+    for path in made:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    for cell in cells:
+        schedule.cell(cell).clear(folder)
+        schedule.metrics(cell).clear(folder)
+    assert all(path.exists() for path in made)
+
+
 def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path):
     mesh = tmp_path / "cape.obj"
     with pytest.raises(ValueError, match=r"cape\.obj"):

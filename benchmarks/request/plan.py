@@ -220,7 +220,7 @@ def check_names(cells: Sequence[Cell]) -> None:
                 raise PlanError(
                     f"{what} '{name[:40]}...': its name has more than {LONGEST} bytes: shorten it"
                 )
-        if cell.method == "body" or cell.method.endswith("-quasi-static"):
+        if cell.method == "body" or cell.method.endswith("quasi-static"):
             raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")
         if (other := there.setdefault(cell.name, cell)) is not cell:
             raise PlanError(f"{cell.label} and {other.label} would have the same files: rename one")

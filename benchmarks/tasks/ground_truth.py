@@ -199,7 +199,7 @@ class SimulateQuasiStatic(Task):
         from reference_sim import simulate
 
         scene = built(self.scene, context)
-        path = context.folder.quasi_static_path(scene.name, "simulation")
+        path = context.folder.quasi_static_path(scene.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         trajectory = simulate(
             scene.cloth, scene.energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,

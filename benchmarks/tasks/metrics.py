@@ -71,7 +71,7 @@ class MeasureCell(Task):
         folder = context.folder
         group = SceneRollOuts(built(self.cell.scene, context), gap_samples=self.gap_samples)
         if self.quasi_static in needed:
-            group.quasi_static = _positions(folder.quasi_static_path(self.cell.scene.name, "simulation"))
+            group.quasi_static = _positions(folder.quasi_static_path(self.cell.scene.name))
         found = {}
         for cell in self.cells:
             outcome = needed.get(("cell", cell.name))
