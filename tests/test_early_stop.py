@@ -11,6 +11,7 @@ from dressing import swaying, tube_dress
 from reference_sim import Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
 from snug.recipe import DEFAULT
+from snug.recipes import SUPERVISED
 from snug.rollout import roll_out
 from snug.stopwatch import PARTS
 from snug.tensorboard_log import TensorBoardError, TensorBoardLog
@@ -103,9 +104,10 @@ def test_supervised_validates_against_its_own_targets():
     target = dressed.skinned(HELD, smoothing=20)
     target[..., 1] += 0.02
     validation = Validation(motions=[HELD], every=5, trajectories={"held": target})
+    still = replace(SUPERVISED, learning_rate=1e-9)  # Adam takes whole steps along rounding errors too
     model = train(
         "supervised", dressed, [motion], steps=5, seed=0, trajectories=trajectories, validation=validation,
-        progress=False,
+        progress=False, recipe=still,
     )  # fmt: skip
     # Taught to stay at skinning, where it starts, it is 2 cm off the held-out targets.
     assert model.summary["validation"]["best"] == pytest.approx(4.0, rel=1e-3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ def trajectory(frames=4, **changes) -> Trajectory:
 @dataclasses.dataclass
 class FourFrames:
     frames: int = 4
+    cloth: SimpleNamespace = dataclasses.field(default_factory=lambda: SimpleNamespace(vertex_count=3))
 
 
 def test_a_trajectory_is_judged_by_what_is_in_it():

@@ -109,7 +109,7 @@ class TrainNetwork(Task):
                 seed=self.seed, trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False,
                 every=LOG_EVERY, device=self.device, saving=saving, validation=validation,
             )  # fmt: skip
-        context.tell(self.units - told)  # of a training that ended early
+        context.tell(self.steps - told)  # of a training that ended early
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
         saving.done()
