@@ -109,7 +109,8 @@ class TrainNetwork(Task):
                 seed=self.seed, trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False,
                 every=LOG_EVERY, device=self.device, saving=saving, validation=validation,
             )  # fmt: skip
-        context.tell(self.steps - told)  # of a training that ended early
+        if told < self.steps:  # it ended early
+            context.tell(self.steps - told)
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
         saving.done()
