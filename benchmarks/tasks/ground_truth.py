@@ -170,7 +170,7 @@ class SimulateClips(Task):
         try:
             trajectory = simulated(scene, self.entry, context.folder)
         except RuntimeError as error:  # a pose that leaves the cloth no room
-            return np.empty(0), str(error)
+            return np.empty(0), str(error) or type(error).__name__
         done = trajectory.status == "converged" or self.entry.truncated
         whole = trajectory.frames == clip.frames and np.isfinite(trajectory.positions).all()
         return trajectory.positions, "" if done and whole else f"{trajectory.status}: {trajectory.reason}"
