@@ -52,7 +52,8 @@ class FastGRU(torch.autograd.Function):
     """apply(x (N, T, D), state (L, N, H), *weights) -> (N, T, H), (L, N, H).
 
     weights: input, hidden, input bias, hidden bias of each layer. Differentiable once, by the weights alone:
-    neither inputs nor the state at the start are trained, and the state that comes out is a constant.
+    neither inputs nor the state at the start are trained, and the state that comes out is a constant. Between
+    products a row of units is as wide as the next multiple of LANES, and 0 beyond H.
     """
 
     @staticmethod
@@ -62,16 +63,18 @@ class FastGRU(torch.autograd.Function):
         for layer, start in enumerate(state):
             w_i, w_h, b_i, b_h = weights[4 * layer : 4 * layer + 4]
             (frames, count), size = x.shape[:2], w_h.shape[1]
-            inputs = product(x.flatten(0, 1), w_i, b_i).view(frames, count, 3 * size)
-            hidden = x.new_empty(frames + 1, count, size)
-            gates = x.new_empty(frames, count, 4 * size)  # r, z, n, q
-            hidden[0] = start
+            wide = size + -size % LANES
+            inputs = _widened(product(x.flatten(0, 1), w_i, b_i), size).view(frames, count, -1)
+            hidden = x.new_zeros(frames + 1, count, wide)
+            gates = x.new_empty(frames, count, 4 * wide)  # r, z, n, q
+            hidden[0, :, :size] = start
             for t in range(frames):
-                arrays = inputs[t], product(hidden[t], w_h, b_h), hidden[t], gates[t], hidden[t + 1]
-                _cell(*(array.numpy().ravel() for array in arrays), size // LANES)
+                recurrent = _widened(product(hidden[t, :, :size].contiguous(), w_h, b_h), size)
+                arrays = inputs[t], recurrent, hidden[t], gates[t], hidden[t + 1]
+                _cell(*(array.numpy().ravel() for array in arrays), wide // LANES)
             saved += [x, gates, hidden]
-            x = hidden[1:]
-            last.append(hidden[-1])
+            x = hidden[1:, :, :size].contiguous()
+            last.append(hidden[-1, :, :size])
         ctx.save_for_backward(*weights, *saved)
         ctx.layers = len(state)
         ends = torch.stack(last)
@@ -87,9 +90,10 @@ class FastGRU(torch.autograd.Function):
             w_i, w_h = weights[4 * layer : 4 * layer + 2]
             x, gates, hidden = saved[3 * layer : 3 * layer + 3]
             to_inputs, to_recurrent = _back_in_time(y, gates, hidden, w_h)
+            before = hidden[:-1, :, : w_h.shape[1]].contiguous().flatten(0, 1)
             gradients[4 * layer : 4 * layer + 4] = [
                 product(to_inputs.t(), x.flatten(0, 1).t()),
-                product(to_recurrent.t(), hidden[:-1].flatten(0, 1).t()),
+                product(to_recurrent.t(), before.t()),
                 to_inputs.sum(0),
                 to_recurrent.sum(0),
             ]
@@ -100,15 +104,27 @@ class FastGRU(torch.autograd.Function):
 
 def _back_in_time(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tuple[Tensor, Tensor]:
     """Gradients (T N, 3H) of what W_i x and W_h h gave, from those y (T, N, H) of a layer's outputs."""
-    frames, count, size = y.shape
-    to_inputs, to_recurrent = (y.new_empty(frames, count, 3 * size) for _ in range(2))
-    back, y = y.new_zeros(count, size), y.contiguous()
+    (frames, count, size), wide = y.shape, hidden.shape[-1]
+    to_inputs, to_recurrent = (y.new_empty(frames, count, 3 * wide) for _ in range(2))
+    back, y = y.new_zeros(count, wide), _widened(y.contiguous(), size)
     arrays = [tensor.numpy() for tensor in (y, gates, hidden, to_inputs, to_recurrent)]
     for t in reversed(range(frames)):
-        _cell_back(back.numpy().ravel(), *(array[t].ravel() for array in arrays), size // LANES)
+        _cell_back(back.numpy().ravel(), *(array[t].ravel() for array in arrays), wide // LANES)
         if t:
-            back += product(to_recurrent[t], w_h.t())
-    return to_inputs.flatten(0, 1), to_recurrent.flatten(0, 1)
+            back[:, :size] += product(_narrowed(to_recurrent[t], size), w_h.t())
+    return _narrowed(to_inputs.flatten(0, 1), size), _narrowed(to_recurrent.flatten(0, 1), size)
+
+
+def _widened(rows: Tensor, size: int) -> Tensor:
+    """Rows (..., k H), H of this size, with each of the k parts filled up with 0 to a multiple of LANES."""
+    if size % LANES == 0:
+        return rows
+    return nn.functional.pad(rows.unflatten(-1, (-1, size)), (0, -size % LANES)).flatten(-2)
+
+
+def _narrowed(rows: Tensor, size: int) -> Tensor:
+    """The inverse of `_widened`."""
+    return rows.unflatten(-1, (-1, size + -size % LANES))[..., :size].flatten(-2)
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
@@ -131,7 +147,7 @@ def _cell(
     blocks: int,
 ) -> None:
     """One frame of a layer: what W_i x and W_h h give (N, 3H) and h (N, H) -> r, z, n, q (N, 4H) and h'
-    (N, H). All flat, with H of so many blocks of LANES.
+    (N, H). All flat, with H, widened, of so many blocks of LANES.
     """
     L, u = LANES, np.empty(7 * LANES, np.float32)
     for place in range(len(after) // L):
@@ -208,12 +224,13 @@ class FastLinear(torch.autograd.Function):
         return to_x, product(y, rows.t()), y.sum(1)
 
 
-def run_gru(gru: nn.GRU, x: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor]:
-    """What gru(x, state) gives, for a gru of batches first, in one direction and without dropout. Raises
-    ValueError for a number of units that does not fill lanes.
+def run_gru(gru: nn.GRU, x: Tensor, state: Tensor | None, *, closed_form: bool) -> tuple[Tensor, Tensor]:
+    """What gru(x, state) gives, for a gru of batches first, in one direction and without dropout.
+
+    closed_form: by FastGRU, where a gradient is asked for.
     """
-    if gru.hidden_size % LANES:
-        raise ValueError(f"{gru.hidden_size} recurrent units: closed forms want a multiple of {LANES}")
+    if not (closed_form and torch.is_grad_enabled()):
+        return gru(x, state)
     if state is None:
         state = x.new_zeros(gru.num_layers, len(x), gru.hidden_size)
     weights = [weight for layer in gru.all_weights for weight in layer]

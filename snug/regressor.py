@@ -59,10 +59,7 @@ class Regressor(nn.Module):
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
         normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
-        if self.closed_form and torch.is_grad_enabled():
-            hidden, state = run_gru(self.gru, normalised, state)
-        else:
-            hidden, state = self.gru(normalised, state)  # (N, T, 256), (4, N, 256)
+        hidden, state = run_gru(self.gru, normalised, state, closed_form=self.closed_form)
         flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), state
 

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from snug.baselines.santesteban2019 import FitAndWrinkles
 from snug.baselines.supervised import Targets, VertexTargets
 from snug.device import CPU
 from snug.divergence_guard import SETTLING, DivergenceGuard, live_tensors
@@ -86,7 +87,7 @@ class Trainer:
         )
         network.normalise_by(*self.data.input_statistics())
         self.network = network.to(device)
-        if isinstance(network, Regressor | MotionPerceptron):
+        if isinstance(network, Regressor | FitAndWrinkles | MotionPerceptron):
             network.closed_form = self.kernels
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay, fused=True

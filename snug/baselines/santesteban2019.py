@@ -12,11 +12,12 @@ do on other bodies. The 2 mm clean-up of its authors is a method of its own, see
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import torch
 from torch import Tensor, nn
 
+from snug.fast_network import run_gru, run_linear
 from snug.regressor import Regressor
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ class FitAndWrinkles(nn.Module):
         self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
     ) -> None:
         super().__init__()
-        self.vertices, self.output_scale = vertices, output_scale
+        self.vertices, self.output_scale, self.closed_form = vertices, output_scale, False
         self.input_mean: Tensor
         self.input_std: Tensor
         self.register_buffer("input_mean", torch.zeros(inputs))
@@ -51,8 +52,10 @@ class FitAndWrinkles(nn.Module):
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
         normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
-        hidden, state = self.gru(normalised, state)  # (N, T, 1500), (1, N, 1500)
-        flat = self.fit(normalised[..., -SHAPES:]) + self.offsets(hidden)  # (N, T, 3V)
+        fast, drape = self.closed_form, cast(nn.Linear, self.fit[-1])
+        hidden, state = run_gru(self.gru, normalised, state, closed_form=fast)  # (N, T, 1500), (1, N, 1500)
+        shape = self.fit[:-1](normalised[..., -SHAPES:])
+        flat = run_linear(drape, shape, closed_form=fast) + run_linear(self.offsets, hidden, closed_form=fast)
         return (self.output_scale * flat).unflatten(-1, (self.vertices, 3)), state
 
     def lay_out(self, plan: FramePlan) -> None:
