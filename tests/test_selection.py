@@ -66,6 +66,21 @@ def test_patterns_choose_scenes_methods_and_cases():
     assert sum(case.suite == "extremes" for case in cases) >= 8
 
 
+def test_a_pattern_of_another_garment_means_its_motions_of_the_split():
+    def names(pattern, split="test", suites=("garments",)):
+        of = choose_motions([], [], find_preset("quick"), split=split)
+        found = choose(Request(suites=suites, preset=find_preset("quick"), motions=of, scenes=(pattern,)))[0]
+        return of, {cell.scene.name for cell in found}
+
+    for split in ("test", "validation"):
+        of, found = names("trousers/*", split)
+        assert found == {f"trousers/{motion}" for motion in of.measured} and len(found) >= 4
+    of, found = names("skirt/*")
+    assert found == {f"skirt/{motion}" for motion in of.dynamic_measured}
+    of, found = names("shorts/*@clip", suites=("speed",))
+    assert found == {f"shorts/{motion}@clip" for motion in of.measured}
+
+
 def test_a_name_means_itself_whatever_is_in_it():
     found, _ = chosen(("garments",), scenes=["tshirt/w[1]"], test=("w[1]", "w2"))
     assert {cell.scene.name for cell in found} == {"tshirt/w[1]"}

@@ -164,8 +164,8 @@ def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> l
 def _pairs(request: Request) -> Iterator[tuple[str, str, MethodEntry]]:
     """(suite, scene, method), suite by suite; a method that is left out of a scene says why.
 
-    A scene that no suite lists is met where its whole name is given: a body in a whole motion in garments,
-    all else in speed. A method that no suite lists takes part in each suite where its whole name is given.
+    A scene that no suite lists is met where it is named: a body in a whole motion in garments, all else in
+    speed. A method that no suite lists takes part in each suite where its whole name is given.
     """
     extent, declared = request.extent, request.declared_scenes
     unlisted = _unlisted_scenes(request)
@@ -225,13 +225,23 @@ def default_suites(method: str, preset: Preset) -> list[str]:
 
 
 def _unlisted_scenes(request: Request) -> dict[str, str]:
-    """Scenes called by their whole names that no suite lists -> the suite that takes them."""
-    everything = Extent(request.preset, request.motions, full=True, further=True)
+    """Scenes that no suite lists -> the suite that takes them: those called by their whole names, and by a
+    pattern that no listed scene has, as 'trousers/*', the motions of the split.
+    """
+    motions = request.motions
+    everything = Extent(request.preset, motions, full=True, further=True)
     listed = {name for suite in SUITES for name in suite.scenes(everything)}
+    patterns = [p for p in request.scenes if not any(named(name, [p]) for name in listed)]
+
+    def asked(scene: Scene) -> bool:
+        if scene.name in request.scenes or not (patterns and named(scene.name, patterns)):
+            return scene.name in request.scenes
+        return scene.dressed and scene.motion in motions.measured_of(scene.garment)
+
     return {
         name: "garments" if scene.part == "whole" else "speed"
         for name, scene in request.declared_scenes.items()
-        if name in request.scenes and name not in listed
+        if name not in listed and asked(scene)
     }
 
 
