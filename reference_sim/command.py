@@ -12,7 +12,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .command_options import DEFAULT_FRAMES, make_parser
+from .command_options import DEFAULT_DT, DEFAULT_FRAMES, make_parser
 from .command_terms import contradiction, terms
 from .material import Material
 
@@ -61,6 +61,10 @@ def _run(options: Namespace) -> int:
     frames = options.frames
     if frames is None:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else DEFAULT_FRAMES
+    own = _dt_of(options.obstacle)
+    dt = options.dt or own or DEFAULT_DT
+    if own and abs(dt - own) > 1e-6 * own:
+        _say(f"note: {options.obstacle} has {own:.4g} s between frames, and --dt is {dt:.4g}")
     from .simulator import simulate
     from .summary import predicted_stretch, summary
 
@@ -74,7 +78,7 @@ def _run(options: Namespace) -> int:
     trajectory = simulate(
         cloth,
         terms(cloth, options),
-        dt=options.dt,
+        dt=dt,
         frames=frames,
         obstacle=obstacle,
         substeps=options.substeps,
@@ -108,15 +112,23 @@ def _check_paths(options: Namespace) -> None:
         if options.pc2.suffix.lower() != ".pc2":
             raise InputError(f"{options.pc2}: a point cache ends in .pc2")
         outputs += [options.pc2, options.pc2.with_suffix(".obj")]
-    inputs = [Path(p).resolve() for p in (options.garment, options.obstacle, options.obstacle_rest) if p]
+    from .mesh_io import mesh_paths
+
+    inputs = [Path(p).resolve() for p in (options.garment, options.obstacle_rest) if p]
+    if options.obstacle:
+        inputs += [path.resolve() for path in mesh_paths(options.obstacle)]
     for path in outputs:
         if not path.parent.is_dir():
             raise InputError(f"{path.parent}: no such folder to write {path.name} in")
         if path.resolve() in inputs:
             raise InputError(f"{path} would replace an input: choose another name")
+        if path != options.output and path.exists() and not (options.resume or options.overwrite):
+            raise InputError(f"{path} exists: add --overwrite to replace it")
 
 
 def _read_cloth(options: Namespace) -> Cloth:
+    import numpy as np
+
     from .cloth import Cloth, MeshError
     from .mesh_io import METRES, read_mesh, to_metres_y_up
     from .uv_chart import join_seams, rest_chart
@@ -126,11 +138,12 @@ def _read_cloth(options: Namespace) -> Cloth:
     material = replace(material, **{name: value for name, value in given.items() if value is not None})
     surface = read_mesh(options.garment)
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
-    chart = None
+    pins, chart = choose_pins(options.pins, positions), None
     if options.rest == "uv":
-        surface, kept = join_seams(replace(surface, positions=positions))
+        surface, kept, now = join_seams(replace(surface, positions=positions))
         if len(kept) < len(positions):
             _say(f"note: {options.garment}: {len(positions) - len(kept)} doubled vertices joined along seams")
+            pins = np.unique(now[pins])  # chosen by their numbers in the file
         positions = surface.positions
         try:
             chart = rest_chart(surface, options.uv_scale or METRES[options.units])
@@ -143,7 +156,6 @@ def _read_cloth(options: Namespace) -> Cloth:
     size = float((positions.max(axis=0) - positions.min(axis=0)).max())
     if not 0.02 < size < 20:
         _say(f"note: {options.garment} measures {size:.3g} m: is --units {options.units} right?")
-    pins = choose_pins(options.pins, positions)
     if len(pins) == len(positions):
         raise InputError(f"--pins {options.pins!r} holds every vertex of {options.garment}: choose fewer")
     try:
@@ -226,6 +238,17 @@ def _read_obstacle(cloth: Cloth, options: Namespace) -> Obstacle | None:
             f"vertex {distance.argmin()} {-1e3 * distance.min():.0f} mm deep"
         )
     return obstacle
+
+
+def _dt_of(obstacle: str | None) -> float | None:
+    """Time between frames [s] of an obstacle that is a trajectory; None of any other."""
+    from .mesh_io import TRAJECTORY_SUFFIXES
+    from .trajectory import Trajectory
+
+    if not obstacle or not obstacle.lower().endswith(TRAJECTORY_SUFFIXES):
+        return None
+    times = Trajectory.load(obstacle).times
+    return float(times[1] - times[0]) if len(times) > 1 else None
 
 
 def _say(text: str) -> None:

@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from .material import Material
 
-DEFAULT_FRAMES = 60
+DEFAULT_FRAMES, DEFAULT_DT = 60, 1 / 30
 DIGITS = 9  # of a count
 UNITS_OF_MATERIAL = {
     "young_modulus": ("PA", "Young's modulus [Pa]"),
@@ -162,9 +162,8 @@ def _add_contact_and_time(parser: argparse.ArgumentParser) -> None:
     steps.add_argument(
         "--dt",
         type=_positive,
-        default=1 / 30,
         metavar="S",
-        help="time between frames, as 0.02 or 1/60 (default 1/30)",
+        help="time between frames, as 0.02 or 1/60 (default: that of an obstacle's trajectory, or 1/30)",
     )
     steps.add_argument(
         "--frames", type=_count, metavar="N", help=f"default: those of the obstacle, or {DEFAULT_FRAMES}"

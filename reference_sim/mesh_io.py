@@ -140,7 +140,7 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
 
         trajectory = Trajectory.load(pattern)
         return trajectory.positions, Surface(trajectory.positions[0], trajectory.faces)
-    paths = _paths(str(pattern))
+    paths = mesh_paths(str(pattern))
     first = read_mesh(paths[0])
     frames = [first.positions]
     for path in paths[1:]:
@@ -150,7 +150,8 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     return np.stack(frames), first
 
 
-def _paths(pattern: str) -> list[Path]:
+def mesh_paths(pattern: str) -> list[Path]:
+    """The files that `read_sequence` reads, in its order. Raises MeshError where there are none."""
     path = Path(pattern)
     if path.is_dir():
         found = [p for p in path.iterdir() if p.suffix.lower() in MESH_SUFFIXES]
@@ -167,7 +168,7 @@ def _paths(pattern: str) -> list[Path]:
         raise MeshError(
             f"{pattern}: meshes of several kinds ({', '.join(kinds)}): name one, as in '*{kinds[0]}'"
         )
-    return sorted(found, key=lambda p: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", p.name)])
+    return sorted(found, key=lambda p: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", str(p))])
 
 
 def _check_corresponds(path: Path, surface: Surface, first_path: Path, first: Surface) -> None:

@@ -39,6 +39,11 @@ class Potential:
         steps = (energy.parameters()["dt_s"] for energy in self.energies if energy.name == "inertia")
         return next(steps, None)
 
+    @property
+    def impassable(self) -> bool:
+        """Whether some term may stop an obstacle on its way."""
+        return any(energy.impassable for energy in self.energies)
+
     def prepare(self, step: Step) -> None:
         """Freeze in every term what it needs for one step."""
         for energy in self.energies:

@@ -133,7 +133,7 @@ def _check_same_run(path: Path, then: dict[str, Any], now: dict[str, Any]) -> No
     different = [
         f"{key} ({then.get(key)}, now {now.get(key)})"
         for key in dict.fromkeys([*now, *then])
-        if then.get(key) != now.get(key)
+        if json.dumps(then.get(key)) != json.dumps(now.get(key))  # where NaN is NaN
     ]
     if different:
         raise TrajectoryError(

@@ -102,10 +102,12 @@ def simulate(
     earlier = recover(path, provenance, frames=frames) if resume and path else None
     if earlier and earlier.complete(frames):
         return earlier.trajectory
+    if earlier is None:
+        loop.check_start(x, v)
     state = State(x, v) if earlier is None else loop.resumed(earlier, v, pin_positions)
     with Recorder(cloth, provenance, path) as record:
         if earlier is None:
-            record.start(x, loop.first_fields(x))
+            record.start(x, loop.first_fields())
         else:
             record.replay(earlier)
         for frame in _bar(range(record.frames, frames), progress):

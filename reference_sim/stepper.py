@@ -71,7 +71,14 @@ class Stepper:
         method = "newton" if any(energy.dynamic for energy in energies) else "lbfgs"
         self.quasi_static, self.options = quasi_static, {"method": method} | options
         self.minimiser = make_minimiser(self.potential, **self.options)
-        self._started = False
+
+    def check_start(self, x: np.ndarray, v: np.ndarray) -> None:
+        """Raises ValueError where x (V, 3) at frame 0 is impossible for a term that nothing may pass."""
+        if self.potential.impassable:
+            self.prepare(1, x, v, x[self.cloth.pins])
+            self.potential.set_progress(0.0)
+            if infeasibility := self.potential.infeasibility(x):
+                raise ValueError(f"simulate: the start is not free of intersections: {infeasibility}")
 
     def advance(self, frame: int, state: State, pins: np.ndarray | None) -> tuple[State | None, list[Result]]:
         """The sub-steps to `frame`, pins (P, 3) [m] at its end; the state is None if one of them diverged."""
@@ -130,6 +137,11 @@ class Stepper:
         pins = self.cloth.pins
         if pin_positions is not None and not np.array_equal(pin_positions(last), x[pins]):
             raise TrajectoryError(f"simulate: pins at frame {last} are not where the earlier run had them")
+        if self.potential.impassable and not earlier.trajectory.frame_fields["converged"][last]:
+            raise TrajectoryError(
+                f"simulate: at frame {last} the obstacle may have stopped on its way, no file says where: "
+                "start again"
+            )
         if before is None:
             raise TrajectoryError(f"simulate: the sub-step before frame {last} is lost: start again")
         # Terms may remember the step before, and an obstacle what it was asked about.
@@ -143,16 +155,8 @@ class Stepper:
         guess until something would touch. From there pins and obstacle go on alone; if they cannot, a rough
         minimisation gains distance, and all move on. So the last minimisation starts without an intersection,
         pins and obstacle at the end of their way. Without such a term it starts at the guess.
-
-        Raises:
-            ValueError: the very first x is impossible already.
         """
         potential, pins = self.potential, self.cloth.pins
-        if not self._started:
-            potential.set_progress(0.0)
-            if infeasibility := potential.infeasibility(x):
-                raise ValueError(f"simulate: the start is not free of intersections: {infeasibility}")
-            self._started = True
         motion, goal, progress = guess - x, guess, 0.0
         reached = [0.0]
         while len(reached) <= MAX_APPROACHES:
@@ -188,7 +192,7 @@ class Stepper:
         options: dict[str, Any] = self.options | {"max_iterations": 8, "tolerance": 1e-2}
         return make_minimiser(self.potential, **options)
 
-    def first_fields(self, x: np.ndarray) -> dict[str, float]:
+    def first_fields(self) -> dict[str, float]:
         """The fields of frame 0, which is given."""
         names = [energy.name for energy in self.potential.energies]
         fields = dict.fromkeys([f"energy/{name}" for name in names], float("nan"))
@@ -213,5 +217,5 @@ class Stepper:
             "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
             "material": asdict(cloth.material),
             "cloth": fingerprint(cloth.rest_positions, cloth.faces, np.asarray(cloth.pins), cloth.rest_uv),
-            "obstacle": None if obstacle is None else obstacle.fingerprint,
+            "obstacle": None if obstacle is None else f"{type(obstacle).__name__} {obstacle.fingerprint}",
         }

@@ -19,8 +19,9 @@ STRETCH = 1.5  # from chart to mesh, or its inverse: no cloth is sewn so
 STRETCHED_SHARE = 0.1  # of the area, from which a chart is no pattern
 
 
-def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
-    """The surface (in metres) without doubled vertices, and of each vertex left its number in the file (V,).
+def join_seams(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
+    """The surface (in metres) without doubled vertices; of each vertex left its number in the file (V,), and
+    of each vertex in the file its number now.
 
     Vertices closer than a micrometre are one. A surface that has none stays as it is.
     """
@@ -31,7 +32,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
     count = len(surface.positions)
     pairs = cKDTree(surface.positions).query_pairs(JOINED, output_type="ndarray")
     if not len(pairs):
-        return surface, np.arange(count)
+        return surface, np.arange(count), np.arange(count)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     of_vertex = connected_components(graph, directed=False)[1]
     _, first = np.unique(of_vertex, return_index=True)
@@ -42,7 +43,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
     joined = replace(
         surface, positions=surface.positions[kept], faces=place[of_vertex][surface.faces], vertex_data=data
     )
-    return joined, kept
+    return joined, kept, place[of_vertex]
 
 
 def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndarray:

@@ -47,8 +47,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
     """
     demand_new(folder)
     whole = folder.resolve()
-    part = whole.with_name(f".{whole.name}.part")
-    shutil.rmtree(part, ignore_errors=True)  # of work that was killed
+    part = whole.with_name(f".{whole.name}.{os.getpid()}.part")
     part.mkdir(parents=True)
     try:
         yield part

@@ -57,12 +57,13 @@ class Patch:
         """Cut the patch for samples (S, 3) [m] out of a body in its T-pose (B, 3) [m], (Fb, 3)."""
         from scipy.spatial import cKDTree
 
-        distance, _ = cKDTree(samples).query(
-            body_positions[body_faces].mean(axis=1), distance_upper_bound=region
-        )
+        middles = body_positions[body_faces].mean(axis=1)
+        distance, _ = cKDTree(samples).query(middles, distance_upper_bound=region)
         kept = body_faces[np.isfinite(distance)]
         if len(kept) == 0:
             raise ValueError(f"no body face lies within {region} m of the garment: they do not fit together")
+        if cKDTree(middles).query(samples)[0].max() > region:
+            kept = body_faces  # a sample without a face in its region meets all
         body_vertices, flat = np.unique(kept, return_inverse=True)
         faces = flat.reshape(-1, 3).astype(np.int32)
         rest = body_positions[body_vertices].astype(np.float32)

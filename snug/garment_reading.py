@@ -79,7 +79,7 @@ def examine(file: GarmentFile, wearer: Wearer, body: Body) -> Reading:
         raise GarmentError(str(error)) from None
     authored = authored_weights(file.path, raw.vertex_data, file.weights, len(raw.positions))
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
-    surface, kept = join_seams(replace(raw, positions=positions))
+    surface, kept, _ = join_seams(replace(raw, positions=positions))
     reading = Reading(surface=surface)
     _of_size(reading, raw, surface, kept)
     fits = _of_place(reading, file, wearer, raw)

@@ -1,4 +1,4 @@
-"""The network of garments that swing: half a second of motion goes through a perceptron into offsets.
+"""The network of garments that swing: a perceptron from three quarters of a second of motion to offsets.
 
 It carries nothing from frame to frame: what a garment did is not among its inputs, but all that made it do so
 is (snug.motion_inputs). So frames are learned one by one, in any order, and no roll-out can drift.

@@ -221,7 +221,10 @@ def _digest(
     from snug.dataset import settings_of
 
     taught = sorted((name, simulated[name].content) for name in simulated)
-    found = hashlib.sha256(repr((settings_of(dressed.body, dressed.garment), taught)).encode())
+    body, garment = dressed.body, dressed.garment
+    found = hashlib.sha256(repr((settings_of(body, garment), taught, garment.authored_weights)).encode())
+    for array in (garment.skinning_weights, body.shape_directions, body.joint_directions):
+        found.update((np.round(array, 6) + 0.0).tobytes())
     for role, several in (("train", motions), ("validate", held_out)):
         for motion in several:
             found.update(f"{role} {motion.name} {motion.fps}".encode())
@@ -250,15 +253,19 @@ def _check_ended(out: Path, options: argparse.Namespace, vertices: int, learned_
 
 
 def _tell(model: TrainedModel) -> None:
+    from snug.trained_model import find_kind
+
+    unit = find_kind(model.kind).unit
     last = {name: value for name, value in model.history[-1].items() if "/" not in name}
     parts = {name: value for name, value in model.history[-1].items() if "/" in name}
     terms = [f"{name} {value:.4g}" for name, value in last.items() if name not in ("step", "seconds")]
-    print("last steps, J per frame: " + "  ".join(terms))
+    print(f"last steps, {unit}, mean over frames: " + "  ".join(terms))
     print("ms a step: " + "  ".join(f"{n.removeprefix('seconds/')} {1e3 * s:.1f}" for n, s in parts.items()))
     for window in model.summary["named_windows"][:5]:
-        print("step {step}: {window} at {joules} J, {action}".format(**window))
+        print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=unit))
     if found := model.summary.get("validation"):
-        print("validation {best:.4g} J at step {best_step}, whose weights are kept".format(**found))
+        best, step = found["best"], found["best_step"]
+        print(f"validation {best:.4g} {unit} at step {step}, whose weights are kept")
     print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
           f"{model.megabytes:.1f} MB")  # fmt: skip
 

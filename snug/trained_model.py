@@ -47,6 +47,11 @@ class Kind:
     def physics(self) -> bool:
         return self.targets is None
 
+    @property
+    def unit(self) -> str:
+        """Of its loss: a frame's energy, or how far vertices are from the simulated ones."""
+        return self.targets.unit if self.targets else "J"
+
 
 KINDS = {
     "snug": Kind(Regressor, "motion", sequences=True),
@@ -66,8 +71,8 @@ class ModelFileError(TensorFileError):
 class TrainedModel:
     """A network and how it came to be.
 
-    history: one dict for every few steps: step, seconds, loss and each energy [J per frame], and as
-        `seconds/<part>` what the parts of a step took on the mean (snug.stopwatch).
+    history: one dict for every few steps: step, seconds, loss and each term [unit of the kind, mean over
+        frames], and as `seconds/<part>` what the parts of a step took on the mean (snug.stopwatch).
     summary: windows above the spike limit, updates left out, returns to good weights, with names.
     seconds: wall time of the steps, contact search included, and of a pretraining before them;
         setup_seconds: of making ready the motions and the first anchors.

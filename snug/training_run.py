@@ -173,7 +173,12 @@ class TrainingRun:
         taught = trainer.targets.fingerprint() if trainer.targets else _bytes(trainer.data.ahead)
         past = [_bytes(trainer.past.frames)] if trainer.past else []
         data, weights = trainer.data, trainer.dressed.weights(trainer.recipe.smoothing)
-        for part in (_bytes(data.features), _bytes(data.rest), taught, _bytes(weights), *past):
+        held_out = [self.validator.data] if self.validator else []
+        seen = [_bytes(part) for of in (data, *held_out) for part in (of.features, of.transforms, of.ahead)]
+        body = trainer.dressed.body
+        of_body = (body.template, body.faces, body.shape_directions, body.joint_directions)
+        skin = [array.tobytes() for array in of_body]
+        for part in (*seen, _bytes(data.rest), taught, _bytes(weights), *past, *skin):
             digest.update(part)
         digest.update(trainer.dressed.cloth.Dm_inverse.tobytes())
         return {

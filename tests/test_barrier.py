@@ -9,7 +9,7 @@ import pytest
 from barriers import cuts, folded, sheet, still
 from meshes import box, grid, patch, sphere
 
-from reference_sim import Cloth, Material, Obstacle, Potential, minimise, simulate
+from reference_sim import Cloth, Material, Obstacle, Potential, TrajectoryError, minimise, simulate
 from reference_sim.energies import (
     BarrierFriction,
     BendHinge,
@@ -165,6 +165,24 @@ def test_a_body_that_leaves_no_room_stops_and_says_so():
     assert "frame 2" in pressed.reason
     assert list(pressed.frame_fields["converged"][[1, 2, 4]]) == [1, 0, 1]
     assert not cuts(pressed.positions[4], cloth.edges, press.at(4), press.faces).any()
+
+
+def test_a_run_cut_off_where_a_body_had_stopped_is_not_gone_on_with(tmp_path):
+    """No file holds how far the body came: begun at its end, it would have passed the cloth."""
+    cloth = sheet(4, 0.06, (-0.03, 0.01, 0.4))
+    low, faces = box((-0.019, -0.05, 0.408), (0.021, 0, 0.449))
+    high, _ = box((-0.019, 0.02, 0.408), (0.021, 0.07, 0.449))
+    both = np.concatenate([faces, faces + len(low)])
+    shut = [0, 0.01, 0.0205, 0.0205, 0.01]
+    press = Obstacle(np.stack([np.concatenate([low, high - [0, s, 0]]) for s in shut]), both)
+    path = tmp_path / "run.vtkhdf"
+    for frames in (2, 3):
+        terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
+        done = simulate(cloth, terms, obstacle=press, frames=frames, path=path, resume=True)
+    assert done.frames == 3 and done.status == "stalled"
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
+    with pytest.raises(TrajectoryError, match=r"frame 2 the obstacle may have stopped .* start again"):
+        simulate(cloth, terms, obstacle=press, frames=5, path=path, resume=True)
 
 
 @pytest.mark.parametrize(

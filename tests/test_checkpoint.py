@@ -204,6 +204,20 @@ def test_a_checkpoint_of_other_targets_or_cloth_is_refused(tmp_path):
     with pytest.raises(Interrupted):
         short(saving=saving, stop=asked_after(2))
     stiff = DressedBody(dressed.body, dressed.garment, material=Material(young_modulus=1e6))
+    saving.done()
+    clip = swaying(16, name="held")
+    with pytest.raises(Interrupted):
+        short(saving=saving, stop=asked_after(2), validation=Validation(motions=[clip]))
+    shaken_clip = replace(clip, poses=1.1 * clip.poses)
+    with pytest.raises(TensorFileError, match="another data"):
+        short(saving=saving, validation=Validation(motions=[shaken_clip]))
+    saving.done()
+    with pytest.raises(Interrupted):
+        short(saving=saving, stop=asked_after(2))
+    body = replace(dressed.body, template=1.01 * dressed.body.template)
+    with pytest.raises(TensorFileError, match="another data"):
+        other = DressedBody(body, dressed.garment)
+        train("snug", other, CLIPS, steps=24, seed=0, recipe=PLAIN, every=5, progress=False, saving=saving)
     with pytest.raises(TensorFileError, match="another material"):
         train("snug", stiff, CLIPS, steps=24, seed=0, recipe=PLAIN, every=5, progress=False, saving=saving)
 
@@ -236,6 +250,11 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     assert "8 steps" in shown and "validation" in shown and "ms a step" in shown
     assert [path.name for path in tmp_path.iterdir()] == ["small.safetensors"]
     assert module.main(words) == 0 and "nothing to resume" in capsys.readouterr().out
+    dressed = tube_dress()
+    heavier = replace(dressed.garment, skinning_weights=np.roll(dressed.garment.skinning_weights, 1, axis=1))
+    rounder = replace(dressed.body, shape_directions=2 * dressed.body.shape_directions)
+    others = (dressed, DressedBody(dressed.body, heavier), DressedBody(rounder, dressed.garment))
+    assert len({module._digest(other, library, (), {}) for other in others}) == 3
     before = out.read_bytes()
     others = {"seed": "1", "recipe": "paper", "steps": "9", "vertices": "300", "model": "pbns"}
     for name, value in others.items():

@@ -28,7 +28,7 @@ from benchmarks.runner import execution
 from reference_sim import Trajectory, command
 from reference_sim.array_file import write_array
 from reference_sim.trajectory_writer import ROOM
-from reference_sim.whole_file import disk_full, replacing
+from reference_sim.whole_file import disk_full, new_folder, replacing
 from snug import training_run
 from snug.tensor_file import read_tensors, write_tensors
 from snug.training_run import Saving
@@ -181,3 +181,14 @@ def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatc
         for made in (folder, other)
     )
     assert rows == others
+
+
+def test_two_processes_that_fill_a_folder_of_one_name_do_not_share_it(tmp_path, monkeypatch):
+    first, second = new_folder(tmp_path / "out"), new_folder(tmp_path / "out")
+    (first.__enter__() / "first").touch()
+    monkeypatch.setattr(os, "getpid", lambda: 7)
+    (second.__enter__() / "second").touch()
+    first.__exit__(None, None, None)
+    with pytest.raises(OSError, match="not empty"):
+        second.__exit__(None, None, None)
+    assert [p.name for p in tmp_path.rglob("*")] == ["out", "first"]

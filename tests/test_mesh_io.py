@@ -155,6 +155,14 @@ def test_a_sequence_follows_the_numbers_in_its_names(tmp_path):
     assert still.shape == (1, len(positions), 3)
 
 
+def test_a_sequence_over_folders_follows_their_numbers(tmp_path):
+    positions, faces = sphere(1)
+    for k in (2, 7, 10, 1):
+        write(tmp_path / f"frame_{k}" / "body.ply", positions + k, faces)
+    moving, _ = read_sequence(tmp_path / "frame_*" / "body.ply")
+    np.testing.assert_allclose(moving[:, 0, 0] - positions[0, 0], [1, 2, 7, 10], atol=1e-6)
+
+
 def test_a_trajectory_of_this_project_is_a_sequence(tmp_path):
     positions, faces = sphere(1)
     moving = np.stack([positions, positions + 1])

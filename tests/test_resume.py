@@ -246,6 +246,10 @@ def test_what_cannot_be_read_is_said_in_one_line_and_left_alone(tmp_path, damage
         ({"velocity": None}, "start "),
         ({"quasi_static": True}, "quasi_static "),
         ({"energies": [StretchStVK(PINNED), Gravity(PINNED)]}, r"terms\.bending"),
+        (
+            {"energies": [StretchStVK(PINNED), BendHinge(PINNED, rest_angles=0.1), Gravity(PINNED)]},
+            r"terms\.bending\.rest",
+        ),
         ({"pin_positions": lambda k: SHEET[[0, 7]]}, "pins at frame 2"),
         ({"frames": 2}, "holds 3 frames already, more than the 2 asked for"),
     ],
@@ -270,6 +274,13 @@ def test_another_cloth_or_obstacle_is_refused(tmp_path):
     terms = [StretchStVK(stiff), BendHinge(stiff), Gravity(stiff), contact, ContactFriction(contact)]
     with pytest.raises(TrajectoryError, match=r"material\.young_modulus \(70000\.0, now 80000\.0\)"):
         simulate(**on_a_moving_ball(cloth=stiff, energies=terms), path=path, resume=True)
+
+
+def test_a_cloth_without_hinges_goes_on_where_it_was(tmp_path):
+    one = Cloth(np.eye(3), np.array([[0, 1, 2]]), pins=[0])
+    scene = {"cloth": one, "energies": [StretchStVK(one), BendHinge(one), Gravity(one)]}
+    simulate(**scene, frames=2, path=tmp_path / "run.vtkhdf")
+    assert simulate(**scene, frames=3, path=tmp_path / "run.vtkhdf", resume=True).frames == 3
 
 
 def test_a_lost_sub_step_is_said(tmp_path):

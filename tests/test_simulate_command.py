@@ -295,6 +295,14 @@ BAD = {
     "pins unclear": (["sheet.obj", "--pins", "left"], "--pins 'left': give indices, 'top', or a box"),
     "all pinned": (["sheet.obj", "--pins", "top"], "holds every vertex of sheet.obj: choose fewer"),
     "input as output": (["sheet.obj", "--pc2", "sheet.pc2"], "sheet.obj would replace an input"),
+    "frame of the obstacle as output": (
+        ["sheet.obj", "--obstacle", "ball/ball_*.obj", "--pc2", "ball/ball_1.pc2"],
+        "ball/ball_1.obj would replace an input",
+    ),
+    "a file of somebody else": (
+        ["sheet.obj", "--pc2", "twice.pc2"],
+        "twice.obj exists: add --overwrite to replace it",
+    ),
     "kind of cache": (["sheet.obj", "--pc2", "sheet.abc"], "sheet.abc: a point cache ends in .pc2"),
     "no folder": (["sheet.obj", "--pc2", "there/a.pc2"], "there: no such folder to write a.pc2 in"),
     "two wishes": (["sheet.obj", "--resume", "--overwrite"], "not allowed with argument"),
@@ -318,6 +326,40 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, case):
     assert status == 2
     assert error.startswith("simulate: ") and error.count("\n") == 1 and message in error
     assert sorted(p.as_posix() for p in folder.rglob("*")) == before
+
+
+def test_a_start_that_cannot_be_leaves_what_is_there(folder, capsys):
+    assert main(["sheet.obj", "--frames", "2", "-o", "out.vtkhdf"]) == 0
+    before = Path("out.vtkhdf").read_bytes()
+    write("cut.obj", BALL, BALL_FACES)
+    words = ["sheet.obj", "--obstacle", "cut.obj", "--barrier", "-o", "out.vtkhdf", "--overwrite"]
+    assert main(words) == 2 and "start is not free of intersections" in capsys.readouterr().err
+    assert Path("out.vtkhdf").read_bytes() == before
+
+
+def test_pins_are_numbers_of_the_file_where_a_chart_joins_its_vertices(folder):
+    cut = np.flatnonzero(np.abs(SHEET[:, 0]) < 1e-9)
+    twice, split = doubled_along(SHEET, FACES, cut)
+    chart = SHEET[FACES][:, :, [0, 2]]
+    order = np.random.default_rng(0).permutation(len(twice))  # so that joining renumbers what is pinned
+    new = np.argsort(order)
+    write_obj(folder / "split.obj", twice[order], new[split], uv=chart)
+    pin = len(twice) - 1
+    assert main(["split.obj", "--rest", "uv", "--pins", f"{pin}", "--frames", "2", "-o", "out.vtkhdf"]) == 0
+    first, last = Trajectory.load("out.vtkhdf").positions
+    held = np.flatnonzero((first == last).all(axis=1))
+    np.testing.assert_allclose(first[held], twice[order[-1:]], atol=1e-6)
+
+
+def test_an_obstacles_trajectory_brings_its_time_between_frames(folder, capsys):
+    Trajectory(BALL + np.zeros((3, 1, 1)), BALL_FACES, np.arange(3) / 60).save("ball.vtkhdf")
+    words = ["sheet.obj", "--obstacle", "ball.vtkhdf", "--obstacle-rest", "ball/ball_0.obj"]
+    assert main([*words, "-o", "a.vtkhdf"]) in (0, 1)
+    assert Trajectory.load("a.vtkhdf").times[1] == pytest.approx(1 / 60)
+    assert "between frames" not in capsys.readouterr().out
+    assert main([*words, "--dt", "1/30", "-o", "b.vtkhdf"]) in (0, 1)
+    assert Trajectory.load("b.vtkhdf").times[1] == pytest.approx(1 / 30)
+    assert "note: ball.vtkhdf has 0.01667 s between frames, and --dt is 0.03333" in capsys.readouterr().out
 
 
 def test_an_output_of_another_kind_is_refused(folder, capsys):

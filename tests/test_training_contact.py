@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import torch
 from dressing import swaying, tube_dress
+from meshes import sphere
 
 from reference_sim.surface_walk import triangle_adjacency
-from snug.contact import ContactCache
+from snug.contact import ContactCache, Patch
 from snug.motion_augmentation import mixed_for
 from snug.recipe import DEFAULT
 from snug.skeleton import JOINT
@@ -29,6 +30,17 @@ def made(motions=MOTIONS, **options):
 def test_across_a_side_lies_the_face_that_shares_it():
     faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]])
     assert triangle_adjacency(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
+
+
+def test_a_sample_far_from_the_body_at_rest_may_meet_all_of_it():
+    body, faces = sphere(2, 0.1)
+    near = body[:5] * 1.2
+    assert len(Patch.around(near, body, faces, region=0.05).faces) < len(faces)
+    far = np.concatenate([near, [[1.0, 0.0, 0.0]]])
+    patch = Patch.around(far, body, faces, region=0.05)
+    assert len(patch.faces) == len(faces)  # as the simulator's rule of regions has it
+    where, _ = patch.search(np.tile([[-0.11, 0.0, 0.0]], (6, 1)), patch.rest)
+    assert body[faces[where[5]]].mean(axis=0)[0] < -0.09
 
 
 def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):

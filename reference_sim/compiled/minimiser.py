@@ -75,7 +75,7 @@ class CompiledLBFGS:
         self._first_step = 1.0  # what the first direction of the last step allowed: most of the next too
 
     def minimise(self, x0: np.ndarray) -> Result:
-        """Run from x0 (V, 3) [m]: status "max_iterations", or "diverged"."""
+        """Run from x0 (V, 3) [m]: status "max_iterations", "stalled" or "diverged"."""
         start = time.perf_counter()
         terms, x0 = self._terms, np.ascontiguousarray(x0, np.float64)
         target = (terms.inertia.x_hat - x0).astype(np.float32).ravel()

@@ -19,6 +19,7 @@ from ..block_places import BlockPlaces
 from ..cloth import Cloth
 from ..kernel_cache import njit
 from ..lanes import LANES, add_blocks, arctan2
+from ..resume import fingerprint
 from .energy import Energy
 
 if TYPE_CHECKING:
@@ -62,7 +63,12 @@ class BendHinge(Energy):
         self.rest_angles = np.array(angles)  # its own: a broadcast view is read-only
 
     def parameters(self) -> dict[str, Any]:
-        return {"scaling": self.scaling, "mean_stiffness_J": float(self.stiffness.mean())}
+        mean = float(self.stiffness.mean()) if len(self.stiffness) else 0.0
+        return {
+            "scaling": self.scaling,
+            "mean_stiffness_J": mean,
+            "rest": fingerprint(self.stiffness, self.rest_angles),
+        }
 
     def element_energy(self, u: Tensor) -> Tensor:
         import torch

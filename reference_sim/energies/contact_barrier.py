@@ -49,7 +49,7 @@ class ContactBarrier(Energy):
     """
 
     name = "barrier"
-    remembers = True  # where the obstacle stopped
+    remembers = impassable = True  # what it remembers is where the obstacle stopped
     dynamic = True
 
     def __init__(

@@ -50,6 +50,7 @@ class Energy:
             and in every step.
         remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
             judged without preparing the one before it.
+        impassable: whether an obstacle may have to stop on its way to the end of a step.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Energy:
     dynamic: bool = False
     constant: tuple[int, ...] = ()
     remembers: bool = False
+    impassable: bool = False
 
     def energy(self, x: Tensor) -> Tensor:
         """Energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""

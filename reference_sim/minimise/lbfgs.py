@@ -45,7 +45,7 @@ class LBFGS:
         switch: relative residual at which Newton takes over; None is SWITCH, or COMPILED_SWITCH.
         patience: iterations after which it takes over in any case.
         finish: whether Newton takes over at all. Without it the result can only be "max_iterations",
-            "stalled" or "timeout": nothing but a look at the curvature can say "converged".
+            "stalled", "timeout" or "diverged": nothing but a look at the curvature can say "converged".
         timeout: seconds, for both together.
         observe: called with every point (V, 3) [m] that either of them kept, the start included. Nothing is
             compiled then.

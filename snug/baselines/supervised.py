@@ -42,6 +42,7 @@ class VertexTargets:
     motion without a fitting trajectory.
     """
 
+    unit = "cm²"  # of the loss
     from_files = True  # whether a batch needs nothing but its own frames
 
     def __init__(

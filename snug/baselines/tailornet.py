@@ -166,6 +166,7 @@ class BandTargets(VertexTargets):
     All of it is in memory, also of trajectories in files: smoothing a batch takes longer than teaching it.
     """
 
+    unit = "cm"
     from_files = False
 
     def __init__(self, dressed: Any, *arguments: Any) -> None:
