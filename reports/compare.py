@@ -177,7 +177,7 @@ def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]
 
 def _machine(mean: Mean, far: Effect) -> bool:
     """Whether a change of time or memory may be the machine's: not repeated, or within MOST_SLACK."""
-    if far.error is None and mean.uncertainty is None:
+    if mean.uncertainty is None and "seeds" not in far.covers:
         return True
     low, high = far.interval or (far.shown, far.shown)
     return not far.ratio or (low < 1.0 + MOST_SLACK and high > 1.0 / (1.0 + MOST_SLACK))

@@ -75,9 +75,19 @@ class Run:
 
     @property
     def worn(self) -> pd.DataFrame:
-        """The rows of suite garments, which are averaged over the scenes of a garment."""
+        """The rows of suite garments, which are averaged over the scenes of a garment: of motions that nobody
+        has trained on, unless there are no others.
+        """
         rows = self.suite("garments")
-        return rows[rows["garment"] != ""]
+        rows = rows[rows["garment"] != ""]
+        unseen = rows[~rows["scene"].isin(self.trained_on)]
+        return rows if unseen.empty else unseen
+
+    @property
+    def trained_on(self) -> list[str]:
+        """Scenes of training motions, as a user's own can be."""
+        scenes = self.config.get("scenes") or {}
+        return [name for name, said in scenes.items() if said.get("role") == "training"]
 
     def garments(self, frame: pd.DataFrame) -> dict[str, list[str]]:
         """Garment -> its scenes among these rows, in the order in which run.json declares them."""
@@ -121,6 +131,12 @@ class Run:
         """The ablations among these rows whose base has a usable number too: they have their own table."""
         usable = set(frame[frame["usable"]]["method"])
         return {name for name in self.with_role("ablation") if self.methods[name].base in usable}
+
+
+def shown_seeds(rows: pd.DataFrame) -> pd.Series:
+    """(scene, method) -> the first seed whose roll-out came to its end; the first where none did."""
+    good = rows[rows["usable"]].groupby(["scene", "method"])["seed"].min()
+    return good.combine_first(rows.groupby(["scene", "method"])["seed"].min()).astype(int)
 
 
 def run_data(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[str] = ()) -> Run:

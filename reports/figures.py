@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 SERIES_TERMS = ("strain", "bending", "inertia")
 DOTTED = ("energy/total", "curvature/error", "penetration/vertices")
-SIZED, VERTICES = ("curvature/error", "curvature/mean"), "mesh/vertices"
+SIZED, VERTICES, STEPS = ("curvature/error", "curvature/mean"), "mesh/vertices", "mesh/steps"
 EVERY = 3  # of a roll-out's frames, in histograms
 RARE = 0.01  # [%] the lowest share that they show
 MOST_LINES = 24  # methods that have room below each other
@@ -148,8 +148,10 @@ def histograms(
 
 
 def against_vertices(folder: Path, run: Run) -> list[Picture]:
-    """Errors against the number of vertices, a line per method, of the scenes that declare that number."""
-    rows = run.frame[run.frame["usable"]]
+    """Errors against the number of vertices, a line per method, of a garment's scenes that declare it."""
+    rows = run.frame[run.frame["usable"] & (run.frame["garment"] != "")]
+    finer = rows[(rows["metric"] == STEPS) & (rows["value"] > 1.0)]["scene"]
+    rows = rows[~rows["scene"].isin(finer)]
     sizes = rows[rows["metric"] == VERTICES].drop_duplicates("scene").set_index("scene")["value"]
     rows = rows[rows["scene"].isin(sizes.index) & (rows["method"] != "")]
     shown = [name for name in SIZED if len(rows[rows["metric"] == name])]

@@ -18,6 +18,7 @@ from reports.table import Table
 HEAD = "% Needs \\usepackage{booktabs} and LuaLaTeX or XeLaTeX for names not Latin; as wide as two columns.\n"
 FEW = 9  # columns that fit in the larger letters
 LINE = 11  # letters of a heading's line
+NUMBER = "\n"  # between a heading and the number of its column
 MARKS = {"*": r"\ast", "†": r"\dagger", "‡": r"\ddagger", "§": r"\S"}
 _POWER = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
 _PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
@@ -38,7 +39,8 @@ def latex(run: Run, table: Table) -> str:
         column_texts(run, column, [row[place] for row in table.rows], [])
         for place, column in enumerate(table.columns)
     ]
-    heads = [f"{c.title} [{c.unit_above}]" if c.unit_above else c.title for c in table.columns]
+    named = [f"{c.title} [{c.unit_above}]" if c.unit_above else c.title for c in table.columns]
+    heads = [f"{head}{NUMBER}{place}" for place, head in enumerate(named)]  # two metrics may have one heading
     cells = {
         head: [cell["text"] if column.text else _cell(cell) for cell in texts]
         for head, column, texts in zip(heads, table.columns, columns)
@@ -62,6 +64,7 @@ def latex(run: Run, table: Table) -> str:
 
 def _stacked(head: str) -> str:
     """A heading of short lines, its unit on the last: columns are as wide as their numbers."""
+    head = head.partition(NUMBER)[0]
     title, _, unit = head.partition(" [")
     lines = [*wrap(title, LINE, break_long_words=False), *([f"{{[{unit}}}"] if unit else [])]
     return r"\shortstack[r]{" + r"\\ ".join(lines) + "}" if len(lines) > 1 else head

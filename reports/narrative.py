@@ -64,7 +64,7 @@ def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str], first_only: boo
         best, solver = beaten_by(points, own), fastest(truncated(run, points), own.error)
         text += f" By {run.metrics[metric].title.lower()} ({_both(own)}) "
         if best is None:
-            text += "nothing as fast as SNUG is nearer"
+            text += "nothing as fast as SNUG is nearer" + _of_all(frame, scenes, metric, points)
         else:
             within = " within repeats" if best.time > own.time else ""
             apart = own.error - best.error > own.error_spread + best.error_spread
@@ -73,6 +73,13 @@ def fronts(run: Run, frame: pd.DataFrame, scenes: Sequence[str], first_only: boo
         text += f"; the fastest solver as near is {run.label(solver.method)}, " if solver else ""
         text += f"{number(solver.time)} ms." if solver else "."
     return text.strip()
+
+
+def _of_all(frame: pd.DataFrame, scenes: Sequence[str], metric: str, points: Sequence[Point]) -> str:
+    """That some method has the number in a part of the scenes alone, and was not looked at."""
+    rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == metric) & frame["usable"]]
+    left_out = set(rows["method"]) - {point.method for point in points}
+    return ", of those that have it in all scenes" if left_out else ""
 
 
 def _both(point: Point) -> str:

@@ -117,8 +117,8 @@ def grid(axes: Axes, which: str = "both") -> None:
 
 
 def file_name(text: str) -> str:
-    """A scene's or method's name as part of a file name."""
-    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in text)
+    """A scene's or method's name as part of a file name, in letters that the report's text keeps."""
+    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in printable(text))
 
 
 @dataclass(frozen=True)

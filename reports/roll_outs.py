@@ -11,7 +11,7 @@ import pandas as pd
 
 from benchmarks.results import RunFolder
 from reports import figures, hem, pictures
-from reports.data import Run
+from reports.data import Run, shown_seeds
 from reports.means import mean_of
 from reports.numbers import number, with_spread
 from reports.overview import leads
@@ -61,9 +61,9 @@ def draw_roll_outs(folder: RunFolder, run: Run, read: Reader) -> list[Picture]:
 
 
 def film(folder: RunFolder, run: Run, rows: pd.DataFrame, methods: Iterable[str], read: Reader) -> Filmed:
-    """The first seed of each method that is on disk, of the one scene of these rows."""
+    """The first good seed of each method, of the one scene of these rows; the first where none is good."""
     scene = str(rows["scene"].iloc[0])
-    seeds = rows.groupby("method")["seed"].min()
+    seeds = shown_seeds(rows).loc[scene]
     asked = {method: read(folder.trajectory_path(scene, method, int(seeds[method]))) for method in methods}
     series = {method: cloth for method, cloth in asked.items() if cloth is not None}
     body = read(folder.trajectory_path(scene, "body")) if series else None

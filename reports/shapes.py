@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from reports.data import Run
-from reports.means import means
+from reports.means import means, pair
 from reports.numbers import number
 from reports.plotting import (
     PAGE_WIDTH,
@@ -37,26 +37,27 @@ def shapes(run: Run) -> list[Table]:
     Without a simulation, or a scene of another shape, there is none.
     """
     rows, sizes = _rows(run)
+    elsewhere = rows[rows["scene"].map(sizes) > 0.0]
     columns = [run.metrics[name] for name in SHOWN if name in run.metrics]
     if rows.empty or not columns:
         return []
     found = means(rows, "scene", "method", "metric")
-    others = means(rows[rows["scene"].map(sizes) > 0.0], "method", "metric")
+    others = means(elsewhere, "method", "metric")
     methods = run.ordered(set(rows["method"]) - set(run.twins))
 
-    def line(of: pd.Series, *key: str) -> tuple[Cell, ...]:
-        values = [of.get((*key, metric.name)) for metric in columns]
-        ours, theirs = of.get((*key, TOTAL)), of.get((*key[:-1], run.reference, TOTAL))
-        above = ours.value - theirs.value if ours and theirs and key[-1] != run.reference else None
-        return (above, *values)
+    def line(of: pd.Series, within: pd.DataFrame, *key: str) -> tuple[Cell, ...]:
+        above = None if key[-1] == run.reference else _above(run, within, key[-1])
+        return (above, *(of.get((*key, metric.name)) for metric in columns))
 
     ordered = sorted(sizes.index, key=lambda scene: sizes[scene])
     each: list[tuple[Cell, ...]] = [
-        (scene, float(sizes[scene]), method, *line(found, scene, method))
+        (scene, float(sizes[scene]), method, *line(found, rows[rows["scene"] == scene], scene, method))
         for scene in ordered
         for method in methods
     ]
-    together: list[tuple[Cell, ...]] = [(OTHERS, None, method, *line(others, method)) for method in methods]
+    together: list[tuple[Cell, ...]] = [
+        (OTHERS, None, method, *line(others, elsewhere, method)) for method in methods
+    ]
     of_mean = [own for own in each if own[1] == 0.0]
     heads = (
         Column("scene", "Scene", text=True), Column("shape", "Norm of the shape"),
@@ -73,13 +74,22 @@ def shapes(run: Run) -> list[Table]:
 
 def on_other_bodies(run: Run) -> str:
     """What networks, and skinning alone, have above the simulation, in a sentence; empty without a number."""
-    made = next(iter(shapes(run)), None)
-    above = {line[2]: line[3] for line in made.rows if line[0] == OTHERS} if made else {}
-    told = [f"{run.label(name)} {number(value)}" for name, value in above.items()
-            if isinstance(name, str) and isinstance(value, float)
-            and run.methods[name].role in ("baseline", "network", "ablation")]  # fmt: skip
-    where = f"on {(_rows(run)[1] > 0.0).sum()} other bodies [J]"
+    rows, sizes = _rows(run)
+    rows = rows[rows["scene"].map(sizes) > 0.0]
+    told = []
+    for name in run.ordered(set(rows["method"]) - set(run.twins)):
+        if run.methods[name].role in ("baseline", "network", "ablation"):
+            one, _ = pair(rows, name, run.reference, TOTAL)
+            above = _above(run, rows, name)
+            told += [f"{run.label(name)} {number(above)}{one.fewer}"] if one and above is not None else []
+    where = f"on {(sizes > 0.0).sum()} other bodies [J]"
     return f"Total energy above the simulation's {where}: {', '.join(told)}." if told else ""
+
+
+def _above(run: Run, rows: pd.DataFrame, method: str) -> float | None:
+    """Total energy above the simulation's [J], mean over the bodies that both have."""
+    one, other = pair(rows, method, run.reference, TOTAL)
+    return one.value - other.value if one and other else None
 
 
 def against_shape(folder: Path, run: Run) -> list[Picture]:
@@ -88,7 +98,7 @@ def against_shape(folder: Path, run: Run) -> list[Picture]:
     The zero of the total is a choice: it is drawn above that of the simulation.
     """
     rows, sizes = _rows(run)
-    rows = rows[~rows["method"].isin(run.twins)]
+    rows = rows[~rows["method"].isin(run.twins) & rows["usable"]]
     shown = [name for name in SHOWN if name in set(rows["metric"])]
     if not shown:
         return []
@@ -125,9 +135,9 @@ def against_shape(folder: Path, run: Run) -> list[Picture]:
 
 
 def _rows(run: Run) -> tuple[pd.DataFrame, pd.Series]:
-    """The usable rows of scenes whose shape is known, and scene -> its norm; none unless shapes differ."""
+    """The rows of scenes whose shape is known, and scene -> its norm; none unless shapes differ."""
     cells = run.cells("shapes")
-    cells = cells[cells["usable"]]
-    sizes = cells[cells["metric"] == SHAPE].drop_duplicates("scene").set_index("scene")["value"]
+    known = cells[(cells["metric"] == SHAPE) & cells["usable"]]
+    sizes = known.drop_duplicates("scene").set_index("scene")["value"]
     kept = cells["scene"].isin(sizes.index) if sizes.nunique() > 1 else np.zeros(len(cells), bool)
     return cells[kept], sizes

@@ -49,7 +49,8 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     one, other = means.pop(own), means.pop(run.reference)
     asked = worn[worn["metric"] == TOTAL]["scene"].nunique()
     count = f"{len(scenes)} of {asked}" if len(scenes) < asked else str(asked)
-    text = f"On {count} unseen motion{'' if asked == 1 else 's'} {run.label(own)}'s total energy is "
+    kind = "training" if set(worn["scene"]) <= set(run.trained_on) else "unseen"
+    text = f"On {count} {kind} motion{'' if asked == 1 else 's'} {run.label(own)}'s total energy is "
     text += f"{with_spread(one.value, one.spread_or_uncertainty)} J{one.fewer}, the simulation's "
     text += with_spread(other.value, other.spread_or_uncertainty) + _apart(run, rows, one, other)
     words = [f"{run.label(name)} has {number(mean.value)}{mean.fewer}" for name, mean in means.items()]

@@ -103,6 +103,11 @@ def test_times_count_beyond_a_fifth_where_they_were_repeated_and_on_one_machine(
     assert found(rows_of(), rows_of(time=1.15)) == []
     assert found(rows_of(), rows_of(time=1.5)) == [("changed", "flag", "lbfgs-4", "cost/frame")]
     assert found(rows_of(), rows_of(time=1.5), times=False) == []
+    once = [  # several motions are no repeats
+        [row(scene, "lbfgs-4", "cost/frame", factor * (9.0 + i), unit="ms") for i, scene in enumerate(SCENES)]
+        for factor in (1.0, 1.5)
+    ]
+    assert found(*once) == []
     elsewhere = [dataclasses.replace(r, hardware="another") for r in rows_of(time=1.5)]
     assert found(rows_of(), elsewhere) == []
 

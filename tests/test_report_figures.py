@@ -20,7 +20,9 @@ from reports import (
     training,
     work_precision,
 )
+from reports.data import shown_seeds
 from reports.pareto import Point
+from reports.plotting import file_name, printable
 
 
 def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
@@ -265,6 +267,31 @@ def test_errors_are_drawn_against_the_vertices_that_scenes_declare(tmp_path, mon
     (line,) = figure.axes[0].get_lines()
     assert list(line.get_xdata()) == [500.0, 2000.0] and list(line.get_ydata()) == [5.0, 20.0]
     assert figures.against_vertices(tmp_path, run_of(rows[2:])) == []
+    # The same mesh with more steps, and a sheet, are other scenes.
+    rows += [
+        row("dt/b", "simulation", "mesh/vertices", 2000.0, unit="1"),
+        row("dt/b", metric="curvature/error"),
+    ]
+    rows += [row("dt/b", "simulation", "mesh/steps", 4.0, unit="1")]
+    rows += [row("drape", "simulation", "mesh/vertices", 900.0, unit="1")]
+    rows += [row("drape", metric="curvature/error")]
+    (figure,) = drawn_by(monkeypatch, figures.against_vertices, tmp_path, run_of(rows))
+    assert list(figure.axes[0].get_lines()[0].get_ydata()) == [5.0, 20.0]
+
+
+def test_the_first_seed_that_came_to_its_end_is_shown():
+    bad = [row(value=None, status="diverged", reason="no end", method=m) for m in ("snug", "pbns")]
+    rows = [*bad, row(seed=2), row(seed=1), row(method="skinning")]
+    seeds = shown_seeds(run_of(rows).frame).loc["tshirt/walk"]
+    assert seeds.to_dict() == {"snug": 1, "pbns": 0, "skinning": 0}
+
+
+def test_names_in_any_letters_give_files_that_the_report_finds():
+    assert (
+        file_name("tshirt/跳跃@clip")
+        == "tshirt-U-8DF3U-8DC3-clip"
+        == file_name(printable("tshirt/跳跃@clip"))
+    )
 
 
 def shaped(method, metric, values, **more):
@@ -302,6 +329,11 @@ def test_energies_are_drawn_and_listed_against_the_shape(tmp_path, monkeypatch):
 
     said = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.250."
     assert shapes.on_other_bodies(run_of(rows)) == said
+    # A method that failed on a body is compared on the others, and the sentence says so.
+    last = [row("shapes/1", "snug", "cost/frame", None, suite="shapes", status="diverged", reason="no end")]
+    kept = [r for r in rows if (r.scene, r.method) != ("shapes/1", "snug")]
+    said = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.200 (1 of 2 roll-outs)."
+    assert shapes.on_other_bodies(run_of(kept + last)) == said
     one = [r for r in rows if r.scene == "shapes/0"]
     assert shapes.on_other_bodies(run_of(one)) == ""
     assert shapes.shapes(run_of(one)) == shapes.against_shape(tmp_path, run_of(one)) == []

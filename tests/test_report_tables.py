@@ -268,6 +268,17 @@ def test_the_verdict_compares_means_over_the_scenes_that_all_have():
     assert near(rows + on_two_scenes("simulation-perturbed-1e-9", 0.5, 7.0)) == near(rows)
 
 
+def test_a_training_motion_is_in_no_mean_of_unseen_ones():
+    rows = on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
+
+    def said(*trained):
+        scenes = {name: {"role": "training" if name in trained else "test"} for name in SCENES}
+        return dict(verdict(run_of(rows, scenes=scenes)))["How near"].replace("\u00a0", " ")
+
+    assert said(SCENES[1]).startswith("On 1 unseen motion SNUG's total energy is 1.00 J")
+    assert said(*SCENES).startswith("On 2 training motions SNUG's total energy is 5.00 J")
+
+
 def test_the_verdict_says_how_many_seeds_are_left():
     rows = [*seeds_of("snug", "energy/total", (1.0, 1.2)), row(method="simulation", metric="energy/total")]
     rows.append(row(metric="cost/frame", value=None, seed=2, status="diverged", reason="no end"))

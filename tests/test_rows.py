@@ -50,6 +50,7 @@ def test_a_trajectory_is_judged_by_what_is_in_it():
     assert judged(status="max_iterations", truncated=True) == ("ok", "")
     assert judged(status="max_iterations", reason="frame 2: gave up")[0] == "stalled"
     assert judged(frames=2)[0] == "diverged"
+    assert judged(frames=2, status="timeout", reason="60 s") == ("timeout", "60 s")
     assert judged(positions=np.full((4, 3, 3), np.nan))[0] == "diverged"
     assert judged(status="fine")[0] == "failed"
     stalled = judged(
@@ -191,6 +192,15 @@ def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch)
     log.write_rows([Row("garments", "tshirt/kick", "snug", 0, metric, "s", 1.0) for metric in metrics])
     found = {row.metric: row.hardware for row in log.folder.read_rows()}
     assert found == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
+
+
+def test_a_run_that_has_just_begun_leaves_what_the_rows_there_mean(tmp_path):
+    log = RunLog(plan_of(tmp_path))
+    log.write_rows([Row("garments", "tshirt/kick", "snug", 0, "energy/total", "J", 1.0)])
+    before = log.folder.read_config()
+    RunLog(plan_of(tmp_path))  # and is interrupted before it knows anything
+    after = log.folder.read_config()
+    assert before["digests"] and all(after[name] == before[name] for name in ("scenes", "digests"))
 
 
 def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path, capsys):

@@ -38,6 +38,11 @@ def test_a_cell_in_two_suites_is_run_once():
     assert {cell.suites for cell in found if cell.scene.name == "tshirt/kick"} == {("garments",)}
 
 
+def test_a_method_that_a_suite_lists_twice_is_of_it_once():
+    found, _ = chosen(("garments",), methods=("simulation", "simulation-perturbed-*", "simulation-refrozen"))
+    assert len(found) > 4 and all(cell.suites == ("garments",) for cell in found)
+
+
 def test_the_reference_comes_first_in_every_scene():
     found, _ = chosen(("garments", "speed"), full=True)
     first = {}

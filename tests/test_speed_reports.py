@@ -9,7 +9,7 @@ from report_folder import declaration, run_of
 from report_folder import row as any_row
 
 from benchmarks.results import Row, RunFolder
-from reports import build
+from reports import build, narrative
 from reports.break_even import Cost, break_even, compared_scenes, cost_of, crossing, crossings, rivals
 from reports.narrative import summary
 from reports.pareto import (
@@ -293,6 +293,20 @@ def test_the_summary_says_what_beats_the_network_and_when_training_pays():
         "SNUG's 3.33 min of training pay after 2,000 frames against Simulation, after 13,000 frames against "
         "L-BFGS, 20 iterations, after 53,000 frames against L-BFGS, 5 iterations."
     )
+
+
+def test_nothing_is_nearer_of_those_that_were_looked_at():
+    numbers = {"snug": ("a", "b"), "pbns": ("a",)}
+    rows = [
+        any_row(scene, method, metric, value / (1 + (method == "pbns")), suite="speed")
+        for method, scenes in numbers.items()
+        for scene in scenes
+        for metric, value in (("gap/energy", 2.0), ("cost/frame", 4.0))
+    ]
+    run = run_of(rows)
+    said = narrative.fronts(run, run.cells("speed"), ["a", "b"], first_only=True)
+    assert said.endswith("nothing as fast as SNUG is nearer, of those that have it in all scenes.")
+    assert "PBNS is nearer" in narrative.fronts(run, run.cells("speed"), ["a"], first_only=True)
 
 
 def test_every_figure_of_the_suite_is_drawn(tmp_path):

@@ -13,6 +13,7 @@ from report_folder import all_rows, declaration, row
 from benchmarks import results
 from benchmarks.results import RunFolder
 from reports import build, dictionary, latex
+from reports.data import run_data
 from reports.read import read_run
 from reports.tables import make_tables
 
@@ -118,6 +119,17 @@ def test_the_dictionary_has_every_column_and_what_every_row_holds(made):
     assert found["metric", "energy/strain"]["definition"] == "definition of energy/strain"
     assert found["metric", "energy/strain"]["better"] == "lower"
     assert ("metric", "check") not in found and all(line["definition"] for line in found.values())
+
+
+def test_two_columns_of_one_heading_keep_their_own_numbers(tmp_path):
+    rows = [
+        row("tshirt/walk", "snug", f"energy/{name}", value) for name, value in (("strain", 1.0), ("own", 5.0))
+    ]
+    said = declaration(rows)
+    said["metrics"]["energy/own"]["title"] = said["metrics"]["energy/strain"]["title"]
+    run = run_data(said, rows)
+    (line,) = [line for line in latex.latex(run, make_tables(run)["energies"]).splitlines() if "SNUG" in line]
+    assert "1.00" in line and "5.00" in line
 
 
 def test_a_table_that_the_run_has_not_is_not_written(tmp_path):

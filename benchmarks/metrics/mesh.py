@@ -18,6 +18,10 @@ METRICS = (
         name="mesh/edge", unit="mm", title="Edge", table="dependence",
         definition="mean length of its edges at rest",
     ),
+    Metric(
+        name="mesh/steps", unit="1", title="Steps of a frame", table="dependence",
+        definition="time steps that a frame is simulated in",
+    ),
 )  # fmt: skip
 
 
@@ -28,4 +32,5 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     return {
         "mesh/vertices": float(cloth.vertex_count),
         "mesh/edge": 1e3 * float(cloth.edge_lengths.mean()),
+        "mesh/steps": float(roll_out.scene.substeps),
     }

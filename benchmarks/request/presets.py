@@ -96,7 +96,7 @@ PRESETS = (
     ),
     Preset(
         name="quick",
-        description="garments of 1000 vertices, all embedded motions; by default at most 21 minutes",
+        description="garments of 1000 vertices, all embedded motions; by default 20 minutes on a slow machine",
         garment_vertices=1000,
         train_motions=None,
         test_motions=None,

@@ -177,7 +177,7 @@ def _pairs(request: Request) -> Iterator[tuple[str, str, MethodEntry]]:
         more = suite.more_methods if request.methods or request.preset.further else ()
         further = suite.named_methods if request.methods else ()
         asked = replace(extent, full=extent.full or bool(request.methods))
-        methods = (*suite.methods(asked), *more, *further, *sorted(own_methods))
+        methods = dict.fromkeys((*suite.methods(asked), *more, *further, *sorted(own_methods)))
         for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
             # Networks for a second garment double the training: only for whoever names its scenes.
             plain = not extent.further and declared[scene].garment not in ("", extent.motions.first_garment)

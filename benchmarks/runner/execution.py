@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ..assets import Assets
 
 KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier run in the folder
+OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks", "cells", "outdated")
 
 
 def execute(plan: Plan) -> int:
@@ -156,6 +157,8 @@ class RunLog:
             # Earlier runs in this folder: their stages are the times of what this one reuses.
             "earlier": [*before.get("earlier", []), *runs_before],
             "test_looks": before.get("test_looks", []),
+            # What the rows there mean, until there are others.
+            **{name: before[name] for name in OF_ROWS if name in before},
         }
         plan.folder.mkdir(parents=True, exist_ok=True)
         self.folder.remove_parts()

@@ -290,7 +290,8 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
     if not np.isfinite(trajectory.positions).all():
         return "diverged", reason or "a position is not finite"
     if trajectory.frames < scene.frames:
-        return "diverged", reason or f"ended after {trajectory.frames} of {scene.frames} frames"
+        ended = "timeout" if trajectory.status == "timeout" else "diverged"
+        return ended, reason or f"ended after {trajectory.frames} of {scene.frames} frames"
     if trajectory.status == "max_iterations":
         return ("ok", "") if truncated else ("stalled", reason)
     if trajectory.status not in WORDS:

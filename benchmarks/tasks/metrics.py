@@ -14,7 +14,7 @@ from ..frame_energies import SECONDS
 from ..metric import Estimate, RollOut, SceneRollOuts
 from ..metrics import find_metric, modules, names_of
 from ..registry import load
-from ..results import RunFolder, replacing
+from ..results import USABLE, RunFolder, replacing
 from .cell import Cell, built
 from .task import Context, Outcome, Task, TaskId, one_line
 
@@ -51,7 +51,8 @@ class MeasureCell(Task):
         if "roll-outs" not in context.memo:
             context.memo["roll-outs"] = self._roll_outs(context, needed)
         roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
-        if self.counterpart is not None and ("cell", self.counterpart.name) in needed:
+        there = needed.get(("cell", self.counterpart.name)) if self.counterpart else None
+        if self.counterpart is not None and there is not None and there.status in USABLE:
             roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
         if self.training is not None:
             roll_out.training_poses = _training_poses(self.training, context)

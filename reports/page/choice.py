@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.results import RunFolder
-from reports.data import SUITES, Run
+from reports.data import SUITES, Run, shown_seeds
 
 BUDGET = 25_000_000  # bytes of the whole page
 FIRST = ("reference", "bound", "baseline", "network")  # roles of the methods of page one
@@ -28,7 +28,7 @@ class Group:
 def groups(folder: RunFolder, run: Run) -> Iterator[Group]:
     """All roll-outs on disk, the most wanted first; the methods of a scene come in one or two groups."""
     cells = run.cells(*SUITES)
-    seeds = cells.groupby(["scene", "method"])["seed"].min()
+    seeds = shown_seeds(cells)
     traits = cells.drop_duplicates("scene").set_index("scene")[["garment", "part"]]
     kinds: list[list[str]] = [[], [], []]
     for scene, garment, part in traits.itertuples():
