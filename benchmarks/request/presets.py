@@ -96,7 +96,7 @@ PRESETS = (
     ),
     Preset(
         name="quick",
-        description="garments of 1000 vertices, all embedded motions; by default 20 minutes on a slow machine",
+        description="garments of 1000 vertices, all embedded motions; by default 20 minutes",
         garment_vertices=1000,
         train_motions=None,
         test_motions=None,
