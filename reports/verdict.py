@@ -50,7 +50,9 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     asked = worn[worn["metric"] == TOTAL]["scene"].nunique()
     count = f"{len(scenes)} of {asked}" if len(scenes) < asked else str(asked)
     kind = "training" if set(worn["scene"]) <= set(run.trained_on) else "unseen"
-    text = f"On {count} {kind} motion{'' if asked == 1 else 's'} {run.label(own)}'s total energy is "
+    garments = list(run.garments(run.worn))
+    where = f" in {garments[0]}" if len(garments) > 1 else ""
+    text = f"On {count} {kind} motion{'' if asked == 1 else 's'}{where} {run.label(own)}'s total energy is "
     text += f"{with_spread(one.value, one.spread_or_uncertainty)} J{one.fewer}, the simulation's "
     text += with_spread(other.value, other.spread_or_uncertainty) + _apart(run, rows, one, other)
     words = [f"{run.label(name)} has {number(mean.value)}{mean.fewer}" for name, mean in means.items()]

@@ -268,6 +268,12 @@ def test_the_verdict_compares_means_over_the_scenes_that_all_have():
     assert near(rows + on_two_scenes("simulation-perturbed-1e-9", 0.5, 7.0)) == near(rows)
 
 
+def test_the_verdict_names_the_garment_where_there_are_several():
+    rows = on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
+    more = [row("skirt/walk", name, "energy/total", 3.0) for name in ("snug", "simulation")]
+    assert near(rows + more).startswith("On 2 unseen motions in tshirt SNUG's total energy is 5.00 J")
+
+
 def test_a_training_motion_is_in_no_mean_of_unseen_ones():
     rows = on_two_scenes("snug", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
 
