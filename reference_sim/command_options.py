@@ -57,7 +57,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     known = parser.add_mutually_exclusive_group()
     known.add_argument("--resume", action="store_true", help="go on after the last whole frame of OUT.vtkhdf")
-    known.add_argument("--overwrite", action="store_true", help="replace OUT.vtkhdf if it exists")
+    known.add_argument("--overwrite", action="store_true", help="replace outputs that exist")
 
     meshes = parser.add_argument_group("meshes")
     units = ("m", "cm", "mm", "in")
