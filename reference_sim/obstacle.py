@@ -36,6 +36,18 @@ class Planes:
     far: np.ndarray | None = None
 
 
+def reachable_faces(rest_points: np.ndarray, centroids: np.ndarray, region: float) -> np.ndarray:
+    """Indices of the faces that some sample may meet, by the rule of regions: those whose centroid (F, 3) [m]
+    lies within `region` of a sample (S, 3) [m], all at rest; all faces where a sample has none.
+    """
+    from scipy.spatial import cKDTree
+
+    if cKDTree(centroids).query(rest_points)[0].max() > region:
+        return np.arange(len(centroids))
+    near = cKDTree(rest_points).query(centroids, distance_upper_bound=region)[0]
+    return np.flatnonzero(np.isfinite(near))
+
+
 class Obstacle:
     """A closed mesh that moves through T frames.
 

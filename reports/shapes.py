@@ -46,7 +46,7 @@ def shapes(run: Run) -> list[Table]:
     methods = run.ordered(set(rows["method"]) - set(run.twins))
 
     def line(of: pd.Series, within: pd.DataFrame, *key: str) -> tuple[Cell, ...]:
-        above = None if key[-1] == run.reference else _above(run, within, key[-1])
+        above = None if key[-1] == run.reference else _above(run, within, key[-1])[0]
         return (above, *(of.get((*key, metric.name)) for metric in columns))
 
     ordered = sorted(sizes.index, key=lambda scene: sizes[scene])
@@ -79,17 +79,18 @@ def on_other_bodies(run: Run) -> str:
     told = []
     for name in run.ordered(set(rows["method"]) - set(run.twins)):
         if run.methods[name].role in ("baseline", "network", "ablation"):
-            one, _ = pair(rows, name, run.reference, TOTAL)
-            above = _above(run, rows, name)
-            told += [f"{run.label(name)} {number(above)}{one.fewer}"] if one and above is not None else []
+            above, fewer = _above(run, rows, name)
+            told += [] if above is None else [f"{run.label(name)} {number(above)}{fewer}"]
     where = f"on {(sizes > 0.0).sum()} other bodies [J]"
     return f"Total energy above the simulation's {where}: {', '.join(told)}." if told else ""
 
 
-def _above(run: Run, rows: pd.DataFrame, method: str) -> float | None:
-    """Total energy above the simulation's [J], mean over the bodies that both have."""
+def _above(run: Run, rows: pd.DataFrame, method: str) -> tuple[float | None, str]:
+    """Total energy above the simulation's [J], mean over the bodies that both have, and words on those that
+    it lacks.
+    """
     one, other = pair(rows, method, run.reference, TOTAL)
-    return one.value - other.value if one and other else None
+    return (one.value - other.value, one.fewer) if one and other else (None, "")
 
 
 def against_shape(folder: Path, run: Run) -> list[Picture]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from reference_sim.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
-from reference_sim.obstacle import DEFAULT_REGION
+from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
 from reference_sim.surface_walk import SLACK, triangle_adjacency
 from snug.contact_kernels import PARTS, byte_normals, contact_energy, interpolated_planes
 from snug.lanes import LANES
@@ -58,12 +58,9 @@ class Patch:
         from scipy.spatial import cKDTree
 
         middles = body_positions[body_faces].mean(axis=1)
-        distance, _ = cKDTree(samples).query(middles, distance_upper_bound=region)
-        kept = body_faces[np.isfinite(distance)]
-        if len(kept) == 0:
+        if cKDTree(middles).query(samples)[0].min() >= region:
             raise ValueError(f"no body face lies within {region} m of the garment: they do not fit together")
-        if cKDTree(middles).query(samples)[0].max() > region:
-            kept = body_faces  # a sample without a face in its region meets all
+        kept = body_faces[reachable_faces(samples, middles, region)]
         body_vertices, flat = np.unique(kept, return_inverse=True)
         faces = flat.reshape(-1, 3).astype(np.int32)
         rest = body_positions[body_vertices].astype(np.float32)

@@ -34,7 +34,8 @@ class Kind:
     """A sort of model: its network, the inputs it reads, whether it sees sequences, and what teaches it.
 
     targets: what simulated vertices become for it; None where the energies teach it. past: whether inertia is
-    that of a simulation's previous frames, see snug.simulated_past.
+    that of a simulation's previous frames, see snug.simulated_past. closed_form: whether it trains faster by
+    snug.fast_network.
     """
 
     network: type[nn.Module]
@@ -42,6 +43,7 @@ class Kind:
     sequences: bool
     targets: type[VertexTargets] | None = None
     past: bool = False
+    closed_form: bool = False
 
     @property
     def physics(self) -> bool:
@@ -54,11 +56,13 @@ class Kind:
 
 
 KINDS = {
-    "snug": Kind(Regressor, "motion", sequences=True),
-    "dynamic": Kind(MotionPerceptron, "history", sequences=False, past=True),
-    "supervised": Kind(Regressor, "motion", sequences=True, targets=VertexTargets),
+    "snug": Kind(Regressor, "motion", sequences=True, closed_form=True),
+    "dynamic": Kind(MotionPerceptron, "history", sequences=False, past=True, closed_form=True),
+    "supervised": Kind(Regressor, "motion", sequences=True, targets=VertexTargets, closed_form=True),
     "pbns": Kind(PoseSpaceDeformation, "pose", sequences=False),
-    "santesteban2019": Kind(FitAndWrinkles, "pose_shape", sequences=True, targets=VertexTargets),
+    "santesteban2019": Kind(
+        FitAndWrinkles, "pose_shape", sequences=True, targets=VertexTargets, closed_form=True
+    ),
     "tailornet": Kind(FrequencyMixture, "pose_shape", sequences=False, targets=BandTargets),
 }
 

@@ -14,7 +14,6 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.baselines.santesteban2019 import FitAndWrinkles
 from snug.baselines.supervised import Targets, VertexTargets
 from snug.device import CPU
 from snug.divergence_guard import SETTLING, DivergenceGuard, live_tensors
@@ -23,10 +22,8 @@ from snug.fast_skinning import FastSkin
 from snug.hidden_state_cache import HiddenStateCache
 from snug.loss import PhysicsLoss
 from snug.motion_augmentation import mixed_for, shapes_of_mixed
-from snug.motion_perceptron import MotionPerceptron
 from snug.parallel import ALONE, Group, GroupError
 from snug.recipe import Recipe
-from snug.regressor import Regressor
 from snug.simulated_past import SimulatedPast
 from snug.skinning import skin
 from snug.stopwatch import Stopwatch
@@ -87,7 +84,7 @@ class Trainer:
         )
         network.normalise_by(*self.data.input_statistics())
         self.network = network.to(device)
-        if isinstance(network, Regressor | FitAndWrinkles | MotionPerceptron):
+        if how.closed_form:
             network.closed_form = self.kernels
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay, fused=True

@@ -148,7 +148,7 @@ def test_the_elements_named_are_those_that_cut():
     assert cuts(needle, np.array([[a, b]]), x, cloth.faces[face : face + 1]).all()
 
 
-def test_a_body_that_leaves_no_room_stops_and_says_so():
+def a_press() -> tuple[Cloth, Obstacle]:
     """A press that closes wholly, and opens again: between its jaws there is no place for a sheet.
 
     The sheet reaches out of the jaws, so that it would be cut, not buried.
@@ -158,7 +158,11 @@ def test_a_body_that_leaves_no_room_stops_and_says_so():
     high, _ = box((-0.019, 0.02, 0.408), (0.021, 0.07, 0.449))
     both = np.concatenate([faces, faces + len(low)])
     shut = [0, 0.01, 0.0205, 0.0205, 0.01]
-    press = Obstacle(np.stack([np.concatenate([low, high - [0, s, 0]]) for s in shut]), both)
+    return cloth, Obstacle(np.stack([np.concatenate([low, high - [0, s, 0]]) for s in shut]), both)
+
+
+def test_a_body_that_leaves_no_room_stops_and_says_so():
+    cloth, press = a_press()
     terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
     pressed = simulate(cloth, terms, obstacle=press, frames=5)
     assert pressed.status == "stalled" and "pins and obstacle came" in pressed.reason
@@ -169,12 +173,7 @@ def test_a_body_that_leaves_no_room_stops_and_says_so():
 
 def test_a_run_cut_off_where_a_body_had_stopped_is_not_gone_on_with(tmp_path):
     """No file holds how far the body came: begun at its end, it would have passed the cloth."""
-    cloth = sheet(4, 0.06, (-0.03, 0.01, 0.4))
-    low, faces = box((-0.019, -0.05, 0.408), (0.021, 0, 0.449))
-    high, _ = box((-0.019, 0.02, 0.408), (0.021, 0.07, 0.449))
-    both = np.concatenate([faces, faces + len(low)])
-    shut = [0, 0.01, 0.0205, 0.0205, 0.01]
-    press = Obstacle(np.stack([np.concatenate([low, high - [0, s, 0]]) for s in shut]), both)
+    cloth, press = a_press()
     path = tmp_path / "run.vtkhdf"
     for frames in (2, 3):
         terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]

@@ -234,9 +234,11 @@ def _unlisted_scenes(request: Request) -> dict[str, str]:
     patterns = [p for p in request.scenes if not any(named(name, [p]) for name in listed)]
 
     def asked(scene: Scene) -> bool:
-        if scene.name in request.scenes or not (patterns and named(scene.name, patterns)):
-            return scene.name in request.scenes
-        return scene.dressed and scene.motion in motions.measured_of(scene.garment)
+        return scene.name in request.scenes or (
+            any(named(scene.name, [p]) for p in patterns)
+            and scene.dressed
+            and scene.motion in motions.measured_of(scene.garment)
+        )
 
     return {
         name: "garments" if scene.part == "whole" else "speed"

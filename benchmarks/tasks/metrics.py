@@ -51,9 +51,10 @@ class MeasureCell(Task):
         if "roll-outs" not in context.memo:
             context.memo["roll-outs"] = self._roll_outs(context, needed)
         roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
-        there = needed.get(("cell", self.counterpart.name)) if self.counterpart else None
-        if self.counterpart is not None and there is not None and there.status in USABLE:
-            roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
+        if self.counterpart is not None:
+            there = needed.get(("cell", self.counterpart.name))
+            if there is not None and there.status in USABLE:
+                roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
         if self.training is not None:
             roll_out.training_poses = _training_poses(self.training, context)
         metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)

@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 
 from ..closest_point import FaceTree, by_cells
 from ..group_search import GROUP
-from ..obstacle import Obstacle, Planes
+from ..obstacle import Obstacle, Planes, reachable_faces
 from ..surface import carry, plane_normals, vertex_normals
 from ..surface_walk import triangle_adjacency
 from .sliding import ask_neighbours, gaps_of, not_outside, slide
@@ -143,10 +143,7 @@ class _Patch:
             centroids = obstacle.at(0)[obstacle.faces].mean(axis=1)
         self.numbers = np.arange(len(obstacle.faces))
         if rest_points is not None:
-            near = cKDTree(rest_points).query(centroids, distance_upper_bound=obstacle.region)[0]
-            alone = cKDTree(centroids).query(rest_points)[0].max() > obstacle.region
-            if not alone:  # a sample without a face in its region meets all
-                self.numbers = np.flatnonzero(np.isfinite(near))
+            self.numbers = reachable_faces(rest_points, centroids, obstacle.region)
         self.vertices, faces = np.unique(obstacle.faces[self.numbers], return_inverse=True)
         self.faces = np.ascontiguousarray(faces.reshape(-1, 3))
         self.centroids = np.ascontiguousarray(centroids[self.numbers])
