@@ -45,18 +45,22 @@ def shapes(run: Run) -> list[Table]:
     others = means(elsewhere, "method", "metric")
     methods = run.ordered(set(rows["method"]) - set(run.twins))
 
-    def line(of: pd.Series, within: pd.DataFrame, *key: str) -> tuple[Cell, ...]:
-        above = None if key[-1] == run.reference else _above(run, within, key[-1])[0]
-        return (above, *(of.get((*key, metric.name)) for metric in columns))
+    def numbers(of: pd.Series, *key: str) -> list[Cell]:
+        return [of.get((*key, metric.name)) for metric in columns]
+
+    def above(scene: str, method: str) -> float | None:
+        one, other = (found.get((scene, name, TOTAL)) for name in (method, run.reference))
+        return one.value - other.value if one and other and method != run.reference else None
 
     ordered = sorted(sizes.index, key=lambda scene: sizes[scene])
     each: list[tuple[Cell, ...]] = [
-        (scene, float(sizes[scene]), method, *line(found, rows[rows["scene"] == scene], scene, method))
+        (scene, float(sizes[scene]), method, above(scene, method), *numbers(found, scene, method))
         for scene in ordered
         for method in methods
     ]
     together: list[tuple[Cell, ...]] = [
-        (OTHERS, None, method, *line(others, elsewhere, method)) for method in methods
+        (OTHERS, None, method, _above(run, elsewhere, method)[0], *numbers(others, method))
+        for method in methods
     ]
     of_mean = [own for own in each if own[1] == 0.0]
     heads = (
@@ -87,8 +91,10 @@ def on_other_bodies(run: Run) -> str:
 
 def _above(run: Run, rows: pd.DataFrame, method: str) -> tuple[float | None, str]:
     """Total energy above the simulation's [J], mean over the bodies that both have, and words on those that
-    it lacks.
+    it lacks; None of the simulation itself.
     """
+    if method == run.reference:
+        return None, ""
     one, other = pair(rows, method, run.reference, TOTAL)
     return (one.value - other.value, one.fewer) if one and other else (None, "")
 
