@@ -57,11 +57,10 @@ def _run(options: Namespace) -> int:
     if text := contradiction(options):
         raise InputError(text)
     cloth = _read_cloth(options)
-    obstacle = _read_obstacle(cloth, options)
+    obstacle, own = _read_obstacle(cloth, options)
     frames = options.frames
     if frames is None:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else DEFAULT_FRAMES
-    own = _dt_of(options.obstacle)
     dt = options.dt or own or DEFAULT_DT
     if own and abs(dt - own) > 1e-6 * own:
         _say(f"note: {options.obstacle} has {own:.4g} s between frames, and --dt is {dt:.4g}")
@@ -103,7 +102,9 @@ def _run(options: Namespace) -> int:
 
 def _check_paths(options: Namespace) -> None:
     """Refuse what could not be written, or would destroy an input, before any work."""
-    if options.output.suffix.lower() not in (".vtkhdf", ".hdf"):
+    from .trajectory import SUFFIXES
+
+    if options.output.suffix.lower() not in SUFFIXES:
         raise InputError(f"{options.output}: the trajectory ends in .vtkhdf")
     if options.output.exists() and not (options.resume or options.overwrite):
         raise InputError(f"{options.output} exists: add --resume to go on with it, --overwrite to replace it")
@@ -206,27 +207,33 @@ def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
     return np.flatnonzero(chosen)
 
 
-def _read_obstacle(cloth: Cloth, options: Namespace) -> Obstacle | None:
+def _read_obstacle(cloth: Cloth, options: Namespace) -> tuple[Obstacle | None, float | None]:
+    """The obstacle, and the time between its frames [s] where it is a trajectory."""
     if options.obstacle is None:
-        return None
+        return None, None
     from .cloth import MeshError
-    from .mesh_io import TRAJECTORY_SUFFIXES, read_mesh, read_sequence, to_metres_y_up
+    from .mesh_io import read_mesh, read_sequence, to_metres_y_up
     from .obstacle import Obstacle
+    from .trajectory import SUFFIXES, Trajectory
 
     axes = {"units": options.units, "up": options.up}
-    positions, surface = read_sequence(options.obstacle)
-    if not options.obstacle.lower().endswith(TRAJECTORY_SUFFIXES):
-        positions = to_metres_y_up(positions, **axes)
+    if options.obstacle.lower().endswith(SUFFIXES):
+        moving = Trajectory.load(options.obstacle)
+        positions, faces = moving.positions, moving.faces
+        dt = moving.dt if moving.frames > 1 else None
+    else:
+        positions, surface = read_sequence(options.obstacle)
+        positions, faces, dt = to_metres_y_up(positions, **axes), surface.faces, None
     rest = None
     if options.obstacle_rest:
         rest_surface = read_mesh(options.obstacle_rest)
-        if rest_surface.faces.shape != surface.faces.shape or (rest_surface.faces != surface.faces).any():
+        if rest_surface.faces.shape != faces.shape or (rest_surface.faces != faces).any():
             raise InputError(
                 f"{options.obstacle_rest}: other faces than {options.obstacle}: export both from one mesh"
             )
         rest = to_metres_y_up(rest_surface.positions, **axes)
     try:
-        obstacle = Obstacle(positions, surface.faces, rest_positions=rest, region=options.region)
+        obstacle = Obstacle(positions, faces, rest_positions=rest, region=options.region)
     except MeshError as error:
         raise InputError(f"{options.obstacle}: {error}") from None
     distance = obstacle.signed_distance(cloth.rest_positions, 0)
@@ -237,18 +244,7 @@ def _read_obstacle(cloth: Cloth, options: Namespace) -> Obstacle | None:
             f"note: the garment starts with {inside.sum()} of {len(inside)} vertices inside the obstacle, "
             f"vertex {distance.argmin()} {-1e3 * distance.min():.0f} mm deep"
         )
-    return obstacle
-
-
-def _dt_of(obstacle: str | None) -> float | None:
-    """Time between frames [s] of an obstacle that is a trajectory; None of any other."""
-    from .mesh_io import TRAJECTORY_SUFFIXES
-    from .trajectory import Trajectory
-
-    if not obstacle or not obstacle.lower().endswith(TRAJECTORY_SUFFIXES):
-        return None
-    times = Trajectory.load(obstacle).times
-    return float(times[1] - times[0]) if len(times) > 1 else None
+    return obstacle, dt
 
 
 def _say(text: str) -> None:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import numpy as np
 
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
-TRAJECTORY_SUFFIXES = (".vtkhdf", ".hdf")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
 FARTHEST = 1e12  # in any unit: squares and cubes of it are still numbers
@@ -126,20 +125,14 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     """Read a moving mesh: positions (T, B, 3) and, for its faces, the first mesh.
 
     Args:
-        pattern: one mesh (T = 1), a folder of meshes of one kind, a glob such as "body_*.obj", or a VTKHDF
-            trajectory of this project. Files are taken in the order of the numbers in their names.
+        pattern: one mesh (T = 1), a folder of meshes of one kind, or a glob such as "body_*.obj". Files are
+            taken in the order of the numbers in their names.
 
     Raises:
         MeshError: as `read_mesh`; no files; vertices or faces that do not correspond to the first file's.
-        TrajectoryError: a VTKHDF file that is not ours.
     """
     import numpy as np
 
-    if str(pattern).lower().endswith(TRAJECTORY_SUFFIXES):
-        from .trajectory import Trajectory
-
-        trajectory = Trajectory.load(pattern)
-        return trajectory.positions, Surface(trajectory.positions[0], trajectory.faces)
     paths = mesh_paths(str(pattern))
     first = read_mesh(paths[0])
     frames = [first.positions]

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import h5py
 
 
+SUFFIXES = (".vtkhdf", ".hdf")
 SMALL = 1 << 20  # [bytes] that nobody minds
 # What h5py and numpy raise for a file that is none, or is damaged.
 UNREADABLE = (

@@ -13,7 +13,6 @@ from reference_sim import Trajectory
 from reference_sim.cloth import MeshError
 from reference_sim.mesh_io import read_mesh, read_sequence, to_metres_y_up
 from reference_sim.point_cache import write_point_cache
-from reference_sim.trajectory import TrajectoryError
 
 
 def write(path, positions, faces, kind="triangle"):
@@ -161,18 +160,6 @@ def test_a_sequence_over_folders_follows_their_numbers(tmp_path):
         write(tmp_path / f"frame_{k}" / "body.ply", positions + k, faces)
     moving, _ = read_sequence(tmp_path / "frame_*" / "body.ply")
     np.testing.assert_allclose(moving[:, 0, 0] - positions[0, 0], [1, 2, 7, 10], atol=1e-6)
-
-
-def test_a_trajectory_of_this_project_is_a_sequence(tmp_path):
-    positions, faces = sphere(1)
-    moving = np.stack([positions, positions + 1])
-    nan = np.full(2, np.nan)
-    Trajectory(moving, faces, np.array([0.0, 0.1]), nan).save(tmp_path / "body.vtkhdf")
-    read, first = read_sequence(tmp_path / "body.vtkhdf")
-    np.testing.assert_array_equal(read, moving)
-    np.testing.assert_array_equal(first.faces, faces)
-    with pytest.raises(TrajectoryError, match=r"nix.vtkhdf: no such"):
-        read_sequence(tmp_path / "nix.vtkhdf")
 
 
 def test_a_sequence_that_does_not_correspond_is_refused(tmp_path):

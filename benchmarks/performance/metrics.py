@@ -68,7 +68,7 @@ METRICS = (
         _size("training_frames", "Frames", "poses that the training draws from, augmented motions included"),
         _clocked("setup", "s", "Making ready", "what a training does before its first step"),
         _clocked("training_step", "ms", "Step", "a training step; the median over blocks of steps"),
-        _clocked("paper_training", "h", "60,000 steps", "preset paper's number of steps at the median"),
+        _clocked("paper_training", "h", "Preset paper", "preset paper's number of steps at the median"),
         _size("step_frames", "Frames a step", "poses of one training step"),
         _clocked("training_step_least", "ms", "Least step", "mean of the quickest block of steps"),
         _clocked("training_step_processor", "ms", "Processor",
