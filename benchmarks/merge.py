@@ -37,7 +37,8 @@ LIKE_TIMES = ("cost/spread", "cost/peak")  # of repeats, and of a process
 SAME = ("format", "preset", "preset_values", "split", "body", "garment")  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
 JOINED = (*STRICT, "tasks", "outdated")  # which hold times and remarks
-OF_ONE_RUN = ("uncertainty", "reason", "commit", "hardware")  # columns that other cells of the run decide
+# Columns that other cells of the run decide.
+OF_ONE_RUN = ("uncertainty", "moved", "reason", "commit", "hardware")
 
 
 class MergeError(ValueError):
@@ -211,7 +212,7 @@ def _known(row: Row) -> tuple[bool, bool]:
 def _told(row: Row, hardware: str) -> Row:
     """A time of another machine: a reason instead of a number."""
     reason = f"{row.value:.4g} {row.unit} on {row.hardware}; other times are of {hardware}"
-    return replace(row, value=None, uncertainty=None, status="skipped", reason=reason)
+    return replace(row, value=None, uncertainty=None, moved=(), status="skipped", reason=reason)
 
 
 def _compare(one: tuple[Row, str], other: tuple[Row, str]) -> None:

@@ -45,10 +45,14 @@ COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what oth
 
 
 class Estimate(NamedTuple):
-    """A number and how far it may be off, in the same unit."""
+    """A number and how far it may be off, in the same unit.
+
+    moved: of a number beside the reference, by how much each simulation as right, in its place, changes it.
+    """
 
     value: float
     uncertainty: float
+    moved: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

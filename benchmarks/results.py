@@ -53,7 +53,8 @@ class Row:
     `value`, `expected`, `tolerance` and `uncertainty` are None where absent (an empty cell in the file); a
     skipped row has a reason and no value. `uncertainty`, in the unit of the value: how far it moves where
     another simulation as right as the reference takes its place, or its standard error as a sample of
-    frames. `terms` names the energies of the scene, joined by "+".
+    frames; `moved`: by how much each of those simulations changes it. `terms` names the energies of the
+    scene, joined by "+".
 
     Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
     Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
@@ -75,6 +76,7 @@ class Row:
     expected: float | None = None
     tolerance: float | None = None
     uncertainty: float | None = None
+    moved: tuple[tuple[str, float], ...] = ()
     preset: str = ""
     commit: str = ""
     hardware: str = ""
@@ -125,6 +127,8 @@ def row_to_cells(row: Row) -> dict[str, str]:
             cells[name] = repr(float(value))
         elif isinstance(value, bool):
             cells[name] = str(value).lower()
+        elif name == "moved":
+            cells[name] = json.dumps(dict(value)) if value else ""
         else:
             cells[name] = " ".join(str(value).split())
     return cells
@@ -145,7 +149,9 @@ def cells_to_row(cells: dict[str, str]) -> Row:
                 raise ValueError(f"no name of at most {LONGEST} printable bytes")
         name = "seeded"
         values[name] = _TRUTHS[cells[name]]
-    except (ValueError, KeyError) as error:
+        name = "moved"  # runs of before have none
+        values[name] = tuple((str(k), float(v)) for k, v in json.loads(cells.get(name) or "{}").items())
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise ResultsError(f"column {name}: {error}") from None
     return Row(**values)
 
@@ -309,7 +315,8 @@ class RunFolder:
         reader = csv.DictReader(stream)
         if tuple(reader.fieldnames or ()) == COLUMNS[: COLUMNS.index("garment")]:
             raise ResultsError(f"{self.rows_path}: {OLD}")
-        if tuple(reader.fieldnames or ()) != COLUMNS:
+        before = tuple(name for name in COLUMNS if name != "moved")
+        if tuple(reader.fieldnames or ()) not in (COLUMNS, before):
             raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
         for cells in reader:
             line = f"{self.rows_path}: line {reader.line_num}"

@@ -43,7 +43,7 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
     measured = outcomes.get(("metrics", cell.name))
     if outcome.files and measured is None:
         return  # interrupted before it was measured
-    metrics: dict[str, Any] = {}  # a number, or a number and its uncertainty
+    metrics: dict[str, Any] = {}  # a number, or the parts of an Estimate
     status, reason = outcome.status, "; ".join(filter(None, (outcome.reason, outcome.remark)))
     if outcome.files:
         assert measured is not None
@@ -94,7 +94,7 @@ def _rows(
     if not metrics:
         yield base
     for name, found in metrics.items():
-        value, uncertainty = found if isinstance(found, (tuple, list)) else (found, None)
+        value, uncertainty, moved = found if isinstance(found, (tuple, list)) else (found, None, ())
         metric, why, ended = find_metric(name, outside), reason, status
         if name == "cost/frame" and not entry.timed:
             why = DECLARED
@@ -110,6 +110,7 @@ def _rows(
         yield dataclasses.replace(
             base, metric=name, unit=metric.unit, value=_finite(value),
             status=ended, reason=why, uncertainty=_finite(uncertainty),
+            moved=tuple((twin, change) for twin, change in moved if math.isfinite(change)),
             seeded=entry.seeded and metric.of == "answer", **judged,
         )  # fmt: skip
 
@@ -201,23 +202,24 @@ def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:
-    """The rows, those of the reference with the largest difference to a simulation that is as right.
+    """The rows, those of the reference with their differences to simulations that are as right.
 
     Of answers, and not of what has an uncertainty of its own. outside: where further metrics are declared.
     """
-    others: dict[tuple[str, str], list[float]] = {}
+    others: dict[tuple[str, str], dict[str, float]] = {}
     for row in rows:
         if as_right(row.family, row.level) and row.status == "ok" and row.value is not None:
-            others.setdefault((row.scene, row.metric), []).append(row.value)
+            others.setdefault((row.scene, row.metric), {})[row.method] = row.value
 
-    def of(row: Row) -> float | None:
-        there = others.get((row.scene, row.metric), [])
+    def told(row: Row) -> Row:
+        there = others.get((row.scene, row.metric), {})
         answer = row.role == "reference" and find_metric(row.metric, outside).of == "answer"
-        if answer and row.uncertainty is None:
-            return max((abs(value - row.value) for value in there if row.value is not None), default=None)
-        return row.uncertainty
+        if not answer or row.uncertainty is not None or row.value is None or not there:
+            return row
+        moved = tuple((twin, value - row.value) for twin, value in there.items())
+        return dataclasses.replace(row, uncertainty=max(abs(change) for _, change in moved), moved=moved)
 
-    return [dataclasses.replace(row, uncertainty=of(row)) for row in rows]
+    return [told(row) for row in rows]
 
 
 def remarked(rows: Iterable[Row]) -> list[Row]:

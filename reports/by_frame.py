@@ -49,7 +49,8 @@ def with_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, o
         shared = known.merge(shares, on=["scene", "seed"])
         metric = share_of_frames(term)
         shared = shared.assign(
-            metric=metric.name, unit=metric.unit, value=shared["share"], uncertainty=float("nan")
-        )
+            metric=metric.name, unit=metric.unit, value=shared["share"], uncertainty=float("nan"),
+            moved=[()] * len(shared),
+        )  # fmt: skip
         made.append(shared[rows.columns])
     return pd.concat(made, ignore_index=True)

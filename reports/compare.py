@@ -108,7 +108,8 @@ def _chosen(run: Run, methods: str) -> pd.DataFrame:
     timed = frame["metric"].isin((TIME, WHOLE))
     apart = repeats.reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell])).to_numpy()
     frame.loc[timed, "uncertainty"] = frame.loc[timed, "value"] * apart
-    return frame[frame["metric"] != REPEATS]
+    # The reference of another run need not move as this one's: uncertainties add up.
+    return frame[frame["metric"] != REPEATS].drop(columns="moved")
 
 
 def _matching(names: pd.Series, patterns: str) -> pd.Series:

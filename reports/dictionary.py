@@ -24,6 +24,10 @@ COLUMNS = {
         "how far the value moves with another simulation as right as the reference, or its standard error "
         "as a sample of frames; empty where unknown",
     ),
+    "moved": (
+        "of the row",
+        "what each simulation as right as the reference changes of the value, in its place: JSON, or empty",
+    ),
     "preset": ("", "sizes of everything, as declared in run.json"),
     "commit": ("", "of the source that measured the row"),
     "hardware": ("", "processor and number of its cores"),

@@ -23,7 +23,8 @@ class Mean:
     `stalled` says that a solver left some frames of some cell unconverged, `seeded` that another seed would
     give another value. `cells`: the value of each (scene, seed). `pairing_group`: means of one group are
     compared seed by seed; empty for none. `uncertainty`: in the metric's unit, how far another reference, as
-    right as the one taken, would move it; None if unknown.
+    right as the one taken, would move it; None if unknown. `moved`: what each of them changes of the value of
+    a cell; cells of which nobody knows it are left out.
     """
 
     value: float
@@ -36,6 +37,7 @@ class Mean:
     cells: Mapping[tuple[str, int], float] = field(default_factory=dict, compare=False)
     pairing_group: str = field(default="", compare=False)
     uncertainty: float | None = None
+    moved: Mapping[tuple[str, int], Mapping[str, float]] = field(default_factory=dict, compare=False)
 
     @property
     def spread_or_uncertainty(self) -> float | None:
@@ -71,8 +73,15 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     of_seed, of_all = (usable.groupby(names, sort=False) for names in ([*own, "seed"], own))
     seeds = of_seed["value"].mean()
     cells: dict[tuple, dict[tuple[str, int], float]] = {}
-    for *key, scene, seed, value in usable[[*own, "scene", "seed", "value"]].itertuples(index=False):
+    changes: dict[tuple, dict[tuple[str, int], dict[str, float]]] = {}
+    if "moved" not in usable:
+        usable = usable.assign(moved=[()] * len(usable))
+    for *key, scene, seed, value, moved in usable[[*own, "scene", "seed", "value", "moved"]].itertuples(
+        index=False
+    ):
         cells.setdefault(tuple(key), {})[scene, int(seed)] = float(value)
+        if moved:
+            changes.setdefault(tuple(key), {})[scene, int(seed)] = dict(moved)
     across = seeds.groupby(own, sort=False)
     unsure = of_all["uncertainty"].mean() if "uncertainty" in frame else [None] * len(cells)
     columns = (
@@ -95,6 +104,7 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
             cells=cells[key],
             pairing_group=pairing_group,
             uncertainty=None if pd.isna(moved) else float(moved),
+            moved=changes.get(key, {}),
         )
     index = pd.MultiIndex.from_arrays([list(column) for column in zip(*found)] or [[]] * len(own), names=own)
     return pd.Series(list(found.values()), index=index, dtype=object)

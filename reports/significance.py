@@ -142,10 +142,37 @@ def _one_seed(mean: Mean, beside: Mean) -> bool:
 
 def within_uncertainty(one: Mean, other: Mean, factor: float = 1.0) -> bool:
     """Whether `factor` times the first differs from the second by no more than other references, as right as
-    the one taken, would move the two; False where nobody measured that.
+    the one taken, would move them apart; False where nobody measured that.
     """
-    moved = factor * (one.uncertainty or 0.0) + (other.uncertainty or 0.0)
+    moved = _moved_apart(one, other, factor)
     return moved > 0.0 and abs(factor * one.value - other.value) <= moved
+
+
+def _moved_apart(one: Mean, other: Mean, factor: float) -> float:
+    """By how much another reference moves `factor` times the first against the second: the most that one of
+    them does in a scene, the mean of scenes. Most of what it does to one method it does to the other too.
+
+    Where nobody knows what each reference does, the sum of both uncertainties, which is no less.
+    """
+    known = [mean.moved and mean.moved.keys() >= mean.cells.keys() for mean in (one, other)]
+    if any(mean.uncertainty and not told for mean, told in zip((one, other), known)):
+        return factor * (one.uncertainty or 0.0) + (other.uncertainty or 0.0)
+    largest = []
+    for scene in dict.fromkeys(scene for scene, _ in one.cells):
+        first, second = (_moved_in(mean, scene) for mean in (one, other))
+        twins = first.keys() & second.keys() or first.keys() | second.keys()
+        apart = [abs(factor * first.get(twin, 0.0) - second.get(twin, 0.0)) for twin in twins]
+        largest.append(max(apart, default=0.0))
+    return float(np.mean(largest)) if largest else 0.0
+
+
+def _moved_in(mean: Mean, scene: str) -> dict[str, float]:
+    """What each other reference changes of the scene's value, the mean of seeds."""
+    changes: dict[str, list[float]] = {}
+    for (where, _), moved in mean.moved.items():
+        for twin, change in moved.items() if where == scene else ():
+            changes.setdefault(twin, []).append(change)
+    return {twin: float(np.mean(found)) for twin, found in changes.items()}
 
 
 def standing(one: Mean, other: Mean, found: Effect, p: float | None, factor: float = 1.0) -> str:

@@ -6,6 +6,7 @@ import dataclasses
 import subprocess
 import sys
 
+import pandas as pd
 import pytest
 
 from benchmarks import frame_energies
@@ -30,6 +31,16 @@ def test_rows_come_back_digit_for_digit(tmp_path):
     assert back[0] == ROWS[0] and back[1] == ROWS[1] and back[2] == ROWS[2]
     assert back[3].reason == "line two" and back[3].value != back[3].value
     assert sorted(path.name for path in folder.path.iterdir()) == ["results.csv"]
+
+
+def test_a_file_of_before_what_each_reference_changes_is_read(tmp_path):
+    folder = RunFolder(tmp_path)
+    known = dataclasses.replace(ROWS[0], moved=(("simulation-refrozen", -0.1), ("simulation-dt/2", 1e-17)))
+    folder.write_rows([known, ROWS[1]])
+    assert folder.read_rows()[0].moved == known.moved
+    text = pd.read_csv(folder.rows_path, dtype=str, keep_default_na=False)
+    text.drop(columns="moved").to_csv(folder.rows_path, index=False)
+    assert [r.moved for r in folder.read_rows()] == [(), ()]
 
 
 def test_config_comes_back(tmp_path):
@@ -62,7 +73,8 @@ def test_a_row_that_says_nothing_true_is_refused(changes, word):
         ("", "line 1: the columns"),
         ("a,b\n1,2\n", "line 1: the columns"),
         (",".join(COLUMNS) + "\n1,2\n", f"line 2: {len(COLUMNS)} cells"),
-        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,,1,,,,,,,,,false,\n", "line 2: column seed"),
+        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,,,1,,,,,,,,,false,\n", "line 2: column seed"),
+        (",".join(COLUMNS) + "\ns,c,m,0,x,J,1,ok,,,,,[2],,,,,1,,,,,,,,,false,\n", "line 2: column moved"),
     ],
 )
 def test_a_broken_file_is_named_with_its_line(tmp_path, text, word):

@@ -221,6 +221,33 @@ def test_a_difference_within_what_another_reference_would_change():
         assert not within_uncertainty(one, other, factor=3.0)
 
 
+def test_what_another_reference_does_to_both_methods_moves_them_not_apart():
+    twins = ("simulation-refrozen", "simulation-perturbed-1e-4")
+
+    def within(changes: dict[str, tuple[tuple[float, ...], ...]], factor: float = 1.0) -> bool:
+        rows = [
+            replace(
+                row(f"tshirt/{scene}", method, value=value, seed=seed),
+                uncertainty=max(map(abs, moved), default=None), moved=tuple(zip(twins, moved)),
+            )
+            for method, value in (("snug", 1.0), ("pbns", 1.3))
+            for scene, moved in enumerate(changes[method])
+            for seed in range(2)
+        ]  # fmt: skip
+        return within_uncertainty(*pair(run_of(rows).frame, "snug", "pbns", "energy/strain"), factor)
+
+    both = ((0.5, -0.4), (-0.2, 0.3))
+    assert not within({"snug": both, "pbns": both})
+    assert within({"snug": both, "pbns": both}, factor=1.5)  # 1.5 and 1.3, .25 and .15 apart
+    assert within({"snug": both, "pbns": ((0.5, -0.4), (-0.2, -0.35))})  # 0 and .65 apart: .325
+    assert not within({"snug": both, "pbns": ((0.5, -0.4), (-0.2, -0.2))})  # .25
+    assert within({"snug": both, "pbns": ((), ())})  # the simulation beside a network: .4
+    # Nobody knows what each does in one of the scenes: both add up.
+    rows = run_of([row(method=m, value=v) for m, v in (("snug", 1.0), ("pbns", 1.3))]).frame
+    one, other = pair(rows.assign(uncertainty=0.2), "snug", "pbns", "energy/strain")
+    assert within_uncertainty(one, other)
+
+
 def test_one_rule_says_how_two_means_stand():
     one, other = (Mean(value, None, 1, 3, 3) for value in (1.0, 1.2))
 

@@ -9,7 +9,7 @@ import pytest
 from tasks_by_hand import small_scene
 
 from benchmarks.methods import METHODS, find_method
-from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import curvature, dynamics, energy, excess, geometry
 from benchmarks.metrics.hem import HemMotion
 from benchmarks.results import Row, as_right
@@ -47,9 +47,14 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
         newton_1=x + 0.01 * EAST,
     )  # fmt: skip
     found = compared(group.roll_outs[-1], geometry.compare)
-    assert found["distance/rms"] == pytest.approx(Estimate(10.0, 4.0))  # 14 mm from the second twin
+    value, uncertainty, moved = found["distance/rms"]
+    assert (value, uncertainty) == pytest.approx((10.0, 4.0))
+    assert dict(moved) == pytest.approx({TWINS[0]: -1.0, "simulation-perturbed-1e-4": 4.0})
     # A twin is compared with the others, not with itself; the reference with nobody.
-    assert compared(group.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(Estimate(1.0, 4.0))
+    value, uncertainty, moved = compared(group.roll_outs[1], geometry.compare)["distance/rms"]
+    assert (value, uncertainty) == pytest.approx((1.0, 4.0)) and [twin for twin, _ in moved] == [
+        "simulation-perturbed-1e-4"
+    ]
     assert compared(group.roll_outs[0], geometry.compare) == {}
     alone = group_of(scene, simulation=x, newton_1=x + 0.01 * EAST)
     assert compared(alone.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(10.0)
@@ -94,8 +99,11 @@ def test_numbers_of_the_reference_are_as_uncertain_as_right_simulations_differ()
         row(TWINS[0], "cost/frame", 9.0), row(TWINS[0], "gap/energy", 0.3),
         row("simulation-dt/8", "energy/total", 7.0),
     ]  # fmt: skip
-    found = {(r.method, r.metric): r.uncertainty for r in with_uncertainty(rows)}
+    told = with_uncertainty(rows)
+    found = {(r.method, r.metric): r.uncertainty for r in told}
     assert found["simulation", "energy/total"] == pytest.approx(0.03)
+    assert dict(told[0].moved) == pytest.approx({TWINS[0]: 0.01, TWINS[1]: -0.03})
+    assert not any(r.moved for r in told[1:])
     assert found["simulation", "cost/frame"] is None and found["snug", "energy/total"] is None
     assert found["simulation", "gap/energy"] == 0.02
 

@@ -121,7 +121,7 @@ def measured(
 def number(metric: str, value: Any) -> float | Estimate:
     """The value as one, which JSON can keep. Raises TypeError."""
     if isinstance(value, Estimate):
-        return Estimate(float(value.value), float(value.uncertainty))
+        return Estimate(float(value.value), float(value.uncertainty), value.moved)
     if not isinstance(value, numbers.Real):
         raise TypeError(f"{metric} is {value!r:.60}: give a number or an Estimate, or leave it out")
     return float(value)
@@ -130,16 +130,17 @@ def number(metric: str, value: Any) -> float | Estimate:
 def compared(
     roll_out: RollOut, compare: Callable[[RollOut, RollOut], dict[str, float]]
 ) -> dict[str, float | Estimate]:
-    """The numbers against the reference, with the largest change that a simulation as right as it brings."""
+    """The numbers against the reference, and what each simulation as right as it would change of them."""
     if roll_out.reference is None:
         return {}
     values = compare(roll_out, roll_out.reference)
-    others = [compare(roll_out, other) for other in roll_out.group.as_right if other is not roll_out]
-    return {
-        name: Estimate(value, max(moved)) if moved else value
-        for name, value in values.items()
-        for moved in [[abs(other[name] - value) for other in others if name in other]]
-    }
+    twins = [other for other in roll_out.group.as_right if other is not roll_out]
+    others = {other.entry.name: compare(roll_out, other) for other in twins}
+    found: dict[str, float | Estimate] = {}
+    for name, value in values.items():
+        moved = tuple((twin, beside[name] - value) for twin, beside in others.items() if name in beside)
+        found[name] = Estimate(value, max(abs(change) for _, change in moved), moved) if moved else value
+    return found
 
 
 def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
