@@ -94,7 +94,7 @@ class Schedule:
         scene = of_garment(garment, self.plan.motions.worn).scene(motion).at(self.preset)
         return SimulateMotion(
             name=f"{flat(scene.name)}/{flat(entry.name)}", label=_beside(scene.name, entry), scene=scene,
-            entry=entry, units=self.preset.settle_frames + self.preset.frames,
+            entry=entry, units=self.preset.settle_frames + self._frames(motion),
             **self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}.ground_truth")),
         )  # fmt: skip
 
@@ -109,9 +109,14 @@ class Schedule:
             name=f"{flat(clips)}/{flat(entry.name)}-{part}",
             label=_beside(f"{garment}, {sort} clips of {len(motions)} motions, part {part}", entry),
             scene=scene, entry=entry, motions=motions, clips=clips, part=part, swinging=said.swinging,
-            units=len(motions) * self.preset.frames,
+            units=sum(map(self._frames, motions)),
             **of_scene | {"inputs": inputs},
         )  # fmt: skip
+
+    def _frames(self, motion: str) -> int:
+        """Of the motion, as far as progress goes: those of the library have some hundred."""
+        files = self.plan.motions.files
+        return min(self.preset.frames, files[motion].frames if motion in files else 100)
 
     def network(self, network: Network) -> TrainNetwork:
         chosen, (motions, held_out) = network.training, self._learned(network)
@@ -191,7 +196,7 @@ class Schedule:
 
     def quasi_static(self, scene: Scene) -> SimulateQuasiStatic:
         return SimulateQuasiStatic(
-            name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.frames,
+            name=flat(scene.name), label=scene.name, scene=scene, units=self._frames(scene.motion),
             needs=(self.start(scene).id,), **self.inputs.of_scene(scene, f"{TASKS}.ground_truth"),
         )  # fmt: skip
 
