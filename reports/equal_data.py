@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.results import BEFORE_FRAMES
 from reports.data import Run
 from reports.means import mean_of, value_of
-from reports.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
+from reports.plotting import PAGE_WIDTH, Picture, file_name, grid, legend_above, log_axis, new_figure, save
 from reports.styles import Style, family_style, style
 from reports.table import Cell, Column, Table, metric_column, table
 from reports.training import History
@@ -107,11 +107,20 @@ def error_against_frames(folder: Path, run: Run) -> list[Picture]:
 
 
 def held_out_curves(folder: Path, run: Run, histories: Sequence[History]) -> list[Picture]:
-    """The value on held-out motions over the steps of each training that they stop, by the kind of value."""
+    """A figure for each garment: the value on held-out motions over the steps of each training that these
+    stop, a panel for each kind of value.
+    """
     watched = [h for h in histories if h.method in run.methods and np.isfinite(h.column("validation")).any()]
+    pictures: list[Picture] = []
+    for garment in dict.fromkeys(history.garment for history in watched):
+        name = f"held_out_{file_name(garment)}" if pictures else "held_out"
+        own = [history for history in watched if history.garment == garment]
+        pictures.append(_held_out(folder, run, name, garment, own))
+    return pictures
+
+
+def _held_out(folder: Path, run: Run, name: str, garment: str, watched: Sequence[History]) -> Picture:
     panels = list(dict.fromkeys(history.panel for history in watched))
-    if not panels:
-        return []
     looks: dict[str, Style] = {}
     for history in watched:  # in the colour of the same network at equal steps
         own, base = style(run, history.method), run.methods[history.method].base
@@ -128,8 +137,9 @@ def held_out_curves(folder: Path, run: Run, histories: Sequence[History]) -> lis
             log_axis(axes, "y")
         grid(axes)
     legend_above(figure, [looks[method] for method in run.ordered(looks)], lines=True)
-    caption = "Trainings that end when held-out motions get no better: the value on these. A line per seed."
-    return [save(figure, folder, "held_out", caption=caption, kind="equal data")]
+    caption = f"{garment}: trainings that end when held-out motions get no better: the value on these. "
+    caption += "A line per seed."
+    return save(figure, folder, name, caption=caption, kind="equal data")
 
 
 def _first(run: Run, methods: Sequence[str], family: str) -> str:

@@ -17,12 +17,11 @@ from reports.styles import leading, style
 from reports.table import Cell, Column, Table, table
 
 CURVES = "training_curves"
-PHYSICS = "physics loss [J per frame]"
-# By the kind of a network; any other is trained on the energies.
+# By the unit of the loss, of the energies and of simulated vertices: their squares, or two bands of them.
 PANELS = {
-    "supervised": "vertex loss [cm²]",
-    "santesteban2019": "vertex loss [cm²]",
-    "tailornet": "vertex loss of two bands [cm]",
+    "J": "physics loss [J per frame]",
+    "cm²": "vertex loss [cm²]",
+    "cm": "vertex loss of two bands [cm]",
 }
 
 
@@ -56,7 +55,8 @@ def read_history(path: Path, method: str) -> History | None:
     except (OSError, ValueError, SafetensorError) as error:
         raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
     rows = data.get("history") or []
-    return History(method, PANELS.get(data.get("kind", ""), PHYSICS), rows) if len(rows) > 1 else None
+    unit = data.get("unit", "")
+    return History(method, PANELS.get(unit, f"loss [{unit}]"), rows) if len(rows) > 1 else None
 
 
 def read_histories(folder: RunFolder, run: Run, problems: list[str]) -> list[History]:
@@ -103,7 +103,7 @@ def training_curves(folder: Path, run: Run, histories: Sequence[History]) -> lis
 def _curves(folder: Path, run: Run, name: str, what: str, histories: Sequence[History]) -> list[Picture]:
     shown = leading(run, {history.method for history in histories})
     histories = [history for history in histories if history.method in shown]
-    panels = dict.fromkeys((PHYSICS, *PANELS.values()))
+    panels = dict.fromkeys((*PANELS.values(), *(h.panel for h in histories)))
     titles = [title for title in panels if any(h.panel == title for h in histories)]
     if not titles:
         return []

@@ -114,6 +114,7 @@ class TrainedModel:
         metadata = {
             "format": FORMAT,
             "kind": self.kind,
+            "unit": find_kind(self.kind).unit,
             "recipe": self.recipe.as_dict(),
             "inputs": int(self.network.input_mean.shape[0]),
             "vertices": self.vertices,

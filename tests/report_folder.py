@@ -13,6 +13,7 @@ import numpy as np
 from benchmarks.results import FORMAT, Row
 from reference_sim import Trajectory
 from reports.data import Run, run_data
+from snug.trained_model import find_kind
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
 METHODS = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
@@ -146,7 +147,8 @@ def sheet(height: float) -> tuple[np.ndarray, np.ndarray]:
 def write_model(path: Path, kind: str, **last: float) -> None:
     """The header of a safetensors file, with a short history."""
     history = [{"step": s, "seconds": 0.1 * s, "loss": 2.0 / s, **last} for s in (1, 2, 4)]
-    header = json.dumps({"__metadata__": {"snug": json.dumps({"kind": kind, "history": history})}}).encode()
+    said = {"kind": kind, "unit": find_kind(kind).unit, "history": history}
+    header = json.dumps({"__metadata__": {"snug": json.dumps(said)}}).encode()
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(struct.pack("<Q", len(header)) + header)
 

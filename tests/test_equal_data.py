@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -85,3 +86,7 @@ def test_curves_of_every_network_are_kept_and_those_with_held_out_motions_drawn(
     assert {line["validation"] for line in lines[3:]} == {"3"}
     (picture,) = held_out_curves(tmp_path, run, histories)
     assert picture.path.name == "held_out.svg" and held_out_curves(tmp_path, run, histories[:1]) == []
+    both = [*histories, replace(histories[1], garment="tunic")]
+    captions = {p.path.name: p.caption for p in held_out_curves(tmp_path, run, both)}
+    assert [caption.split(":")[0] for caption in captions.values()] == ["tshirt", "tunic"]
+    assert set(captions) == {"held_out.svg", "held_out_tunic.svg"}

@@ -217,7 +217,7 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
 
 def test_histories_come_from_the_models_headers(made, tmp_path):
     history = training.read_history(made.models / "snug-seed0.safetensors", "snug")
-    assert history is not None and history.method == "snug" and history.panel == training.PHYSICS
+    assert history is not None and history.method == "snug" and history.panel == training.PANELS["J"]
     assert history.column("loss").tolist() == [2.0, 1.0, 0.5]
     for kind in ("supervised", "tailornet", "dynamic"):
         write_model(tmp_path / kind, kind)

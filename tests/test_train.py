@@ -20,6 +20,7 @@ from snug.recipes import PAPER, SUPERVISED
 from snug.rollout import roll_out
 from snug.skeleton import JOINT, joint_positions
 from snug.skinning import skin
+from snug.tensor_file import read_tensors
 from snug.trained_model import ModelFileError, TrainedModel
 from snug.trainer import Trainer
 from snug.training import train, untrained_model
@@ -101,6 +102,7 @@ def test_model_survives_its_file(trained, tmp_path):
     assert [p.name for p in path.parent.iterdir()] == ["model.safetensors"]
     assert (loaded.kind, loaded.recipe, loaded.steps) == ("snug", trained.recipe, 150)
     assert loaded.history == trained.history and loaded.megabytes == trained.megabytes
+    assert read_tensors(path)[1]["unit"] == "J"  # of the losses, for whoever draws them
     motion = swaying(12)
     before, after = (roll_out(model, tube_dress(), motion).positions for model in (trained, loaded))
     assert (before == after).all()
