@@ -273,7 +273,5 @@ FAULTS = (
     Fault("lower half only", PATTERN, "lower + sp.tril(lower, -1).T", "lower"),
     # the metric that judges
     Fault("curvature over 2 A", CURVATURE, "np.divide(norm, 4.0 * area", "np.divide(norm, 2.0 * area"),
-    Fault(
-        "barycentric cells at half weight", CURVATURE, "cotangents[:, m]) / 8.0", "cotangents[:, m]) / 6.0"
-    ),
+    Fault("barycentric cells at half weight", CURVATURE, "weighted) / 8.0", "weighted) / 6.0"),
 )

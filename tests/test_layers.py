@@ -21,6 +21,7 @@ ALLOWED = {
         "reports",
         "benchmarks.results",
         "benchmarks.frame_energies",
+        "benchmarks.metrics.curvature",
         "snug.command_line",
         "reference_sim.trajectory",
         "reference_sim.array_file",

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from ..metric import RollOut
 
 Floats = NDArray[np.float64]
+AT_ONCE = 32  # frames
 FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
 METRICS = (
@@ -100,40 +101,39 @@ def boundary_mask(faces: NDArray[np.int64], vertices: int) -> NDArray[np.bool_]:
 
 
 def mean_curvature(positions: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Mean curvature magnitude (V,) [1/m] and mixed Voronoi area (V,) [m^2] of positions (V,3) [m].
+    """Mean curvature magnitude (...,V) [1/m] and mixed Voronoi area (...,V) [m^2] of positions (...,V,3) [m].
 
     Values at boundary vertices are returned as computed; mask them with `boundary_mask`. A vertex of
     zero area gets curvature 0 and, as its area is 0, weighs nothing in any mean.
     """
-    corners = positions[faces]  # (F,3,3)
-    opposite = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)  # edge facing each corner
-    squared = (opposite**2).sum(2)  # (F,3) its squared length
-    doubled = np.linalg.norm(np.cross(opposite[:, 0], opposite[:, 1]), axis=1)  # twice the area
+    vertices = positions.shape[-2]
+    corners = positions.reshape(-1, vertices, 3)[:, faces]  # (T,F,3,3)
+    opposite = np.roll(corners, -1, axis=2) - np.roll(corners, -2, axis=2)  # edge facing each corner
+    squared = (opposite**2).sum(-1)  # (T,F,3) its squared length
+    doubled = np.linalg.norm(np.cross(opposite[:, :, 0], opposite[:, :, 1]), axis=-1)  # twice the area
     tiny = np.finfo(float).tiny
     # cos times the two adjacent lengths, over sin times the same lengths
-    dots = 0.5 * (squared.sum(1)[:, None] - 2.0 * squared)
-    cotangents = dots / np.maximum(doubled, tiny)[:, None]  # (F,3)
+    dots = 0.5 * squared.sum(-1, keepdims=True) - squared
+    cotangents = dots / np.maximum(doubled, tiny)[..., None]  # (T,F,3)
 
-    voronoi = np.empty_like(cotangents)
-    for k in range(3):
-        j, m = (k + 1) % 3, (k + 2) % 3
-        voronoi[:, k] = (squared[:, j] * cotangents[:, j] + squared[:, m] * cotangents[:, m]) / 8.0
+    weighted = squared * cotangents
+    voronoi = (weighted.sum(-1, keepdims=True) - weighted) / 8.0
     obtuse = dots < 0.0
-    share = np.where(obtuse, 0.25, 0.125) * doubled[:, None]
-    areas_of_corners = np.where(obtuse.any(1)[:, None], share, voronoi)
+    share = np.where(obtuse, 0.25, 0.125) * doubled[..., None]
+    areas_of_corners = np.where(obtuse.any(-1, keepdims=True), share, voronoi)
 
-    count = len(positions)
-    area = np.asarray(np.bincount(faces.ravel(), areas_of_corners.ravel(), count), dtype=float)
-    laplacian = np.zeros((count, 3))
-    for k in range(3):
-        j, m = (k + 1) % 3, (k + 2) % 3
-        pull = cotangents[:, k, None] * (corners[:, j] - corners[:, m])
-        for axis in range(3):
-            laplacian[:, axis] += np.bincount(faces[:, j], pull[:, axis], count)
-            laplacian[:, axis] -= np.bincount(faces[:, m], pull[:, axis], count)
-    norm = np.linalg.norm(laplacian, axis=1)
+    count = len(corners) * vertices
+    places = faces + vertices * np.arange(len(corners))[:, None, None]  # (T,F,3)
+    area = np.asarray(np.bincount(places.ravel(), areas_of_corners.ravel(), count), dtype=float)
+    pulls = cotangents[..., None] * opposite
+    after, before = np.roll(places, -1, axis=2).ravel(), np.roll(places, -2, axis=2).ravel()
+    laplacian = np.empty((count, 3))
+    for axis in range(3):
+        pull = pulls[..., axis].ravel()
+        laplacian[:, axis] = np.bincount(after, pull, count) - np.bincount(before, pull, count)
+    norm = np.linalg.norm(laplacian, axis=-1)
     curvature = np.divide(norm, 4.0 * area, out=np.zeros(count), where=area > tiny)
-    return curvature, area
+    return curvature.reshape(positions.shape[:-1]), area.reshape(positions.shape[:-1])
 
 
 @dataclass(frozen=True)
@@ -154,12 +154,9 @@ class CurvatureSeries:
 
 def curvature_series(positions: Floats, faces: NDArray[np.int64]) -> CurvatureSeries:
     """Curvature and areas of every frame of positions (T,V,3) [m]."""
-    boundary = boundary_mask(faces, positions.shape[1])
-    curvature = np.empty(positions.shape[:2])
-    area = np.empty(positions.shape[:2])
-    for frame, x in enumerate(positions):
-        curvature[frame], area[frame] = mean_curvature(x, faces)
-    area[:, boundary] = 0.0
+    blocks = [positions[first : first + AT_ONCE] for first in range(0, max(len(positions), 1), AT_ONCE)]
+    curvature, area = map(np.concatenate, zip(*(mean_curvature(block, faces) for block in blocks)))
+    area[:, boundary_mask(faces, positions.shape[1])] = 0.0
     return CurvatureSeries(curvature, area)
 
 

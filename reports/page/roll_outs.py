@@ -110,7 +110,7 @@ def _cloth(
     pack.numbers("times", cloth.times)
     pack.positions("positions", cloth.positions)
     blocks = [cloth.positions[k : k + BLOCK] for k in range(0, cloth.frames, BLOCK)]
-    pack.values("curvature", np.concatenate([mean_curvature(block, faces) for block in blocks]))
+    pack.values("curvature", mean_curvature(cloth.positions, faces))
     if rest is not None and rest.shape == (len(faces),):
         strain = np.concatenate([area_change(block, faces, rest) for block in blocks])
         pack.values("area", strain, signed=True)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse
 
+from benchmarks.metrics.curvature import curvature_series
+
 if TYPE_CHECKING:
     from reference_sim import Obstacle
 
@@ -14,32 +16,9 @@ MM = 1e3
 
 
 def mean_curvature(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Magnitude of the mean curvature (T,V) [1/m] of positions (T,V,3) [m]; 0 on boundaries.
-
-    Half the cotangent Laplacian over the mixed Voronoi area, Meyer et al. 2003.
-    """
-    frames, count, _ = positions.shape
-    corners = positions[:, faces]  # (T,F,3,3)
-    facing = np.roll(corners, -1, axis=2) - np.roll(corners, -2, axis=2)  # the edge that faces a corner
-    squared = (facing**2).sum(-1)
-    doubled = np.linalg.norm(np.cross(facing[:, :, 0], facing[:, :, 1]), axis=-1)  # twice the area
-    dots = 0.5 * squared.sum(-1, keepdims=True) - squared
-    cotangents = dots / np.maximum(doubled, np.finfo(float).tiny)[..., None]
-    weighted = squared * cotangents
-    mixed = (weighted.sum(-1, keepdims=True) - weighted) / 8.0
-    flat = np.where(dots < 0.0, 0.25, 0.125) * doubled[..., None]
-    areas = np.where((dots < 0.0).any(-1, keepdims=True), flat, mixed)
-    pulls = cotangents[..., None] * facing
-    gather = _gather(faces, count)
-    area = (gather @ areas.reshape(frames, -1).T).T
-    before, after = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
-    flows = _gather(before, count) - _gather(after, count)
-    laplacian = np.stack([(flows @ pulls[..., k].reshape(frames, -1).T).T for k in range(3)], axis=-1)
-    tiny = np.finfo(float).tiny
-    norm = np.linalg.norm(laplacian, axis=-1)
-    found = np.divide(norm, 4.0 * area, out=np.zeros((frames, count)), where=area > tiny)
-    found[:, boundary(faces, count)] = 0.0
-    return found
+    """Magnitude of the mean curvature (T,V) [1/m] of positions (T,V,3) [m]; 0 on boundaries."""
+    found = curvature_series(positions, faces)
+    return np.where(found.area > 0.0, found.curvature, 0.0)
 
 
 def area_change(positions: np.ndarray, faces: np.ndarray, rest_areas: np.ndarray) -> np.ndarray:
@@ -76,16 +55,6 @@ def skin_of(positions: np.ndarray, faces: np.ndarray) -> Obstacle | None:
         return Obstacle(positions, faces)
     except MeshError:
         return None
-
-
-def boundary(faces: np.ndarray, count: int) -> np.ndarray:
-    """(V,) True on vertices of edges with one triangle, and on those of none."""
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    unique, uses = np.unique(edges, axis=0, return_counts=True)
-    found = np.ones(count, dtype=bool)
-    found[faces] = False
-    found[unique[uses == 1]] = True
-    return found
 
 
 def _gather(corners: np.ndarray, count: int) -> scipy.sparse.csr_array:
