@@ -91,7 +91,8 @@ def check_result(step: StressStep, result: Result, kept: Sequence[np.ndarray] = 
     if rise:
         return checked(found.residual, "failed", rise)
     if status != "ok":
-        reason = f"{result.reason} ({result.iterations} iterations){collapse_reason(step.potential, x)}"
+        count = "" if result.status == "max_iterations" else f" ({result.iterations} iterations)"
+        reason = f"{result.reason}{count}{collapse_reason(step.potential, x)}"
         return checked(found.residual, status, reason)
     if found.residual > max(TOLERANCE, found.round_off):
         claim = f"claims convergence at a relative residual of {found.residual:.3g}"
