@@ -94,6 +94,7 @@ class Row:
     pairing_group: str = ""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "moved", tuple(map(tuple, self.moved)))  # JSON gives lists
         label = f"{self.scene} x {self.method} / {self.metric}"
         if self.status not in STATUSES:
             raise ResultsError(f"row {label}: status '{self.status}' is none of {', '.join(STATUSES)}")
