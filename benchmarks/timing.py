@@ -69,27 +69,28 @@ def clocked(
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())
     children = set(multiprocessing.active_children())
-    used, runs, earlier, first = time.process_time(), [], None, True
+    used, runs, earlier, first = 0.0, [], None, True
     while True:
         with _compilations() as compiled:
             _synchronise()
-            clock = time.perf_counter()
+            busy, clock = time.process_time(), time.perf_counter()
             made = run()
             touch(of(made))
             _synchronise()
-            seconds = time.perf_counter() - clock
+            seconds, busy = time.perf_counter() - clock, time.process_time() - busy
         if first and compiled:
-            first, used, earlier = False, time.process_time(), made
+            first, earlier = False, made
             continue
         first = False
         runs.append(seconds)
+        used += busy
         if earlier is not None and _same(of(earlier), of(made)):
             again = "run() gave again what it had given before: each call of run() has to do all of the "
             return made, Reading(tuple(runs), again + "work, and to return an array of its own")
         if sum(runs) >= least or len(runs) == MOST:
             break
         earlier = made  # held beyond the next run, so that what is new lies elsewhere
-    seconds, used = sum(runs), time.process_time() - used
+    seconds = sum(runs)
     if used > CROWDED * seconds + GRAIN:
         crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked: "
         crowd += "leave the number of threads alone: one is set, see OMP_NUM_THREADS"
