@@ -109,9 +109,9 @@ def _cloth(
     pack.indices("faces", faces)
     pack.numbers("times", cloth.times)
     pack.positions("positions", cloth.positions)
-    blocks = [cloth.positions[k : k + BLOCK] for k in range(0, cloth.frames, BLOCK)]
     pack.values("curvature", mean_curvature(cloth.positions, faces))
     if rest is not None and rest.shape == (len(faces),):
+        blocks = [cloth.positions[k : k + BLOCK] for k in range(0, cloth.frames, BLOCK)]
         strain = np.concatenate([area_change(block, faces, rest) for block in blocks])
         pack.values("area", strain, signed=True)
     if reference is not None and _comparable(cloth, reference):
