@@ -202,12 +202,6 @@ class Cloth:
         """(H,) sum of the two rest areas beside the hinge [m^2]."""
         return self.areas[self._edge_table[1][self._inner]].sum(axis=1)
 
-    @cached_property
-    def boundary_vertices(self) -> np.ndarray:
-        """Sorted indices of vertices on a boundary edge."""
-        edges, faces, _ = self._edge_table
-        return np.unique(edges[(faces < 0).any(axis=1)])
-
 
 def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:
     """Refuse shapes, indices and vertices that no cloth can have; raises MeshError naming the element."""

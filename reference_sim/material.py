@@ -125,11 +125,6 @@ class Material:
         return 4 * mu * (lam + mu) / (lam + 2 * mu)
 
     @property
-    def membrane_poisson_ratio(self) -> float:
-        """nu2 = lambda / (lambda + 2 mu) [1]."""
-        return self.lame_lambda / (self.lame_lambda + 2 * self.lame_mu)
-
-    @property
     def areal_density(self) -> float:
         """rho t [kg/m^2]."""
         return self.density * self.thickness

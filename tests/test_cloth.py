@@ -26,7 +26,6 @@ def test_two_triangles_by_hand():
     assert cloth.hinge_areas == pytest.approx([4.0], rel=1e-15)
     assert cloth.vertex_areas == pytest.approx([4 / 3, 4 / 3, 1 / 3, 1.0], rel=1e-15)
     assert cloth.masses == pytest.approx([8 / 3, 8 / 3, 2 / 3, 2.0], rel=1e-15)
-    assert cloth.boundary_vertices.tolist() == [0, 1, 2, 3]
 
 
 def test_an_unstructured_patch_turned_in_space():
@@ -39,8 +38,6 @@ def test_an_unstructured_patch_turned_in_space():
     # Euler: V - E + F = 1 for a disc; each inner edge is one hinge.
     assert cloth.vertex_count - len(cloth.edges) + len(faces) == 1
     assert len(cloth.hinges) == 3 * len(faces) - len(cloth.edges)
-    square = np.isclose(flat[:, 0] % 1, 0) | np.isclose(flat[:, 1] % 1, 0)
-    assert cloth.boundary_vertices.tolist() == np.flatnonzero(square).tolist()
 
 
 def test_the_deformation_gradient_of_rest_is_an_isometry_and_of_a_stretch_is_the_stretch():
@@ -58,10 +55,9 @@ def test_the_deformation_gradient_of_rest_is_an_isometry_and_of_a_stretch_is_the
     assert np.linalg.eigvalsh(stretched) == pytest.approx(np.tile([0.64, 2.25], (len(faces), 1)), rel=1e-12)
 
 
-def test_a_closed_surface_has_no_boundary():
+def test_every_edge_of_a_closed_surface_is_a_hinge():
     x, faces = sphere(2)
     cloth = Cloth(x, faces)
-    assert cloth.boundary_vertices.size == 0
     assert len(cloth.hinges) == len(cloth.edges) == 3 * len(faces) // 2
 
 
