@@ -44,9 +44,11 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     from reports.latex import write_latex
     from reports.page.write import write_page
     from reports.tables import make_tables
-    from reports.training import curves_table, read_histories
+    from reports.training import curves_table, read_histories, trainings
 
-    tables = make_tables(run)
+    problems: list[str] = []
+    histories = read_histories(folder, run, problems)
+    tables = make_tables(run) | {made.name: made for made in trainings(run, histories)}
     # Of other suites, asked for in this folder before. What --axes drew stays.
     made = [path for kind in ("*.csv", "*.tex") for path in folder.tables.glob(kind)]
     for old in [*made, *(p for kind in FIGURES for p in folder.figures.glob(kind))]:
@@ -54,8 +56,6 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     for table in (*tables.values(), dictionary(run)):
         table.write_csv(folder.tables)
     write_latex(run, tables, folder.tables)
-    problems: list[str] = []
-    histories = read_histories(folder, run, problems)
     for table in curves_table(histories):
         table.write_csv(folder.tables)
     pictures = draw(folder, run, histories, problems)

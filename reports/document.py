@@ -63,7 +63,7 @@ def document(
         "Body shapes": drawn("shapes") + printed("shapes"),
         "Validation": drawn("known answers") + _failed(run, tables),
         "Stress": drawn("maps") + _not_converged(run, tables),
-        "Training": drawn("curves", "convergence") + _performance(run, tables),
+        "Training": printed("trainings") + drawn("curves", "convergence") + _performance(run, tables),
         "What did not run to its end": _trouble(run, tables, problems),
     }  # fmt: skip
     return {

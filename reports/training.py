@@ -12,11 +12,13 @@ import numpy as np
 
 from benchmarks.results import RunFolder, model_path
 from reports.data import Run
+from reports.means import Mean
 from reports.plotting import PAGE_WIDTH, Picture, file_name, grid, legend_above, log_axis, new_figure, save
 from reports.styles import leading, style
 from reports.table import Cell, Column, Table, table
 
-CURVES = "training_curves"
+CURVES, ENDS = "training_curves", "trainings"
+LAST, FROM = 10, 0.8  # losses in a mean at the end of a training; the share of its steps it is compared with
 # By the unit of the loss, of the energies and of simulated vertices: their squares, or two bands of them.
 PANELS = {
     "J": "physics loss [J per frame]",
@@ -31,18 +33,43 @@ class ModelHeaderError(ValueError):
 
 @dataclass(frozen=True)
 class History:
-    """How one model's loss fell: its method, the panel of its kind of loss and, for every few steps, step,
-    seconds, loss and terms, and at some the value on held-out motions.
+    """How one model's loss fell: its method, the unit of its loss and, for every few steps, step, seconds,
+    loss and terms, and at some the value on held-out motions. `frames`: that it learned from.
     """
 
     method: str
-    panel: str
+    unit: str
     rows: list[dict[str, float]]
     garment: str = ""
     seed: int = 0
+    frames: int | None = None
+
+    @property
+    def panel(self) -> str:
+        """The title of the panel of its kind of loss."""
+        return PANELS.get(self.unit, f"loss [{self.unit}]")
 
     def column(self, name: str) -> np.ndarray:
         return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
+
+    @property
+    def last_loss(self) -> float:
+        """Mean of the last losses."""
+        return float(self.column("loss")[-LAST:].mean())
+
+    @property
+    def decrease(self) -> float:
+        """By how much they lie below those before four fifths of the steps [%]; nan where few were logged."""
+        steps, losses = self.column("step"), self.column("loss")
+        before = losses[steps <= FROM * steps[-1]][-LAST:]
+        enough = len(before) == LAST and (steps > FROM * steps[-1]).sum() >= LAST
+        return float(100.0 * (1.0 - self.last_loss / before.mean())) if enough else np.nan
+
+    @property
+    def best_step(self) -> float:
+        """The step of the least value on held-out motions; nan where there are none."""
+        values = self.column("validation")
+        return float(self.column("step")[np.nanargmin(values)]) if np.isfinite(values).any() else np.nan
 
 
 def read_history(path: Path, method: str) -> History | None:
@@ -55,8 +82,8 @@ def read_history(path: Path, method: str) -> History | None:
     except (OSError, ValueError, SafetensorError) as error:
         raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
     rows = data.get("history") or []
-    unit = data.get("unit", "")
-    return History(method, PANELS.get(unit, f"loss [{unit}]"), rows) if len(rows) > 1 else None
+    frames = (data.get("summary") or {}).get("training_frames")
+    return History(method, data.get("unit", ""), rows, frames=frames) if len(rows) > 1 else None
 
 
 def read_histories(folder: RunFolder, run: Run, problems: list[str]) -> list[History]:
@@ -75,6 +102,44 @@ def read_histories(folder: RunFolder, run: Run, problems: list[str]) -> list[His
             else:
                 found += [replace(history, garment=str(garment), seed=int(seed))] if history else []
     return found
+
+
+def trainings(run: Run, histories: Sequence[History]) -> list[Table]:
+    """How long each network trained, and how its loss ended; means over seeds."""
+    groups: dict[tuple[str, str], list[History]] = {}
+    for history in histories:
+        groups.setdefault((history.garment, history.method), []).append(history)
+    place = {method: k for k, method in enumerate(run.ordered({method for _, method in groups}))}
+    lines: list[tuple[Cell, ...]] = []
+    for (garment, method), own in sorted(groups.items(), key=lambda item: place[item[0][1]]):
+        ends = [
+            (h.frames, h.rows[-1]["step"], h.best_step, h.rows[-1]["seconds"], h.last_loss, h.decrease)
+            for h in own
+        ]
+        lines.append((garment, method, len(own), *map(_over_seeds, zip(*ends)), own[0].unit))
+    order = list(dict.fromkeys(history.garment for history in histories))
+    lines.sort(key=lambda line: order.index(str(line[0])))
+    columns = (
+        Column("garment", "Garment", text=True), Column("method", "Method", text=True, method=True),
+        Column("seeds", "Seeds"), Column("frames", "Frames", digits=6, trim=True),
+        Column("steps", "Steps", digits=6, trim=True),
+        Column("best", "Best on held-out", digits=6, trim=True), Column("seconds", "Training", "s"),
+        Column("loss", "Loss at its end", mixed=True), Column("decrease", "Fell in last fifth", "%"),
+        Column("unit", "Unit of loss", text=True),
+    )  # fmt: skip
+    caption = (
+        f"How trainings ended. Losses are means of {LAST} logged ones. The fall is from the last {LAST} "
+    )
+    caption += "before four fifths of the steps. Where the rate falls to zero, a loss levels off by itself."
+    return table(ENDS, columns, lines, caption, grouped_by=("garment",))
+
+
+def _over_seeds(values: Sequence[float | None]) -> Mean | None:
+    known = np.array([value for value in values if value is not None and np.isfinite(value)])
+    if not len(known):
+        return None
+    spread = float(known.std(ddof=1)) if len(known) > 1 else None
+    return Mean(float(known.mean()), spread, scenes=1, seeds=len(known), asked=len(values))
 
 
 def curves_table(histories: Sequence[History]) -> list[Table]:

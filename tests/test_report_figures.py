@@ -209,6 +209,27 @@ def test_every_garment_has_its_training_curves(tmp_path):
     assert [picture.caption.partition(":")[0] for picture in pictures] == ["tshirt", "tunic"]
 
 
+def history(seed: int, end: float, count=50, **more):
+    """A loss of 4 that falls to `end` after four fifths of the steps; logged every 20."""
+    losses = [4.0] * (4 * count // 5) + [end] * (count - 4 * count // 5)
+    rows = [{"step": 20 * k, "seconds": 0.5 * k, "loss": loss, **more} for k, loss in enumerate(losses, 1)]
+    return training.History("snug", "J", rows, "tshirt", seed, frames=90)
+
+
+def test_how_trainings_ended_is_a_mean_over_seeds():
+    (made,) = training.trainings(run_of([row()]), [history(0, 3.0), history(1, 2.0)])
+    ((garment, method, seeds, *numbers, unit),) = made.rows
+    frames, steps, best, seconds, loss, decrease = numbers
+    assert (garment, method, seeds, unit) == ("tshirt", "snug", 2, "J") and best is None
+    assert [number.value for number in (frames, steps, seconds, loss)] == [90.0, 1000.0, 25.0, 2.5]
+    # A quarter of 4, and half of it.
+    assert decrease.value == 37.5 and decrease.spread == pytest.approx(12.5 * 2**0.5)
+    assert history(0, 3.0, validation=1.0).best_step == 20
+    assert np.isnan(history(0, 3.0, count=45).decrease)  # nine losses at its end are no ten
+    (made,) = training.trainings(run_of([row()]), [history(0, 3.0, count=9)])
+    assert made.rows[0][-2] is None
+
+
 def point(stiffness: float, dt: float, status="ok"):
     more = {"suite": "extremes", "metric": "map", "unit": "iterations", "status": status}
     value = 3.0 if status == "ok" else None
