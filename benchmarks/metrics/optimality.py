@@ -47,7 +47,10 @@ Floats = NDArray[np.float64]
 SUITES = ("speed",)  # each sampled frame is two minimisations or three
 
 ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
-FINDERS = ("simulator", "from_frame", "frame")
+FINDERS = {
+    "simulator": "by a solve as the simulator does it", "from_frame": "by descending from the frame",
+    "frame": "at the frame itself",
+}  # fmt: skip
 ALIKE = 1e-9  # of the scale: minima this near are one
 PRECISION = 0.1  # standard error of the gap, as a share of it
 LEAST = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
@@ -94,9 +97,9 @@ METRICS = (
     *(
         Metric(
             name=f"gap/found_by_{finder}", unit="frames", title=f"Found by {finder.replace('_', ' ')}",
-            definition="sampled frames whose lowest minimum was found so",
+            definition=f"sampled frames whose lowest minimum was found {how}",
         )
-        for finder in FINDERS
+        for finder, how in FINDERS.items()
     ),
 )  # fmt: skip
 
