@@ -52,6 +52,22 @@ def write(folder: RunFolder, rows: Iterable[Row]) -> None:
         temporary.write_text(text.getvalue(), encoding="utf-8")
 
 
+def join(paths: Iterable[Path], out: Path) -> None:
+    """One file of several, those that are there: every term, and each frame once. Raises ResultsError."""
+    terms, joined = dict[str, None](), dict[tuple[str, ...], dict[str, str]]()
+    for path in filter(Path.is_file, paths):
+        read(path)  # refuses what is none
+        with path.open(newline="", encoding="utf-8") as stream:
+            for line in csv.DictReader(stream):
+                terms |= dict.fromkeys(name for name in line if name not in CELL)
+                joined.setdefault(tuple(line[name] for name in CELL), line)
+    if joined:
+        with replacing(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+            lines = csv.DictWriter(stream, [*CELL, *terms], restval="", lineterminator="\n")
+            lines.writeheader()
+            lines.writerows(joined.values())
+
+
 def _curves(path: Path) -> dict[str, np.ndarray]:
     """Seconds, and energies by term, of a cell; empty where somebody removed its file."""
     from reference_sim.array_file import read_arrays

@@ -18,7 +18,7 @@ from typing import Any
 
 from snug.command_line import Parser, command
 
-from .performance.microbenchmark import SUITE
+from . import frame_energies
 from .results import BEFORE_FRAMES, ResultsError, Row, RunFolder, digest_of_file
 from .runner.cache import read_entry
 
@@ -33,7 +33,6 @@ skipped row. Runs go on in their own folders, not in the merged one.
 exit status: 0 written; 2 the runs differ in what has to be the same, or a file is damaged: one line says
   which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
-LIKE_TIMES = ("cost/spread", "cost/peak")  # of repeats, and of a process
 SAME = ("format", "preset", "preset_values", "split", "body", "garment")  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
 JOINED = (*STRICT, "tasks", "outdated")  # which hold times and remarks
@@ -57,7 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         [Path(run) for run in options.runs], Path(options.out),
         command=shlex.join(["python", "-m", PROGRAM, *words]),
     )  # fmt: skip
-    left_out = [row for row in rows if row.status == "skipped" and of_a_machine(row)]
+    timed = of_machines(RunFolder(Path(options.out)).read_config())
+    left_out = [row for row in rows if row.status == "skipped" and row.metric in timed]
     if left_out:
         print(
             f"{len(left_out)} times of other machines stand in the reasons of skipped rows", file=sys.stderr
@@ -93,17 +93,19 @@ def merge(paths: Sequence[Path], out: Path, *, command: str = "") -> list[Row]:
             raise MergeError(f"{run.folder.path}: is merged already; name the runs that it came of")
     config = _joined(runs, command)
     check_entries([run.folder for run in runs])
-    rows = joined_rows({str(run.folder.path): run.rows for run in runs})
+    rows = joined_rows({str(run.folder.path): run.rows for run in runs}, of_machines(config))
     from reference_sim.whole_file import new_folder
 
     with new_folder(out) as part:
         folder, digests = RunFolder(part), dict[str, str]()
+        frames = folder.frame_energies_path
         for run in runs:
             for name, digest in run.config.get("digests", {}).items():
-                if name not in digests and name != folder.rows_path.name:
+                if name not in digests and name not in (p.name for p in (folder.rows_path, frames)):
                     digests |= copied(name, digest, run.folder.path, part)
         folder.write_rows(rows)
-        digests[folder.rows_path.name] = digest_of_file(folder.rows_path)
+        frame_energies.join([run.folder.frame_energies_path for run in runs], frames)
+        digests |= {path.name: digest_of_file(path) for path in (folder.rows_path, frames) if path.is_file()}
         folder.write_config(config | {"digests": digests})
     return rows
 
@@ -177,13 +179,13 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
                     raise MergeError(f"{told}: run both by the same code; --fresh forgets what is older")
 
 
-def of_a_machine(row: Row) -> bool:
-    """Whether the number is a time, or hangs on the machine as one does."""
-    return row.unit in ("s", "ms") or row.metric in LIKE_TIMES or row.suite == SUITE
+def of_machines(config: Mapping[str, Any]) -> frozenset[str]:
+    """The metrics of a run that are numbers of the machine, as every time."""
+    return frozenset(name for name, said in config["metrics"].items() if said.get("of") == "machine")
 
 
-def joined_rows(runs: Mapping[str, Sequence[Row]]) -> list[Row]:
-    """Each row once; of times those of one machine. Raises MergeError for numbers that differ.
+def joined_rows(runs: Mapping[str, Sequence[Row]], timed: frozenset[str]) -> list[Row]:
+    """Each row once; of metrics `timed` those of one machine. Raises MergeError for numbers that differ.
 
     runs: folder -> its rows, in the order in which machines are preferred.
     """
@@ -194,10 +196,10 @@ def joined_rows(runs: Mapping[str, Sequence[Row]]) -> list[Row]:
             key = (row.suite, row.scene, row.method, row.seed, row.metric)
             there = kept.get(key)
             if there:
-                _compare(there, (row, where))
+                _compare(there, (row, where), of_a_machine=row.metric in timed)
             kind = row.metric if row.metric in BEFORE_FRAMES else ""
-            timed = of_a_machine(row) and row.value is not None
-            if timed and machine.setdefault(kind, row.hardware) != row.hardware:
+            measured = row.metric in timed and row.value is not None
+            if measured and machine.setdefault(kind, row.hardware) != row.hardware:
                 row = _told(row, machine[kind])
             if there is None or _known(row) > _known(there[0]):
                 kept[key] = (row, where)
@@ -215,12 +217,12 @@ def _told(row: Row, hardware: str) -> Row:
     return replace(row, value=None, uncertainty=None, moved=(), status="skipped", reason=reason)
 
 
-def _compare(one: tuple[Row, str], other: tuple[Row, str]) -> None:
+def _compare(one: tuple[Row, str], other: tuple[Row, str], *, of_a_machine: bool) -> None:
     """Raises MergeError for other numbers in one cell; of times, where it ended well on one machine alone."""
     if "skipped" in (one[0].status, other[0].status):
         return
     names = [field.name for field in fields(Row) if field.name not in OF_ONE_RUN]
-    for column in ("status", *(() if of_a_machine(one[0]) else names)):
+    for column in ("status", *(() if of_a_machine else names)):
         if (a := getattr(one[0], column)) != (b := getattr(other[0], column)):
             row = one[0]
             cell = f"{row.scene} x {row.method} seed {row.seed} / {row.metric}"

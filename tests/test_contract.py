@@ -14,14 +14,17 @@ from outside_files import (
     TINY,
     as_before,
 )
-from tasks_by_hand import InProcess
+from tasks_by_hand import InProcess, small_scene
 
 from benchmarks import check
+from benchmarks.contract.findings import Findings
 from benchmarks.contract.methods import CheckMethod
+from benchmarks.contract.scenes import check_derivatives
 from benchmarks.method import Method, MethodEntry
 from benchmarks.results import RunFolder
 from benchmarks.tasks.cell import Cell
 from benchmarks.tasks.task import Context
+from benchmarks.validation.loads import DeadLoad
 from reference_sim import Trajectory
 
 _as_before = pytest.fixture(autouse=True)(as_before)
@@ -220,6 +223,52 @@ def test_the_command_checks_what_files_declare(in_process, tmp_path, capsys):
     out = capsys.readouterr().out
     assert "energy lift: its gradient is not the derivative of its value" in out
     assert "height/highest of simulation is a ndarray: give a float" in out and "2 to mend" in out
+
+
+JUDGED = (
+    METRIC_FILE
+    + """
+def series(roll_out):
+    return {"height/all": roll_out.positions[..., 1]}
+
+def judge(roll_out, values):
+    return SAID
+"""
+)
+
+
+def test_the_command_asks_metrics_for_their_judgement_and_takes_curves_of_vertices(
+    in_process, tmp_path, capsys
+):
+    for name, said in (
+        ("none", "None"),
+        ("lost", "('diverged', 'lost')"),
+        ("word", "'lost'"),
+        ("no", "0 / 0"),
+    ):
+        (tmp_path / f"{name}.py").write_text(JUDGED.replace("SAID", said))
+    assert check.main([str(tmp_path / "none.py"), str(tmp_path / "lost.py")]) == 0
+    assert check.main([str(tmp_path / "word.py"), str(tmp_path / "no.py")]) == 1
+    out = capsys.readouterr().out
+    assert "judge() gives 'lost': None, or a status" in out
+    assert "judge() of simulation raises ZeroDivisionError" in out
+
+
+@pytest.mark.parametrize(("factor", "fine"), [(1.0, True), (0.999, False), (0.67, False), (-1.0, False)])
+def test_a_wrong_gradient_is_found_however_many_vertices_do_not_feel_it(factor, fine):
+    sheet = small_scene("hanging_sheet", cells=40)
+    forces = np.zeros_like(sheet.start)
+    forces[7, 1] = 0.01
+
+    class Pulled(DeadLoad):
+        def value_and_gradient(self, x):
+            value, gradient = super().value_and_gradient(x)
+            return value, factor * gradient
+
+    found = Findings("mine.py")
+    check_derivatives(found, Pulled(sheet.cloth, forces), sheet)
+    assert (not found.wrong) == fine
+    assert fine or "gradient is not the derivative of its value" in found.wrong[0]
 
 
 @pytest.mark.parametrize(

@@ -160,6 +160,11 @@ def test_what_was_interrupted_goes_on(built, tube, here, tmp_path, monkeypatch, 
     assert digests(out) == digests(built)
 
 
+def test_sequences_that_only_leaves_out_stay_missing(tube, here, tmp_path):
+    assert dataset.main([*words(tube, tmp_path / "new"), "--only", "failed"]) == 1  # it is not whole
+    assert [line.status for line in DataSet.read(tmp_path / "new").sequences] == [MISSING] * 3
+
+
 def test_halves_of_two_machines_are_the_whole(built, tube, here, tmp_path, monkeypatch, capsys):
     for name, more in (("one", ["--sequences", "2"]), ("two", ["--from", "1"])):
         monkeypatch.setattr(build_dataset.provenance, "processor_name", lambda name=name: name)

@@ -18,10 +18,13 @@ CONFIG = {
     "garment": "tailored", "seeds": [0], "suites": ["garments"], "started": "2026-01-01T10:00:00+00:00",
     "finished": "2026-01-01T11:00:00+00:00", "hardware": {"processor": "A"}, "command": "run A",
     "motions": {"train tshirt": ["walk"], "frames": {"walk": 20}},
-    "metrics": {"energy/total": {"title": "Total", "unit": "J"}}, "methods": {"snug": {"label": "SNUG"}},
+    "metrics": {"energy/total": {"title": "Total", "unit": "J"},
+        "cost/frame": {"title": "Frame", "unit": "ms", "of": "machine"}},
+    "methods": {"snug": {"label": "SNUG"}},
     "scenes": {"tshirt/kick": {"role": "test"}}, "cases": {}, "test_looks": [{"rows": "1"}],
     "tasks": {"training": {"snug seed 0 (tshirt)": {"seconds": 3.0}}},
 }  # fmt: skip
+TIMED = frozenset(("cost/frame", "cost/spread", "cost/train"))
 
 
 def row(metric: str, value: float | None, unit: str = "J", **fields) -> Row:
@@ -87,6 +90,23 @@ def test_seeds_of_two_machines_are_one_run(folder, tmp_path, capsys):
     assert files == {"a.npy": "a of one", "b.npy": "b of one", "c.npy": "c of two"}
     assert not out.changed(config) and not out.cache.exists()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["both", "one", "two"]
+
+
+def test_energies_of_frames_are_those_of_all_runs(folder, tmp_path):
+    runs = [folder("one", [row("energy/total", 1.0)]), folder("two", [row("energy/total", 2.0, seed=1)])]
+    for seed, (run, terms, values) in enumerate(zip(runs, ("strain", "strain,bending"), ("1", "2,3"))):
+        path = RunFolder(run).frame_energies_path
+        path.write_text(f"scene,method,seed,seconds,{terms}\ntshirt/kick,snug,{seed},0.1,{values}\n")
+        config = RunFolder(run).read_config()
+        config["digests"][path.name] = digest_of_file(path)
+        RunFolder(run).write_config(config)
+    assert command.main([*map(str, runs), "-o", str(tmp_path / "both")]) == 0
+    both = RunFolder(tmp_path / "both")
+    assert both.frame_energies_path.read_text().splitlines() == [
+        "scene,method,seed,seconds,strain,bending", "tshirt/kick,snug,0,0.1,1,", "tshirt/kick,snug,1,0.1,2,3",
+    ]  # fmt: skip
+    assert not both.changed(both.read_config())
+    assert both.read_config()["digests"][both.frame_energies_path.name]
 
 
 def test_nobody_goes_on_in_a_merged_folder_or_merges_it_again(folder, tmp_path, capsys):
@@ -169,31 +189,39 @@ def test_what_cannot_be_merged_is_named(folder, tmp_path, what, capsys):
 def test_numbers_that_differ_are_refused_by_their_cell():
     one, two = row("energy/total", 1.0), row("energy/total", 1.0 + 1e-15)
     with pytest.raises(MergeError, match=r"tshirt/kick x snug seed 0 / energy/total: value 1.0 in a, 1.0000"):
-        joined_rows({"a": [one], "b": [two]})
+        joined_rows({"a": [one], "b": [two]}, TIMED)
     with pytest.raises(MergeError, match="status ok in a, failed in b"):
         failed = row("cost/frame", None, "ms", status="failed", reason="died")
-        joined_rows({"a": [row("cost/frame", 2.0, "ms", hardware="B")], "b": [failed]})
+        joined_rows({"a": [row("cost/frame", 2.0, "ms", hardware="B")], "b": [failed]}, TIMED)
     with pytest.raises(MergeError, match="cost/memory"):
-        joined_rows({"a": [row("cost/memory", 2.0, "MB")], "b": [row("cost/memory", 3.0, "MB")]})
+        joined_rows({"a": [row("cost/memory", 2.0, "MB")], "b": [row("cost/memory", 3.0, "MB")]}, TIMED)
 
 
 def test_what_one_run_knows_more_of_is_kept():
     known = row("energy/total", 1.0, uncertainty=0.1, hardware="B", commit="2")
-    assert joined_rows({"a": [row("energy/total", 1.0)], "b": [known]}) == [known]
-    assert joined_rows({"a": [known], "b": [row("energy/total", 1.0)]}) == [known]
+    assert joined_rows({"a": [row("energy/total", 1.0)], "b": [known]}, TIMED) == [known]
+    assert joined_rows({"a": [known], "b": [row("energy/total", 1.0)]}, TIMED) == [known]
     skipped = row("energy/total", None, status="skipped", reason="a package is missing")
     assert (
-        joined_rows({"a": [skipped], "b": [known]}) == joined_rows({"a": [known], "b": [skipped]}) == [known]
+        joined_rows({"a": [skipped], "b": [known]}, TIMED)
+        == joined_rows({"a": [known], "b": [skipped]}, TIMED)
+        == [known]
     )
 
 
 def test_times_are_of_the_first_machine_that_measured_them():
     a, b = row("cost/frame", 2.0, "ms"), row("cost/frame", 3.0, "ms", hardware="B")
-    assert joined_rows({"a": [a], "b": [b]}) == [a] and joined_rows({"b": [b], "a": [a]}) == [b]
+    assert joined_rows({"a": [a], "b": [b]}, TIMED) == [a] and joined_rows({"b": [b], "a": [a]}, TIMED) == [b]
     spread = row("cost/spread", 7.0, "%", hardware="B")
     skipped = dataclasses.replace(spread, hardware="A", value=None, status="skipped", reason="not asked for")
-    assert joined_rows({"a": [a, skipped], "b": [b, spread]}) == [a, skipped]  # not B's beside A's times
+    # Not B's beside A's times.
+    assert joined_rows({"a": [a, skipped], "b": [b, spread]}, TIMED) == [a, skipped]
     trained = row("cost/train", 9.0, "s", hardware="B with an accelerator")
-    assert joined_rows({"a": [a], "b": [b, trained]}) == [a, trained]
+    assert joined_rows({"a": [a], "b": [b, trained]}, TIMED) == [a, trained]
+    power = [row("mine/power", value, "W", hardware=where) for value, where in ((5.0, "A"), (6.0, "B"))]
+    assert joined_rows({"a": power[:1], "b": power[1:]}, TIMED | {"mine/power"}) == power[:1]
+    sizes = [row("performance/parameters", value, "1") for value in (100.0, 999.0)]
+    with pytest.raises(MergeError, match=r"performance/parameters: value 100.0 in a, 999.0 in b"):
+        joined_rows({"a": sizes[:1], "b": sizes[1:]}, TIMED)
     twin = row("cost/frame", 4.0, "ms", method="pbns")  # the same machine again: its times stand beside
-    assert joined_rows({"a": [a], "c": [twin]}) == [a, twin]
+    assert joined_rows({"a": [a], "c": [twin]}, TIMED) == [a, twin]

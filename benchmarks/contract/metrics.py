@@ -10,6 +10,7 @@ from typing import Any
 
 from ..methods import find_method
 from ..registry import load
+from ..results import STATUSES
 from ..scene import Scene
 from ..tasks.task import Context, Outcome, Task, TaskId
 from .findings import Findings
@@ -66,7 +67,7 @@ class CheckMetrics(Task):
 
         on = f"of {roll_out.entry.name}"
         with found.call(f"measure() {on}", ": leave out of the dictionary what does not apply"):
-            values, again = (module.measure(roll_out) for _ in range(2))
+            values, again = (module.measure(roll_out) if hasattr(module, "measure") else {} for _ in range(2))
         if hasattr(module, "compare") and roll_out.reference is not None:
             with found.call(f"compare() {on}"):
                 compared = module.compare(roll_out, roll_out.reference)
@@ -87,12 +88,20 @@ class CheckMetrics(Task):
         if hasattr(module, "series"):
             with found.call(f"series() {on}"):
                 curves = module.series(roll_out)
-            due = (len(roll_out.positions),)
+            due = roll_out.positions.shape[:2]
             for name, curve in curves.items():
                 found.demand(
-                    np.shape(curve) == due,
-                    f"series() gives {name} {np.shape(curve)}: one number a frame is {due}",
+                    np.shape(curve) in (due[:1], due),
+                    f"series() gives {name} {np.shape(curve)}: one number a frame is {due[:1]}, one a frame "
+                    f"and vertex {due}",
                 )
+        if hasattr(module, "judge"):
+            with found.call(f"judge() {on}"):
+                said = module.judge(roll_out, values)
+            found.demand(
+                said is None or (isinstance(said, tuple) and len(said) == 2 and said[0] in STATUSES),
+                f"judge() gives {said!r}: None, or a status ({', '.join(STATUSES)}) and a reason are due",
+            )
         return set(values)
 
 

@@ -174,7 +174,9 @@ def _lines(
     lines = {line.name: line for line in kept}
     for task in tasks:
         name, outcome = task.scene.motion, outcomes.get(task.id)
-        lines[name] = _line(name, outcome) if outcome else lines.get(name, SimulatedSequence(name))
+        lines[name] = (
+            _line(name, outcome) if outcome and outcome.origin else lines.get(name, SimulatedSequence(name))
+        )
     return tuple(lines.values())
 
 

@@ -55,7 +55,7 @@ METRICS = (
         _clocked("iteration_per_vertex", "us", "Per vertex", "the same over the number of vertices"),
         _clocked("lbfgs_iteration", "ms", "L-BFGS", "time of an iteration of L-BFGS alone"),
         _clocked("lbfgs_slope", "1", "Slope", "its log-log slope over vertices, from 32 x 32 on"),
-        _metric("lbfgs_memory", "kB", "A vertex", "most memory of cloth and L-BFGS together, a vertex"),
+        _clocked("lbfgs_memory", "kB", "A vertex", "most memory of cloth and L-BFGS together, a vertex"),
         table="scaling",
     ),
     *_metrics(

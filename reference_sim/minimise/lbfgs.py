@@ -47,8 +47,8 @@ class LBFGS:
         finish: whether Newton takes over at all. Without it the result can only be "max_iterations",
             "stalled", "timeout" or "diverged": nothing but a look at the curvature can say "converged".
         timeout: seconds, for both together.
-        observe: called with every point (V, 3) [m] that either of them kept, the start included. Nothing is
-            compiled then.
+        observe: called with every point (V, 3) [m] that either of them kept, the start included; of the
+            compiled part with the last.
 
     Raises:
         ValueError: no term of the potential has a scalar stiffness.
@@ -73,7 +73,7 @@ class LBFGS:
         self.observe = observe
         self.max_iterations = min(patience, max_iterations) if finish else max_iterations
         small = potential.cloth.vertex_count <= LARGEST_COMPILED
-        fast = finish and memory > 0 and observe is None and small and has_kernels(potential)
+        fast = finish and memory > 0 and small and has_kernels(potential)
         if switch is None:
             switch = COMPILED_SWITCH if fast else SWITCH
         self.switch = max(switch, tolerance) if finish else tolerance
@@ -96,6 +96,8 @@ class LBFGS:
         if self._newton is not None and self._compiled is not None:
             first = self._in_float32(self._compiled, x0)
             if first is not None:
+                if self.observe is not None:
+                    self.observe(x0.copy())
                 return self._newton.minimise(first.x, after=first)
         run = _Run(self, x0)
         status, reason = run.to_the_end()
