@@ -52,6 +52,13 @@ FAULTS = (
         "return self.density * self.thickness",
         "return self.density",
     ),
+    Fault(
+        "hinges of ten times the stiffness",
+        MATERIAL,
+        "bending_stiffness: float = 3.96e-5",
+        "bending_stiffness: float = 3.96e-4",
+        fast=("constant_bending_stiffness",),
+    ),
     Fault("gravity of 9.8", MATERIAL, "GRAVITY = 9.81", "GRAVITY = 9.8"),
     Fault("membrane modulus of lambda + mu", MATERIAL, "/ (lam + 2 * mu)\n", "/ (lam + mu)\n"),
     Fault("areas doubled", CLOTH, "0.5 * np.abs(np.linalg.det", "1.0 * np.abs(np.linalg.det"),
@@ -71,8 +78,8 @@ FAULTS = (
     Fault(
         "mean instead of sum of hinge areas",
         CLOTH,
-        ".sum(axis=1)\n\n    @cached_property\n    def boundary",
-        ".mean(axis=1)\n\n    @cached_property\n    def boundary",
+        ".sum(axis=1)\n\n\ndef check_mesh",
+        ".mean(axis=1)\n\n\ndef check_mesh",
     ),
     # membrane
     Fault(
@@ -166,6 +173,20 @@ FAULTS = (
         "step.previous + step.dt * step.velocity",
         "step.previous - step.dt * step.velocity",
         fast=("free_fall",),
+    ),
+    Fault(
+        "pins jump in the first sub-step",
+        STEPPER,
+        "handles = (1 - share) * handles + share * pins",
+        "handles = pins",
+        fast=("moving_pins_in_substeps",),
+    ),
+    Fault(
+        "an obstacle moves on as fast in sub-steps",
+        "reference_sim/obstacle.py",
+        "fine._substeps = self._substeps * substeps",
+        "fine._substeps = self._substeps",
+        fast=("friction_belt_in_substeps",),
     ),
     Fault("velocity over the square of dt", STEPPER, "(x - before) / self.dt", "(x - before) / self.dt**2"),
     Fault(

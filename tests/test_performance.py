@@ -31,6 +31,8 @@ from benchmarks.rows import described, rows_of
 from benchmarks.runner import execution
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Outcome
+from reference_sim import simulate
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
 from reports.convergence import convergence_curve
 from reports.data import run_data
 from reports.tables import make_tables
@@ -214,6 +216,17 @@ def test_a_frame_of_the_sheet_has_a_time_that_is_split():
     assert 0 < found["frame"] <= found["frame_worst"] and found["vertices"] == 36
     assert found["converged_frames"] == 100.0 and 0 < found["gradient"] < 1e-6
     assert found["linear_solver"] > 0 and found["outside_linear_solver"] > 0
+
+
+def test_the_sheet_falls_as_a_simulation_does():
+    cloth = sheet.regular_sheet(6)
+    start = cloth.rest_positions + np.random.default_rng(0).normal(0, sheet.NOISE, cloth.rest_positions.shape)
+    start[cloth.pins] = cloth.rest_positions[cloth.pins]
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
+    simulated = simulate(cloth, terms, dt=sheet.DT, frames=4, start=start)
+    results = [result for result, _ in sheet.fall(cloth, 3)]
+    assert [r.iterations for r in results] == simulated.frame_fields["iterations"][1:].tolist()
+    assert np.array_equal(results[-1].positions, simulated.positions[-1])
 
 
 def test_an_iteration_has_a_cost(monkeypatch):

@@ -75,6 +75,7 @@ WITNESSES = {
         "pendulum",
         "rotor",
         "numerical_damping_10",
+        "numerical_damping_20",
         "clamped_stretch_neck",
     ),
     "first vertex feels one neighbour": (
@@ -99,7 +100,9 @@ WITNESSES = {
     "any step will do": ("newton_never_rises",),
     "convergence ignores the gradient": ("unique_step",),
     "lambda of plane strain": ("constant_lame_lambda",),
-    "areal density without the thickness": ("numerical_damping_50",),
+    "hinges of ten times the stiffness": ("constant_bending_stiffness",),
+    "pins jump in the first sub-step": ("moving_pins_in_substeps",),
+    "an obstacle moves on as fast in sub-steps": ("friction_belt_in_substeps",),
     "geometric stiffness with the wrong sign": ("hessian_of_strain",),
     "hinge energy doubled": ("hinges_folded_unscaled",),
     "angle not wrapped": ("hinges_past_half_a_turn",),

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from reference_sim import Cloth, Material, Potential, Result
-from reference_sim.energies import BendHinge, Gravity, Inertia, Step, StretchStVK
-from reference_sim.minimise import Minimiser, make_minimiser
+from reference_sim import Cloth, Material, Result
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim.stepper import State, Stepper
 
 from ..runner.memory import peak_memory
 from .microbenchmark import Settings
 
 FRAMES = 30
+NEWTON = {"method": "newton"}
 LBFGS = {"method": "lbfgs", "finish": False, "max_iterations": 30}  # alone, as many iterations at every size
 SMALLEST = 32  # vertices a side: from there slopes are taken
 DT = 1 / 30
@@ -34,40 +33,32 @@ def regular_sheet(n: int) -> Cloth:
     return Cloth(positions, faces, Material(), pins=[0, n - 1])
 
 
-@dataclass
-class Fall:
-    """Backward Euler from a flat start moved by noise; every step gives its Result and time."""
-
-    cloth: Cloth
-    options: Mapping[str, Any] = field(default_factory=dict)  # of the minimiser
-
-    def __post_init__(self) -> None:
-        cloth = self.cloth
-        self.potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), Inertia(cloth, DT)])
-        self.minimiser: Minimiser = make_minimiser(self.potential, **self.options)
-        self.x = cloth.rest_positions + np.random.default_rng(0).normal(0, NOISE, cloth.rest_positions.shape)
-        self.x[cloth.pins] = cloth.rest_positions[cloth.pins]
-        self.v = np.zeros_like(self.x)
-
-    def step(self) -> tuple[Result, float]:
-        """One frame: its result and seconds."""
+def fall(cloth: Cloth, frames: int, **options: Any) -> list[tuple[Result, float]]:
+    """Its first frames from a flat start moved by noise, as `simulate` steps with options of the minimiser:
+    result and seconds of each. Raises ValueError where it diverges.
+    """
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
+    loop = Stepper(cloth, terms, DT, 1, None, None, False, 0, options)
+    x = cloth.rest_positions + np.random.default_rng(0).normal(0, NOISE, cloth.rest_positions.shape)
+    x[cloth.pins] = cloth.rest_positions[cloth.pins]
+    state, steps = State(x, np.zeros_like(x)), []
+    for frame in range(1, frames + 1):
         clock = time.perf_counter()
-        guess = self.x + DT * self.v
-        self.potential.prepare(Step(self.x, self.v, guess, DT))
-        result = self.minimiser.minimise(guess)
-        seconds = time.perf_counter() - clock
-        self.v, self.x = (result.positions - self.x) / DT, result.positions
-        return result, seconds
+        after, (result,) = loop.advance(frame, state, None)
+        steps.append((result, time.perf_counter() - clock))
+        if after is None:
+            raise ValueError(f"the sheet diverged at frame {frame}: {result.reason}")
+        state = after
+    return steps
 
 
 def frames(settings: Settings, *, side: int) -> dict[str, float]:
     """A frame of side x side vertices and the split of its time, medians over repeats."""
     cloth = regular_sheet(side)
-    Fall(cloth).step()  # compiles
+    fall(cloth, 1)  # compiles
     medians, worst, inside, outside, converged, gradient = [], [], [], [], [], 0.0
     for _ in range(settings.repeats):
-        fall = Fall(cloth)
-        steps = [fall.step() for _ in range(FRAMES)]
+        steps = fall(cloth, FRAMES)
         seconds = [s for _, s in steps]
         linear = sum(r.seconds["factorise"] + r.seconds["solve"] for r, _ in steps)
         medians.append(np.median(seconds))
@@ -97,8 +88,8 @@ def scaling(settings: Settings, *, side: int, frames: int) -> dict[str, float]:
     cloth = regular_sheet(side)
     lbfgs = iteration_seconds(cloth, LBFGS, 1, settings.repeats)
     memory = peak_memory() - base
-    iteration_seconds(regular_sheet(4), {}, 1, 1)
-    newton = iteration_seconds(cloth, {}, frames, settings.repeats)
+    iteration_seconds(regular_sheet(4), NEWTON, 1, 1)
+    newton = iteration_seconds(cloth, NEWTON, frames, settings.repeats)
     found = {
         "vertices": cloth.vertex_count,
         "iteration": 1e3 * newton,
@@ -112,11 +103,10 @@ def scaling(settings: Settings, *, side: int, frames: int) -> dict[str, float]:
     return found
 
 
-def iteration_seconds(cloth: Cloth, options: Mapping[str, Any], frames: int, repeats: int) -> float:
+def iteration_seconds(cloth: Cloth, options: dict[str, Any], frames: int, repeats: int) -> float:
     """Time of an iteration [s] over the first frames of the fall; the median of repeats."""
     costs = []
     for _ in range(repeats):
-        fall = Fall(cloth, options)
-        steps = [fall.step() for _ in range(frames)]
+        steps = fall(cloth, frames, **options)
         costs.append(sum(seconds for _, seconds in steps) / sum(result.iterations for result, _ in steps))
     return float(np.median(costs))

@@ -9,17 +9,13 @@ import numpy as np
 from reference_sim import simulate
 
 from ..metrics.curvature import curvature_series
-from ..scene import Scene
 from ..scenes import hanging_sheet
 from .converged import converged
+from .dynamics import HANGING
 
 CELLS, FRAMES = 10, 45
 FINER = 2  # times as many cells along each side
 SHORTER = 4  # times as many steps
-
-HANGING = Scene(
-    name="hanging_sheet", description="held at two corners", module="benchmarks.scenes.hanging_sheet"
-)
 
 
 def mesh_dependence(quantity: str) -> float:

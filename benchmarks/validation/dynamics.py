@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,28 @@ def free_fall_in_substeps() -> float:
     drop = 9.81 * (scene.dt / steps) ** 2 * n * (n + 1) / 2
     exact = scene.start - drop[:, None, None] * np.array([0.0, 1.0, 0.0])
     return float(np.linalg.norm(trajectory.positions - exact, axis=2).max())
+
+
+def moving_pins_in_substeps() -> float:
+    """Worst distance [m] between four steps a frame and a quarter of the time step, pins moved alike.
+
+    Between frames pins move straight on.
+    """
+    scene, steps, frames = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10), 4, 10
+    places = scene.start[scene.cloth.pins]
+    pulled = np.array([0.01, 0.02, 0.0]) * np.square(np.arange(frames))[:, None, None] / frames
+
+    def between(step: int) -> np.ndarray:
+        frame, part = divmod(step, steps)
+        return places + pulled[frame] + part / steps * (pulled[min(frame + 1, frames - 1)] - pulled[frame])
+
+    def run(**options: Any) -> np.ndarray:
+        trajectory = simulate(scene.cloth, scene.energies, start=scene.start, **options)
+        return converged(trajectory, "the pulled sheet").positions
+
+    coarse = run(dt=scene.dt, frames=frames, substeps=steps, pin_positions=lambda n: places + pulled[n])
+    fine = run(dt=scene.dt / steps, frames=steps * (frames - 1) + 1, pin_positions=between)
+    return float(np.linalg.norm(coarse - fine[::steps], axis=2).max())
 
 
 def stretched_membrane(amplitude: float) -> tuple[Cloth, np.ndarray, np.ndarray, float]:

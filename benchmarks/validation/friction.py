@@ -54,11 +54,12 @@ def slide_path(ratio: float) -> float:
     return float(np.abs((path - path[0]) @ downhill - exact).max())
 
 
-def belt_path() -> float:
+def belt_path(substeps: int = 1) -> float:
     """Worst distance [m] of a patch put at rest on a belt to where (1) has it: u is how fast it lags."""
     along = np.array([BELT * DT, 0.0, 0.0]) * np.arange(16)[:, None, None]
-    path = _patch(LEVEL, along, frames=16)[:, 0]
-    behind = _slip(BELT / SPEED, 0.0, DT * MU * GRAVITY / SPEED, steps=15)
+    path = _patch(LEVEL, along, frames=16, substeps=substeps)[:, 0]
+    dt = DT / substeps
+    behind = _slip(BELT / SPEED, 0.0, dt * MU * GRAVITY / SPEED, steps=15 * substeps, dt=dt)[::substeps]
     return float(np.abs(path - path[0] - (along[:, 0, 0] - behind)).max())
 
 
@@ -73,13 +74,13 @@ def landing_speed() -> float:
     return float((path[-1, 0] - path[-2, 0]) / DT / kept)
 
 
-def _slip(u: float, drive: float, c: float, *, steps: int) -> np.ndarray:
+def _slip(u: float, drive: float, c: float, *, steps: int, dt: float = DT) -> np.ndarray:
     """(steps + 1,) [m] slipped by (1) from u on. Below 1 it is c u'^2 - (1 + 2 c) u' + u + c r = 0."""
     slipped = [0.0]
     for _ in range(steps):
         smooth = (1 + 2 * c - np.sqrt(max((1 + 2 * c) ** 2 - 4 * c * (u + c * drive), 0.0))) / (2 * c)
         u = u + c * (drive - 1) if u + c * (drive - 1) >= 1 else smooth
-        slipped.append(slipped[-1] + u * SPEED * DT)
+        slipped.append(slipped[-1] + u * SPEED * dt)
     return np.array(slipped)
 
 
@@ -91,13 +92,21 @@ def _slope(ratio: float, *, frames: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _patch(
-    turn: np.ndarray, motion: np.ndarray, *, frames: int, velocity: np.ndarray = STILL[0, 0]
+    turn: np.ndarray,
+    motion: np.ndarray,
+    *,
+    frames: int,
+    velocity: np.ndarray = STILL[0, 0],
+    substeps: int = 1,
 ) -> np.ndarray:
     """(T, 3) [m] middle of a patch on a turned plane that moves by motion (T, 1, 3)."""
     points, faces = right_grid(2, 2, 0.1, 0.1)
     flat = in_space(points)[:, [0, 2, 1]]
     cloth = Cloth(flat, faces[:, ::-1], Material())
-    x = slid(cloth, flat, frames=frames, dt=DT, speed=SPEED, turn=turn, motion=motion, velocity=velocity)
+    x = slid(
+        cloth, flat, frames=frames, dt=DT, speed=SPEED, turn=turn, motion=motion, velocity=velocity,
+        substeps=substeps,
+    )  # fmt: skip
     return x.mean(axis=1)
 
 
@@ -113,6 +122,7 @@ def slid(
     pull: np.ndarray = STILL[0, 0],
     velocity: np.ndarray = STILL[0, 0],
     quasi_static: bool = False,
+    substeps: int = 1,
 ) -> np.ndarray:
     """(frames, V, 3) [m] of a cloth laid flat (V, 3) [m] on the plane y = 0, both turned by `turn` (3, 3).
 
@@ -134,6 +144,7 @@ def slid(
         velocity=np.tile(velocity, (len(flat), 1)),
         pin_positions=lambda frame: start[cloth.pins] + frame * pull,
         quasi_static=quasi_static,
+        substeps=substeps,
         tolerance=SOLVED,
     )
     return converged(trajectory, "the slide").positions
