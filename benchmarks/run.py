@@ -50,9 +50,9 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
             return 0
         from .runner.execution import check_roll_outs, execute
 
-        check_roll_outs(plan)
+        assets = check_roll_outs(plan)
         with held(plan.folder):
-            return execute(plan)
+            return execute(plan, assets)
     except (HeldError, DeclarationError, RollOutError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2

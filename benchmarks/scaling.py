@@ -171,9 +171,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     import numpy as np
 
-    workers = [int(text) for text in options.workers.split(",")]
-    if min([options.copies, *workers]) < 1 or min(options.bandwidth, options.handling + 1) <= 0:
+    try:
+        workers = [int(text) for text in options.workers.split(",")]
+    except ValueError:
+        raise ValueError(f"--workers {options.workers}: give whole numbers, as 1,10,100") from None
+    if min([options.copies, *workers]) < 1 or not 0.0 < options.bandwidth < np.inf:
         raise ValueError("--copies, --workers and --bandwidth have to be positive")
+    if not (0.0 <= options.start < np.inf and 0.0 <= options.handling < np.inf):
+        raise ValueError("--start and --handling are seconds: give 0 or more")
     tasks = measured(RunFolder(options.run_dir), options.kinds.split(",") if options.kinds else ())
     many = study(tasks, options.copies, np.random.default_rng(options.seed))
     costs = Costs(options.start, options.handling, options.bandwidth)

@@ -13,9 +13,11 @@ from tasks_by_hand import small_scene
 from benchmarks.methods import find_method
 from benchmarks.methods.stored_roll_out import Stored, entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.roll_outs import files
 from benchmarks.roll_outs.files import read_roll_out
 from benchmarks.roll_outs.mesh_match import same_topology
 from benchmarks.roll_outs.option import RollOutError, RollOutOption, Stated, parse
+from benchmarks.scenes.from_roll_out import declared
 from benchmarks.tasks.metrics import measured
 from benchmarks.validation.meshes import torus
 from reference_sim import Trajectory
@@ -109,6 +111,24 @@ def test_formats_of_less_precision_give_the_rows_of_the_rounded_positions(tmp_pa
     assert read_roll_out(tmp_path / "mine.pc2").dtype == "float32"
     half = read_point_cache(write("pc16", tmp_path))
     assert half.dtype == np.float16 and np.array_equal(half, X.astype(np.float16))
+
+
+@pytest.mark.parametrize("kept", ["obstacle", "obstacle_faces"])
+def test_half_an_obstacle_is_refused(kept, tmp_path):
+    held = {"obstacle": X, "obstacle_faces": FACES}
+    np.savez(tmp_path / "mine.npz", positions=X, faces=FACES, **{kept: held[kept]})
+    gone = next(name for name in held if name != kept)
+    with pytest.raises(RollOutError, match=rf"mine.npz: holds half a body: {gone} is absent"):
+        declared(RollOutOption("mine", str(tmp_path / "mine.npz"), Stated()), "rest.obj")
+
+
+def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
+    path, read = write("npz", tmp_path), []
+    reader = files._READERS[".npz"]
+    monkeypatch.setitem(files._READERS, ".npz", lambda path: read.append(path) or reader(path))
+    assert read_roll_out(path) is read_roll_out(path) and len(read) == 1
+    np.savez(path, positions=2.0 * X, faces=FACES)
+    assert np.array_equal(read_roll_out(path).positions, 2.0 * X) and len(read) == 2
 
 
 def test_hinges_as_printed_are_those_of_the_unscaled_energy():

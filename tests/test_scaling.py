@@ -100,6 +100,9 @@ def test_a_data_set_is_read_too(tmp_path):
         ([], "no finished task of this version"),
         (["--kinds", "dta"], "no task of kind 'dta'"),
         (["--workers", "0"], "posi"),
+        (["--workers", "1,x"], "--workers 1,x: give whole numbers"),
+        (["--handling", "-0.9"], "--start and --handling are seconds"),
+        (["--start", "nan"], "--start and --handling are seconds"),
     ],
 )
 def test_what_cannot_be_simulated_is_one_line(tmp_path, capsys, monkeypatch, options, words):

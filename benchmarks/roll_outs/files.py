@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ import numpy as np
 
 from reference_sim.mesh_io import MESH_SUFFIXES, read_mesh, read_sequence
 
-from .option import RollOutError
+from .option import RollOutError, digest_of
 
 PACKED = 1032  # bytes that deflate packs into one at most
 KEYS = {  # of an npz, and of a pickle
@@ -59,17 +60,22 @@ class StoredRollOut:
 
 def read_roll_out(path: str | Path) -> StoredRollOut:
     """Read a file, a folder or a pattern of files. Raises RollOutError, one line, for whatever is wrong."""
+    return _read(str(path), digest_of(str(path)))
+
+
+@lru_cache(maxsize=1)  # a plan, its checks and a cell ask for the same file one after another
+def _read(path: str, digest: str) -> StoredRollOut:
     suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES and not (Path(path).is_dir() or "*" in str(path)):
+    if suffix not in SUFFIXES and not (Path(path).is_dir() or "*" in path):
         raise RollOutError(
             f"{path}: unknown kind of roll-out: give one of {', '.join(SUFFIXES)}, or a folder"
         )
     reader = _READERS.get(suffix, _meshes)
     try:
-        return _checked(reader(str(path)))
+        return _checked(reader(path))
     except Exception as error:  # a damaged file can fail in nearly every way, and none is this program's own
         why = " ".join(str(error).split())[:300] or type(error).__name__
-        named = why if str(path) in why else f"{path}: {why}"
+        named = why if path in why else f"{path}: {why}"
         raise RollOutError(named) from None
 
 

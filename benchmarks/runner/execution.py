@@ -30,16 +30,18 @@ KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier r
 OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks", "cells", "outdated")
 
 
-def execute(plan: Plan) -> int:
-    """Run the plan. Returns 0 when all ended well, 1 when something failed or there is no report."""
+def execute(plan: Plan, assets: Assets | None = None) -> int:
+    """Run the plan, with its assets where they have been made.
+
+    Returns 0 when all ended well, 1 when something failed or there is no report.
+    """
     tasks = tasks_of(plan)
     log = RunLog(plan)
     runner = Runner(tasks, log.cache)
     try:
-        assets = None
         if plan.garments:
             try:
-                assets = log.open_assets()
+                assets = log.open_assets(assets)
             except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
                 runner.refuse(("start", "data", "clips", "network"), one_line(error))
         runner.run(executor_of(plan, log.folder, assets), log)
@@ -94,17 +96,21 @@ def assets_of(plan: Plan) -> Assets:
     return open_assets(plan.preset, motions, plan.garments, body=plan.body_file, own=own)
 
 
-def check_roll_outs(plan: Plan) -> None:
-    """Compare every stored roll-out with its scene before anything is written. Raises RollOutError."""
+def check_roll_outs(plan: Plan) -> Assets | None:
+    """Compare every stored roll-out with its scene before anything is written; gives the assets that it made.
+
+    Raises RollOutError.
+    """
     stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
     if not stored:
-        return
+        return None
     try:
         assets = assets_of(plan) if plan.garments else None
     except ValueError:
-        return  # the run says so itself, of all dressed scenes
+        return None  # the run says so itself, of all dressed scenes
     for cell in stored:
         cell.entry.make(models=plan.folder, seed=0).prepare(cell.scene.build(assets))
+    return assets
 
 
 def accepted(row: Row) -> bool:
@@ -155,8 +161,8 @@ class RunLog:
             "preset_values": dataclasses.asdict(plan.preset),
             "stages": self.stages,
             # Earlier runs in this folder: their stages are the times of what this one reuses.
-            "earlier": [*before.get("earlier", []), *runs_before],
-            "test_looks": before.get("test_looks", []),
+            "earlier": [*(before.get("earlier") or []), *runs_before],
+            "test_looks": before.get("test_looks") or [],
             # What the rows there mean, until there are others.
             **{name: before[name] for name in OF_ROWS if name in before},
         }
@@ -182,10 +188,10 @@ class RunLog:
             self.stages.append({"name": name, "seconds": round(time.perf_counter() - clock, 3)})
             self.folder.write_config(self.config)
 
-    def open_assets(self) -> Assets:
+    def open_assets(self, made: Assets | None = None) -> Assets:
         """Body, garments and motions of the dressed scenes. Raises ValueError where one cannot be made."""
         with self.stage("body, garments and motions"):
-            assets = assets_of(self.plan)
+            assets = made or assets_of(self.plan)
         self.config["garments"] = {
             garment.name: {
                 "vertices": len(garment.rest_positions),
@@ -240,7 +246,7 @@ class RunLog:
         rows = [row for row in self.rows if row.scene in tests]
         seen = [[row.scene, row.method, row.seed, row.metric, row.value] for row in rows]
         look = {"started": self.config["started"], "commit": self.origin["commit"], "rows": digest(seen)}
-        if seen and look["rows"] not in [earlier["rows"] for earlier in self.config["test_looks"]]:
+        if seen and look["rows"] not in [earlier.get("rows") for earlier in self.config["test_looks"]]:
             self.config["test_looks"] = [*self.config["test_looks"], look]
 
     def make_report(self) -> bool:

@@ -21,8 +21,15 @@ FEWEST = 4  # frames: two are not judged, and a mean is of more than one
 
 
 def declared(option: RollOutOption, rest_mesh: str) -> Scene:
-    """The scene of that roll-out. Raises RollOutError for a file that cannot be read."""
-    stated = option.stated
+    """The scene of that roll-out. Raises RollOutError for a file that cannot be read, or has half a body."""
+    stated, stored = option.stated, read_roll_out(option.path)
+    halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}
+    gone = [name for name, half in halves.items() if half is None]
+    if len(gone) == 1:
+        raise RollOutError(
+            f"{option.path}: holds half a body: {gone[0]} is absent; give obstacle (T,B,3) and "
+            "obstacle_faces (G,3), or neither"
+        )
     return Scene(
         name=f"file/{option.name}",
         description=f"the cloth and the body of {option.name}'s own roll-out",
@@ -31,7 +38,7 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
             "path": option.path, "rest_mesh": rest_mesh, "units": stated.units, "up": stated.up,
             "fps": stated.fps, "digests": (digest_of(option.path), digest_of(rest_mesh)),
         },
-        obstacle=read_roll_out(option.path).obstacle_faces is not None,
+        obstacle=not gone,
     )  # fmt: skip
 
 

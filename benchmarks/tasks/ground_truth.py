@@ -210,4 +210,6 @@ class SimulateQuasiStatic(Task):
             reason = f"ended after {trajectory.frames} of {scene.frames} frames: {trajectory.reason}"
             return Outcome("diverged", reason, failed=True)
         trajectory.save(path)
-        return Outcome(files=(context.folder.relative(path),))
+        left = int((trajectory.frame_fields["converged"] == 0.0).sum())
+        result = {"status": trajectory.status, "frames_not_converged": left}
+        return Outcome(result=result, files=(context.folder.relative(path),))
