@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from benchmarks.request.plan import Motions, Network
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks import ground_truth
 from benchmarks.tasks.cell import Cell
-from benchmarks.tasks.ground_truth import SimulateClips
+from benchmarks.tasks.ground_truth import SimulateClips, SimulateQuasiStatic
 from benchmarks.tasks.training import LONGEST, TrainNetwork
 from reference_sim import Trajectory, simulate
 from reference_sim.array_file import read_arrays
@@ -100,6 +101,20 @@ def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
     )  # fmt: skip
     found = read_arrays(tmp_path / outcome.files[0])[clip.name]
     assert np.array_equal(found, own.positions.astype(np.float32)) and len(found) == FRAMES
+
+
+def test_poses_held_still_say_how_many_of_them_did_not_converge(tmp_path, monkeypatch):
+    import reference_sim
+
+    scene, assets = dressed_scene(MOTION.name), assets_of(tube_dress(), MOTION)
+    task = SimulateQuasiStatic(name="still", label="", inputs={}, modules=(), scene=scene)
+    worn = dataclasses.replace(scene.build(assets), frames=5)
+    assert worn.start.shape  # it has come to rest
+    monkeypatch.setattr(ground_truth, "built", lambda *_: worn)
+    monkeypatch.setattr(reference_sim, "simulate", partial(simulate, max_iterations=1))
+    outcome = task.run(context(tmp_path, assets), {})
+    assert outcome.status == "ok"
+    assert outcome.result == {"status": "max_iterations", "frames_not_converged": 4}
 
 
 def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(tmp_path, quickly):
