@@ -15,7 +15,7 @@ from benchmarks.results import BEFORE_FRAMES
 from reports.data import Run
 from reports.means import mean_of, value_of
 from reports.plotting import PAGE_WIDTH, Picture, file_name, grid, legend_above, log_axis, new_figure, save
-from reports.styles import Style, family_style, style
+from reports.styles import KNOWN, Style, family_style, style
 from reports.table import Cell, Column, Table, metric_column, table
 from reports.training import History
 
@@ -122,18 +122,19 @@ def held_out_curves(folder: Path, run: Run, histories: Sequence[History]) -> lis
 def _held_out(folder: Path, run: Run, name: str, garment: str, watched: Sequence[History]) -> Picture:
     panels = list(dict.fromkeys(history.panel for history in watched))
     looks: dict[str, Style] = {}
-    for history in watched:  # in the colour of the same network at equal steps
-        own, base = style(run, history.method), run.methods[history.method].base
-        looks[history.method] = replace(own, colour=style(run, base).colour) if base in run.methods else own
+    for history in watched:  # in the colour of the network, whatever it learned from
+        own, known = style(run, history.method), KNOWN.get(history.kind)
+        looks[history.method] = replace(own, colour=known.colour) if known else own
     figure = new_figure(PAGE_WIDTH, 2.4)
     for axes, panel in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels):
+        seen: list[float] = []
         for history in (history for history in watched if history.panel == panel):
             value, look = history.column("validation"), looks[history.method]
             there = np.isfinite(value)
+            seen += value[there].tolist()
             axes.plot(history.column("step")[there], value[there], color=look.colour, linestyle=look.line)
         axes.set(xlabel="steps", title=panel)
-        low, high = axes.get_ylim()
-        if high > WIDE * low > 0.0:
+        if max(seen) > WIDE * min(seen) > 0.0:
             log_axis(axes, "y")
         grid(axes)
     legend_above(figure, [looks[method] for method in run.ordered(looks)], lines=True)

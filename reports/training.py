@@ -34,7 +34,8 @@ class ModelHeaderError(ValueError):
 @dataclass(frozen=True)
 class History:
     """How one model's loss fell: its method, the unit of its loss and, for every few steps, step, seconds,
-    loss and terms, and at some the value on held-out motions. `frames`: that it learned from.
+    loss and terms, and at some the value on held-out motions. `kind`: of its network; `frames`: that it
+    learned from.
     """
 
     method: str
@@ -43,6 +44,7 @@ class History:
     garment: str = ""
     seed: int = 0
     frames: int | None = None
+    kind: str = ""
 
     @property
     def panel(self) -> str:
@@ -83,7 +85,8 @@ def read_history(path: Path, method: str) -> History | None:
         raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
     rows = data.get("history") or []
     frames = (data.get("summary") or {}).get("training_frames")
-    return History(method, data.get("unit", ""), rows, frames=frames) if len(rows) > 1 else None
+    kind, unit = data.get("kind", ""), data.get("unit", "")
+    return History(method, unit, rows, frames=frames, kind=kind) if len(rows) > 1 else None
 
 
 def read_histories(folder: RunFolder, run: Run, problems: list[str]) -> list[History]:

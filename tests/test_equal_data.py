@@ -12,7 +12,7 @@ from report_folder import row, run_of, write_model
 from benchmarks.results import RunFolder
 from reports import styles
 from reports.equal_data import equal_data, error_against_frames, held_out_curves, members
-from reports.training import curves_table, read_histories
+from reports.training import History, curves_table, read_histories
 
 COSTS = {"cost/data": 60.0, "cost/setup": 5.0, "cost/train": 100.0, "cost/train_steps": 5300.0}
 
@@ -68,6 +68,21 @@ def test_error_falls_along_a_line_for_each_network_and_not_for_its_variants(tmp_
     assert drawn == [((100.0, 1300.0), (4.25, 1.25), colour) for colour in (blue, orange)]
     one_end = [r for r in block() if r.level != 12.0]
     assert error_against_frames(tmp_path, run_of(one_end)) == []
+
+
+def test_curves_have_the_colours_of_their_networks_though_these_are_not_in_the_run(tmp_path, monkeypatch):
+    kinds = ("snug", "supervised")
+    rows = [
+        row("tshirt/walk", f"{kind}-long-0", "energy/total", 1.0, role="ablation", family=f"{kind}-long",
+            level=0.0, base=f"{kind}-data-0")
+        for kind in kinds
+    ]  # fmt: skip
+    run, steps = run_of(rows), [{"step": s, "validation": 1.0 / s} for s in (1, 2)]
+    histories = [History(f"{kind}-long-0", "J", steps, "tshirt", kind=kind) for kind in kinds]
+    drawn = []
+    monkeypatch.setattr("matplotlib.axes.Axes.plot", lambda axes, x, y, **look: drawn.append(look["color"]))
+    held_out_curves(tmp_path, run, histories)
+    assert drawn == [styles.KNOWN[kind].colour for kind in kinds]
 
 
 def test_curves_of_every_network_are_kept_and_those_with_held_out_motions_drawn(tmp_path):
