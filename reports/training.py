@@ -18,6 +18,7 @@ from reports.styles import leading, style
 from reports.table import Cell, Column, Table, table
 
 CURVES, ENDS = "training_curves", "trainings"
+BEST = "best"  # a column of the latter, where there are held-out motions
 LAST, FROM = 10, 0.8  # losses in a mean at the end of a training; the share of its steps it is compared with
 # By the unit of the loss, of the energies and of simulated vertices: their squares, or two bands of them.
 PANELS = {
@@ -126,7 +127,7 @@ def trainings(run: Run, histories: Sequence[History]) -> list[Table]:
         Column("garment", "Garment", text=True), Column("method", "Method", text=True, method=True),
         Column("seeds", "Seeds"), Column("frames", "Frames", digits=6, trim=True),
         Column("steps", "Steps", digits=6, trim=True),
-        Column("best", "Best on held-out", digits=6, trim=True), Column("seconds", "Training", "s"),
+        Column(BEST, "Best on held-out", digits=6, trim=True), Column("seconds", "Training", "s"),
         Column("loss", "Loss at its end", mixed=True), Column("decrease", "Fell in last fifth", "%"),
         Column("unit", "Unit of loss", text=True),
     )  # fmt: skip
@@ -137,12 +138,14 @@ def trainings(run: Run, histories: Sequence[History]) -> list[Table]:
     return table(ENDS, columns, lines, caption, grouped_by=("garment",))
 
 
-def _over_seeds(values: Sequence[float | None]) -> Mean | None:
-    known = np.array([value for value in values if value is not None and np.isfinite(value)])
-    if not len(known):
-        return None
-    spread = float(known.std(ddof=1)) if len(known) > 1 else None
-    return Mean(float(known.mean()), spread, scenes=1, seeds=len(known), asked=len(values))
+def _over_seeds(values: Sequence[float | None]) -> Mean | float | None:
+    """Their mean and spread; a number that no seed changes as it is."""
+    known = {("", seed): x for seed, x in enumerate(values) if x is not None and np.isfinite(x)}
+    found = np.array(list(known.values()), dtype=float)
+    if len(found) == len(values) and len(set(known.values())) == 1:
+        return float(found[0])
+    spread = float(found.std(ddof=1)) if len(found) > 1 else None
+    return Mean(float(found.mean()), spread, 1, len(found), len(values), cells=known) if known else None
 
 
 def curves_table(histories: Sequence[History]) -> list[Table]:
@@ -179,8 +182,9 @@ def _curves(folder: Path, run: Run, name: str, what: str, histories: Sequence[Hi
     for axes, title in zip(np.atleast_1d(figure.subplots(1, len(titles))), titles):
         for history in histories:
             if history.panel == title:
-                colour = style(run, history.method).colour
-                axes.plot(history.column("seconds"), history.column("loss"), color=colour, linewidth=1.1)
+                look = style(run, history.method)
+                axes.plot(history.column("seconds"), history.column("loss"), color=look.colour,
+                    linestyle=look.line, linewidth=1.1)  # fmt: skip
         axes.set(xlabel="training time [s]", title=title)
         log_axis(axes, "y")
         grid(axes)

@@ -219,11 +219,16 @@ def history(seed: int, end: float, count=50, **more):
 def test_how_trainings_ended_is_a_mean_over_seeds():
     (made,) = training.trainings(run_of([row()]), [history(0, 3.0), history(1, 2.0)])
     ((garment, method, seeds, *numbers, unit),) = made.rows
-    frames, steps, best, seconds, loss, decrease = numbers
-    assert (garment, method, seeds, unit) == ("tshirt", "snug", 2, "J") and best is None
-    assert [number.value for number in (frames, steps, seconds, loss)] == [90.0, 1000.0, 25.0, 2.5]
+    frames, steps, seconds, loss, decrease = numbers
+    assert (garment, method, seeds, unit) == ("tshirt", "snug", 2, "J")
+    assert (frames, steps, seconds, loss.value) == (90.0, 1000.0, 25.0, 2.5)
     # A quarter of 4, and half of it.
     assert decrease.value == 37.5 and decrease.spread == pytest.approx(12.5 * 2**0.5)
+    assert decrease.complete and loss.complete
+    (made,) = training.trainings(run_of([row()]), [history(0, 3.0), history(1, float("nan"))])
+    assert made.rows[0][6].lacking == 1
+    (made,) = training.trainings(run_of([row()]), [history(0, 3.0, validation=1.0)])
+    assert [column.name for column in made.columns][5] == "best" and made.rows[0][5] == 20.0
     assert history(0, 3.0, validation=1.0).best_step == 20
     assert np.isnan(history(0, 3.0, count=45).decrease)  # nine losses at its end are no ten
     (made,) = training.trainings(run_of([row()]), [history(0, 3.0, count=9)])
