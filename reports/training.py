@@ -18,7 +18,6 @@ from reports.styles import leading, style
 from reports.table import Cell, Column, Table, table
 
 CURVES, ENDS = "training_curves", "trainings"
-BEST = "best"  # a column of the latter, where there are held-out motions
 LAST, FROM = 10, 0.8  # losses in a mean at the end of a training; the share of its steps it is compared with
 # By the unit of the loss, of the energies and of simulated vertices: their squares, or two bands of them.
 PANELS = {
@@ -127,15 +126,17 @@ def trainings(run: Run, histories: Sequence[History]) -> list[Table]:
         Column("garment", "Garment", text=True), Column("method", "Method", text=True, method=True),
         Column("seeds", "Seeds"), Column("frames", "Frames", digits=6, trim=True),
         Column("steps", "Steps", digits=6, trim=True),
-        Column(BEST, "Best on held-out", digits=6, trim=True), Column("seconds", "Training", "s"),
+        Column("best", "Best on held-out", digits=6, trim=True), Column("seconds", "Training", "s"),
         Column("loss", "Loss at its end", mixed=True), Column("decrease", "Fell in last fifth", "%"),
         Column("unit", "Unit of loss", text=True),
     )  # fmt: skip
+    filled = [k for k in range(len(columns)) if any(line[k] is not None for line in lines)]
+    lines = [tuple(line[k] for k in filled) for line in lines]
     caption = (
-        f"How trainings ended. Losses are means of {LAST} logged ones. The fall is from the last {LAST} "
+        f"How trainings ended. Losses are means of {LAST} logged ones. The fall is from the last {LAST} before "
+        "four fifths of the steps. Where the rate falls to zero, a loss levels off by itself."
     )
-    caption += "before four fifths of the steps. Where the rate falls to zero, a loss levels off by itself."
-    return table(ENDS, columns, lines, caption, grouped_by=("garment",))
+    return table(ENDS, [columns[k] for k in filled], lines, caption, grouped_by=("garment",))
 
 
 def _over_seeds(values: Sequence[float | None]) -> Mean | float | None:
