@@ -133,7 +133,7 @@ def trainings(run: Run, histories: Sequence[History]) -> list[Table]:
     filled = [k for k in range(len(columns)) if any(line[k] is not None for line in lines)]
     lines = [tuple(line[k] for k in filled) for line in lines]
     caption = (
-        f"How trainings ended. Losses are means of {LAST} logged ones. The fall is from the last {LAST} before "
+        f"How trainings ended. Losses are means of {LAST} logged ones. The fall is from the {LAST} before "
         "four fifths of the steps. Where the rate falls to zero, a loss levels off by itself."
     )
     return table(ENDS, [columns[k] for k in filled], lines, caption, grouped_by=("garment",))
