@@ -57,7 +57,7 @@ def words_of(folder: Path, *methods: str) -> list[str]:
 def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
     words, answers = words_of(tmp_path / "run", "simulation"), []
 
-    def execute(plan):
+    def execute(plan, assets):
         if len(answers) == 0:
             answers.append(None)
             answers.append(run.main(words))
@@ -77,7 +77,7 @@ def test_a_killed_run_holds_its_folder_no_longer(tmp_path, monkeypatch):
         cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE,
     )  # fmt: skip
     assert process.stdout is not None and process.stdout.readline() == b"held\n"
-    monkeypatch.setattr(execution, "execute", lambda plan: 0)
+    monkeypatch.setattr(execution, "execute", lambda plan, assets: 0)
     assert run.main(words_of(tmp_path, "simulation")) == 2
     process.kill()
     process.wait()
