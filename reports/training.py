@@ -35,7 +35,7 @@ class ModelHeaderError(ValueError):
 class History:
     """How one model's loss fell: its method, the unit of its loss and, for every few steps, step, seconds,
     loss and terms, and at some the value on held-out motions. `kind`: of its network; `frames`: that it
-    learned from.
+    learned from; `best_step`: that of the least value on held-out motions, nan where there are none.
     """
 
     method: str
@@ -45,6 +45,7 @@ class History:
     seed: int = 0
     frames: int | None = None
     kind: str = ""
+    best_step: float = np.nan
 
     @property
     def panel(self) -> str:
@@ -67,12 +68,6 @@ class History:
         enough = len(before) == LAST and (steps > FROM * steps[-1]).sum() >= LAST
         return float(100.0 * (1.0 - self.last_loss / before.mean())) if enough else np.nan
 
-    @property
-    def best_step(self) -> float:
-        """The step of the least value on held-out motions; nan where there are none."""
-        values = self.column("validation")
-        return float(self.column("step")[np.nanargmin(values)]) if np.isfinite(values).any() else np.nan
-
 
 def read_history(path: Path, method: str) -> History | None:
     """The history in a model file, None where it has none. Raises ModelHeaderError for a broken file."""
@@ -84,9 +79,11 @@ def read_history(path: Path, method: str) -> History | None:
     except (OSError, ValueError, SafetensorError) as error:
         raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
     rows = data.get("history") or []
-    frames = (data.get("summary") or {}).get("training_frames")
+    summary = data.get("summary") or {}
     kind, unit = data.get("kind", ""), data.get("unit", "")
-    return History(method, unit, rows, frames=frames, kind=kind) if len(rows) > 1 else None
+    best = (summary.get("validation") or {}).get("best_step", np.nan)
+    frames = summary.get("training_frames")
+    return History(method, unit, rows, frames=frames, kind=kind, best_step=best) if len(rows) > 1 else None
 
 
 def read_histories(folder: RunFolder, run: Run, problems: list[str]) -> list[History]:

@@ -145,9 +145,10 @@ def sheet(height: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def write_model(path: Path, kind: str, **last: float) -> None:
-    """The header of a safetensors file, with a short history."""
+    """The header of a safetensors file, with a short history; best at step 3 on held-out motions."""
     history = [{"step": s, "seconds": 0.1 * s, "loss": 2.0 / s, **last} for s in (1, 2, 4)]
     said = {"kind": kind, "unit": find_kind(kind).unit, "history": history}
+    said["summary"] = {"training_frames": 90, "validation": {"best_step": 3}}
     header = json.dumps({"__metadata__": {"snug": json.dumps(said)}}).encode()
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(struct.pack("<Q", len(header)) + header)

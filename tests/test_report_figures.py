@@ -209,11 +209,11 @@ def test_every_garment_has_its_training_curves(tmp_path):
     assert [picture.caption.partition(":")[0] for picture in pictures] == ["tshirt", "tunic"]
 
 
-def history(seed: int, end: float, count=50, **more):
+def history(seed: int, end: float, count=50, best_step=float("nan")):
     """A loss of 4 that falls to `end` after four fifths of the steps; logged every 20."""
     losses = [4.0] * (4 * count // 5) + [end] * (count - 4 * count // 5)
-    rows = [{"step": 20 * k, "seconds": 0.5 * k, "loss": loss, **more} for k, loss in enumerate(losses, 1)]
-    return training.History("snug", "J", rows, "tshirt", seed, frames=90)
+    rows = [{"step": 20 * k, "seconds": 0.5 * k, "loss": loss} for k, loss in enumerate(losses, 1)]
+    return training.History("snug", "J", rows, "tshirt", seed, frames=90, best_step=best_step)
 
 
 def test_how_trainings_ended_is_a_mean_over_seeds():
@@ -227,9 +227,8 @@ def test_how_trainings_ended_is_a_mean_over_seeds():
     assert decrease.complete and loss.complete
     (made,) = training.trainings(run_of([row()]), [history(0, 3.0), history(1, float("nan"))])
     assert made.rows[0][6].lacking == 1
-    (made,) = training.trainings(run_of([row()]), [history(0, 3.0, validation=1.0)])
+    (made,) = training.trainings(run_of([row()]), [history(0, 3.0, best_step=20.0)])
     assert [column.name for column in made.columns][5] == "best" and made.rows[0][5] == 20.0
-    assert history(0, 3.0, validation=1.0).best_step == 20
     assert np.isnan(history(0, 3.0, count=45).decrease)  # nine losses at its end are no ten
     (made,) = training.trainings(run_of([row()]), [history(0, 3.0, count=9)])
     assert "decrease" not in [column.name for column in made.columns]  # too few were logged

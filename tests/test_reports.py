@@ -219,6 +219,7 @@ def test_histories_come_from_the_models_headers(made, tmp_path):
     history = training.read_history(made.models / "snug-seed0.safetensors", "snug")
     assert history is not None and history.method == "snug" and history.panel == training.PANELS["J"]
     assert history.column("loss").tolist() == [2.0, 1.0, 0.5]
+    assert (history.frames, history.best_step) == (90, 3)  # between the steps that were logged
     for kind in ("supervised", "tailornet", "dynamic"):
         write_model(tmp_path / kind, kind)
     taught = [training.read_history(tmp_path / kind, kind) for kind in ("supervised", "tailornet", "dynamic")]
