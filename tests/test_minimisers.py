@@ -142,6 +142,20 @@ def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_else
 
 
 @pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
+def test_hinges_without_stiffness_are_no_hinges(method):
+    positions, faces = square_sheet(4, 0.2)
+    cloth = Cloth(positions, faces, Material(bending_stiffness=0.0), pins=(0, 4))
+    ends = []
+    for bending in ([], [BendHinge(cloth)]):
+        potential = Potential([StretchStVK(cloth), *bending, Gravity(cloth), Inertia(cloth, DT)])
+        potential.prepare(Step(positions, np.zeros_like(positions), positions, DT))
+        found = method(potential, max_iterations=20).minimise(positions)
+        assert found.status == "max_iterations"
+        ends.append(found.positions)
+    np.testing.assert_array_equal(*ends)
+
+
+@pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
 def test_weight_alone_is_one_sweep_to_the_exact_fall(method):
     positions, faces = square_sheet(3, 0.2)
     cloth = Cloth(positions, faces, Material())

@@ -13,12 +13,14 @@ with: its time a frame is that of the whole clip divided by its frames.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from reference_sim import Cloth, Potential, Trajectory
-from reference_sim.energies import ContactPenalty, Gravity, Inertia
+from reference_sim.energies import ContactPenalty, Energy, Gravity, Inertia
 from reference_sim.minimise import make_minimiser
 
 from ..method import Method
@@ -58,13 +60,21 @@ class ClipInertia(Inertia):
 
 
 class DirectOptimisation(Method):
-    """One clip. `sums` holds the minimised sum [J] at the end of each round, with that round's planes."""
+    """One clip. `sums` holds the minimised sum [J] at the end of each round, with that round's planes.
+
+    Raises ValueError for a scene with other terms than the paper's of a garment.
+    """
 
     def prepare(self, scene: BuiltScene) -> None:
         from snug.dressed_body import DressedBody
         from snug.recipe import DEFAULT
 
         assert scene.dressed is not None
+        if _said(scene.energies) != _said(declared_energies(scene.cloth)):
+            names = ", ".join(term.name for term in scene.energies)
+            raise ValueError(
+                f"direct optimisation minimises the paper's terms, scene {scene.name} has: {names}"
+            )
         self.scene, motion = scene, scene.dressed.motion
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         self.start = dressed.skinned(motion, scene.dressed.betas, smoothing=DEFAULT.smoothing)
@@ -74,7 +84,8 @@ class DirectOptimisation(Method):
         apart = 2 * np.ptp(one.rest_positions[:, 0]) * np.arange(frames)[:, None, None] * [1.0, 0.0, 0.0]
         rest = (one.rest_positions + apart).reshape(-1, 3)
         pins = np.asarray(one.pins, dtype=np.int64) + one.vertex_count * np.arange(frames)[:, None]
-        self.cloth = Cloth(rest, faces.reshape(-1, 3), one.material, pins=pins.ravel())
+        flat = None if one.rest_uv is None else np.concatenate([one.rest_uv] * frames)
+        self.cloth = Cloth(rest, faces.reshape(-1, 3), one.material, pins=pins.ravel(), rest_uv=flat)
         self.terms = [
             *declared_energies(self.cloth),
             ClipInertia(self.cloth, scene.dt, frames),
@@ -135,6 +146,10 @@ class DirectOptimisation(Method):
             kinds = _kinds(single)
             whole.points = _by_kind(np.stack([p.points for p in planes]), kinds)
             whole.normals = _by_kind(np.stack([p.normals for p in planes]), kinds)
+
+
+def _said(terms: Sequence[Energy]) -> list[Any]:
+    return [(type(term), term.parameters()) for term in terms]
 
 
 def _kinds(contact: ContactPenalty) -> list[int]:

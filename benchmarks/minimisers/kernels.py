@@ -180,6 +180,8 @@ def sweep_constraints(x, w, membrane, hinges, touching, strain_force, fold_force
         _solve_strain(x, w, e, membrane, strain_force[e], fa, fb, D)
     for e in range(len(hinges[0])):
         hinge, k = hinges[0][e], hinges[1][e]
+        if k == 0.0:  # its compliance is infinite: it pulls at nothing
+            continue
         angle = fold(x, hinge, hinges[2][e], turn)
         total = 1.0 / k
         for c in range(4):
