@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from dressing import AROUND, swaying, tube_dress
 
+from benchmarks.methods import find_method
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metrics import dynamics
 from benchmarks.metrics.hem import (
     AFTER,
     HELD,
@@ -21,6 +27,8 @@ from benchmarks.metrics.hem import (
     spectrum_distance,
     stop_frame,
 )
+from benchmarks.scene import BuiltScene, Dressed
+from reference_sim import Trajectory
 
 DT = 1 / 30
 FRAMES = 120
@@ -199,3 +207,25 @@ def test_a_dresser_without_memory_has_none():
     assert (found["dynamics/gain"], found["dynamics/lag"]) == pytest.approx((1.0, 0.0), abs=1e-9)
     assert found["dynamics/ringing"] == pytest.approx(0.0, abs=1e-9)
     assert found["dynamics/spectrum"] > 0.1
+
+
+@pytest.mark.parametrize("names", [("hem",), ("left_leg", "right_leg")])
+def test_the_hem_of_a_garment_with_legs_is_both_cuffs(names):
+    dressed, motion = tube_dress(), swaying(40)
+    loops = dict(zip(names, np.array_split(np.arange(AROUND), len(names))))
+    garment = replace(dressed.garment, loops=loops)
+    still = dressed.skinned(motion)
+    own = 0.02 * np.sin(2 * np.pi * np.arange(40) / 15)[:, None, None] * still[:1]
+    scene = BuiltScene(
+        name="legs", cloth=garment.cloth(), energies=(), dt=1 / 30, frames=40, settle=lambda: still[0],
+        dressed=Dressed(dressed.body, garment, motion),
+    )  # fmt: skip
+    group = SceneRollOuts(scene)
+    group.quasi_static = still
+    for name, x in (("simulation", still + own), ("fast-lbfgs-10", still + 0.5 * own)):
+        trajectory = Trajectory(positions=x, faces=garment.faces, times=np.arange(40) / 30)
+        group.roll_outs.append(RollOut(group, find_method(name), trajectory))
+    reference, method = group.roll_outs
+    found = dynamics.compare(method, reference)
+    assert found["dynamics/amplitude"] == pytest.approx(0.5)
+    assert dynamics.series(method)["hem/yaw"].shape == (40,)

@@ -74,9 +74,9 @@ def series(roll_out: RollOut) -> dict[str, np.ndarray]:
 
 
 def hem_motion(reference: RollOut) -> HemMotion | None:
-    """What to measure hems of this scene in; None without a body, a hem, or the simulator's static answer."""
+    """What to measure hems of this scene in; None without a body or the simulator's static answer."""
     group, dressed = reference.group, reference.scene.dressed
-    if dressed is None or "hem" not in dressed.garment.loops or group.quasi_static is None:
+    if dressed is None or group.quasi_static is None:
         return None
     from snug.skeleton import rotation_matrices
 
