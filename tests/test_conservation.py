@@ -207,6 +207,10 @@ def test_a_motion_without_a_step_has_no_laws_and_no_pins_are_asked_for(dropped):
     assert measured(dataclasses.replace(scene, frames=2), x[:2]) == {}
     assert measured(scene, x[:5]) == {}  # it did not come to its end
     assert measured(bare, x) == {}  # no body
+    finer = dataclasses.replace(scene, substeps=2)
+    assert measured(finer, x) == {}  # where frames between are not kept
+    with pytest.raises(ValueError, match="2 steps a frame"):
+        law_series(finer, [x])
     pinned = as_if_dressed(built("hanging_sheet"))
     still = np.repeat(pinned.start[None], pinned.frames, axis=0)
     assert measured(pinned, still) == {}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tasks_by_hand import small_scene
@@ -210,6 +212,13 @@ def test_a_hybrid_starts_each_step_from_the_next_frame_with_the_pins_of_the_step
         free = potential.cloth.free
         assert np.array_equal(seen[-1][free], start[free]) and np.array_equal(seen[-1][pins], guess[pins])
         assert np.array_equal(result.positions[pins], guess[pins])
+
+
+def test_a_warm_started_solver_has_no_starts_for_steps_between_frames(tmp_path):
+    scene = small_scene("hanging_sheet")
+    method = WarmStarted("skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1})
+    with pytest.raises(ValueError, match="2 steps a frame"):
+        method.prepare(replace(scene, substeps=2))
 
 
 def test_a_warm_started_solver_has_its_first_guesses_ready_before_the_clock_starts(monkeypatch, tmp_path):

@@ -216,6 +216,8 @@ def test_every_judged_frame_counts_and_those_of_the_warm_up_do_not():
     later = dataclasses.replace(scene, warm_up=7)  # frames 4 to 6 feel the moved one; 7 and 8 do not
     assert optimality(later, x, samples=99).metrics()["gap/energy"].value < 1e-9
     assert all_of.metrics()["gap/energy"].value > 1e-5
+    # A frame of two steps ends at the minimum of neither.
+    assert optimality(dataclasses.replace(scene, substeps=2), x, samples=99).metrics() == {}
 
 
 def test_frames_are_sampled_evenly_and_until_the_mean_is_known(monkeypatch):

@@ -71,6 +71,7 @@ class WarmStarted(Method):
     """A simulation whose steps start at frames from elsewhere and are cut short.
 
     residual: whether the last frame's residual is carried. simulation: what does the steps.
+    Raises ValueError for a scene of several steps a frame: there is a start for its last alone.
     """
 
     guess: str
@@ -81,6 +82,8 @@ class WarmStarted(Method):
     of_guess: Callable[[int], object] = field(init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
+        if scene.substeps > 1:
+            raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
         frames = self._frames(scene)
         carry = self._carry(scene) if self.residual else None
 

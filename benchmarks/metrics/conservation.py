@@ -8,8 +8,8 @@ For the step from x, v to x', v' = (x' - x)/dt the laws are, with every external
     descent             Psi(x') <= Psi(guess), Psi = Phi + |x - x_hat|_M^2 / (2 dt^2)
     residual            grad Psi(x') = 0
 
-v comes from the method's own two frames before, so each is held to its own past. Strain and bending are
-internal: they have no part in the first two laws, which therefore do not depend on the material.
+v comes from the method's own two frames before, so each is held to its own past. Forces of strain and
+bending sum to nothing and turn nothing, so the first two laws do not depend on the material.
 
 Contact planes are those a solver would freeze for this step: found at its first guess from the method's own
 previous frame. All terms of a law stand on these same planes. With each side on its own planes the energy
@@ -43,12 +43,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-INTERNAL = (
-    "strain",
-    "bending",
-    "spring",
-    "area_barrier",
-)  # their forces on a cloth sum to nothing, and turn nothing
 CLAIMED = "the worst frame that claims to have converged"
 RISE = 1e-9  # of the larger side: beyond it, a frame breaks an inequality
 
@@ -94,7 +88,8 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 def _asked(group: SceneRollOuts) -> list[RollOut]:
     scene = group.scene
-    if scene.dressed is None or len(scene.cloth.pins) or scene.frames <= FIRST_FULL_FRAME:
+    of_steps = scene.substeps == 1 and scene.frames > FIRST_FULL_FRAME
+    if scene.dressed is None or len(scene.cloth.pins) or not of_steps:
         return []
     return [r for r in group.roll_outs if r.entry.conserving and len(r.positions) == scene.frames]
 
@@ -141,15 +136,18 @@ class LawSeries:
 
 
 def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSeries]:
-    """Of each trajectory (T,V,3) [m]; T at least 3. For scenes without pins, whose forces nobody knows.
+    """Of each trajectory (T,V,3) [m]; T at least 3. For scenes without pins, whose forces nobody knows,
+    and of one step a frame.
 
     Frames are the outer loop, and within a frame first all guesses, then all planes: the obstacle's search
-    tree of a frame is made once. Raises ValueError for a scene with pins or a trajectory too short.
+    tree of a frame is made once. Raises ValueError for another scene or a trajectory too short.
     """
     from reference_sim import Potential
 
     if len(scene.cloth.pins):
         raise ValueError(f"scene {scene.name}: laws of a cloth with pins need the pins' forces")
+    if scene.substeps > 1:
+        raise ValueError(f"scene {scene.name}: laws of {scene.substeps} steps a frame need all of their ends")
     frames = [len(positions) for positions in trajectories]
     if frames and min(frames) <= FIRST_FULL_FRAME:
         raise ValueError(f"scene {scene.name}: a law needs {FIRST_FULL_FRAME + 1} frames, not {min(frames)}")
@@ -181,7 +179,7 @@ def _one_step(
     for term in potential.energies:
         value, slope = term.value_and_gradient(end)
         psi, gradient = psi + value, gradient + slope
-        if term.name not in (*INTERNAL, "inertia"):
+        if term.name != "inertia":
             force -= slope
     missing = np.einsum("v,vi->i", m, after - v) - dt * force.sum(axis=0)
     # sum m (x'-p) x v' - sum m (x-p) x v = sum m (x'-p) x (v'-v) - dt sum m v x v'

@@ -233,7 +233,8 @@ def optimality(
 
 
 def _judged(scene: BuiltScene, positions: Floats) -> range:
-    return range(scene.warm_up, len(positions))
+    """Frames; none where a frame is not one time step."""
+    return range(scene.warm_up, len(positions) if scene.substeps == 1 else 0)
 
 
 def _potential(scene: BuiltScene) -> Potential:
