@@ -23,7 +23,7 @@ from benchmarks.tasks.task import Context, Task
 from snug.garment_file import GarmentFile
 from snug.motion_library import make_motion
 from snug.recipe import DEFAULT, TERMS
-from snug.recipes import TRAININGS, Training
+from snug.recipes import TRAININGS, Simulated, Training
 
 MOTIONS = Motions(train=("walk",), test=("kick",))
 
@@ -48,7 +48,9 @@ def test_an_energy_that_a_recipe_names_is_part_of_the_training(tmp_path, monkeyp
     assert not any(module.startswith("reference_sim") for module in network(plan).modules)
 
 
-def test_a_networks_cell_is_measured_beside_the_poses_that_it_trained_on_mixed_ones_too(tmp_path):
+def test_a_networks_cell_is_measured_beside_the_poses_that_it_trained_on_mixed_ones_too(
+    tmp_path, monkeypatch
+):
     scene = dressed_scene("kick")
     names = ("simulation", "untrained", "snug", "supervised")
     cells = tuple(Cell(scene, find_method(name), 0, ("garments",)) for name in names)
@@ -63,6 +65,9 @@ def test_a_networks_cell_is_measured_beside_the_poses_that_it_trained_on_mixed_o
     mixed = _training_poses(trainings["snug"], context)
     assert np.array_equal(given, walk.poses) and np.array_equal(mixed[:30], walk.poses)
     assert len(mixed) - 30 == pytest.approx(DEFAULT.mixed * 30, abs=30)
+    # What simulated vertices teach draws no mixed clips, whatever its recipe says.
+    monkeypatch.setitem(TRAININGS, "mine", Training("supervised", DEFAULT, Simulated()))
+    assert np.array_equal(_training_poses(network(schedule.plan, "mine"), context), walk.poses)
     narrow = dataclasses.replace(cells[2], scene=dataclasses.replace(scene, metrics=("energy",)))
     assert schedule.metrics(narrow).training is None
 

@@ -156,6 +156,7 @@ def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> N
 def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | None:
     """(N,24,3) [rad], mixed ones included; None of a network that was not trained. Kept within a batch."""
     from snug.motion_augmentation import mixed_for, shared_clips
+    from snug.trained_model import find_kind
 
     assets, how = context.assets, training.chosen
     if how is None or assets is None:
@@ -163,7 +164,8 @@ def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | No
     if training.id not in context.memo:
         given = assets.named(training.motions)
         vertices = len(assets.garments[training.garment].rest_positions)
-        mixed = mixed_for(given, how.recipe, vertices=vertices, seed=training.seed)
+        drawn = find_kind(how.kind).physics
+        mixed = mixed_for(given, how.recipe, vertices=vertices, seed=training.seed) if drawn else []
         if said := how.simulated:
             mixed += shared_clips(given, said.mixed, vertices=vertices, swinging=said.swinging)
         context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
