@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from reference_sim.material import Material
+from snug.formats.smpl_body import SHAPES
 from snug.motion_inputs import HISTORY, motion_history
 from snug.recipe import Recipe
 from snug.skeleton import rotation_matrices
@@ -100,7 +101,8 @@ class DressedBody:
         still: bool = False,
     ) -> Tensor:
         """Inputs of a network, (T, D) float32: the pose; for `motion` the root velocity and the shape too,
-        for `pose_shape` the shape, for `history` how root and joints move and moved (snug.motion_inputs).
+        for `pose_shape` the shape, with zeros behind it up to SHAPES numbers, for `history` how root and
+        joints move and moved (snug.motion_inputs).
 
         still: as if each pose were held, whatever came before it.
         """
@@ -115,6 +117,8 @@ class DressedBody:
             parts.append(motion_history(motion) * (not still))
         if kind in ("motion", "pose_shape"):
             shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
+            if kind == "pose_shape":
+                shape = np.pad(shape, (0, SHAPES - len(shape)))
             parts.append(np.broadcast_to(shape, (len(motion.poses), len(shape))))
         return torch.from_numpy(np.concatenate(parts, axis=1).astype(np.float32))
 

@@ -64,7 +64,7 @@ class TrainingSet:
             )
         self.dt = 1.0 / rates.pop()
         self.dressed, self.recipe, self.device = dressed, recipe, device
-        self._ends_in_shape = features in ("motion", "pose_shape")
+        self._ends_in_shape = features == "motion"
         self.names = [motion.name for motion in motions]
         self.first = np.cumsum([0, *(len(motion.poses) for motion in motions)])
         self.shapes = shapes

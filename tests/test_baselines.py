@@ -12,6 +12,7 @@ from dressing import swaying, tube_dress
 from reference_sim.energies.energy import Energy
 from snug.baselines.springs import SquaredContact, spring_terms
 from snug.baselines.tailornet import DROPOUT, FrequencyMixture, smoothed
+from snug.dressed_body import DressedBody
 from snug.loss import PhysicsLoss
 from snug.recipe import DEFAULT
 from snug.recipes import ABLATIONS, TRAININGS
@@ -80,6 +81,18 @@ def test_the_fit_reads_the_shape_alone():
     with torch.no_grad():
         still, posed, shaped = network(features)[0]
     assert torch.equal(posed, still) and not torch.equal(shaped, still)
+
+
+@pytest.mark.parametrize("shapes", [0, 3])
+def test_a_body_of_fewer_shapes_has_zeros_for_the_rest(shapes):
+    """Else what is read as its shape is the end of the pose."""
+    dressed, motion = tube_dress(), swaying(5)
+    few = replace(dressed.body, shape_directions=dressed.body.shape_directions[..., :shapes],
+                  joint_directions=dressed.body.joint_directions[..., :shapes])  # fmt: skip
+    betas = np.arange(1.0, 1 + shapes)
+    features = DressedBody(few, dressed.garment).features(motion, DEFAULT, betas, kind="pose_shape")
+    whole = dressed.features(motion, DEFAULT, np.append(betas, np.zeros(10 - shapes)), kind="pose_shape")
+    assert torch.equal(features, whole) and features.shape == (5, 151)
 
 
 def test_pivots_share_by_their_distance_and_each_is_itself_at_home():

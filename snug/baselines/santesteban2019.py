@@ -18,12 +18,13 @@ import torch
 from torch import Tensor, nn
 
 from snug.fast_network import run_gru, run_linear
+from snug.formats.smpl_body import SHAPES
 from snug.regressor import Regressor
 
 if TYPE_CHECKING:
     from snug.frame_plan import FramePlan
 
-SHAPES, FIT, HIDDEN = 10, 20, 1500
+FIT, HIDDEN = 20, 1500
 
 
 class FitAndWrinkles(nn.Module):

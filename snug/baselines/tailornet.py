@@ -22,6 +22,7 @@ import torch
 from torch import Tensor, nn
 
 from snug.baselines.supervised import CM2_PER_M2, VertexTargets
+from snug.formats.smpl_body import SHAPES
 from snug.regressor import Regressor
 from snug.skinning import unposed
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from snug.frame_plan import FramePlan
     from snug.training_set import Batch
 
-SHAPES, WIDTH, DROPOUT = 10, 1024, 0.2
+WIDTH, DROPOUT = 1024, 0.2
 SIGMA = 1.0  # of the kernel, in units of the shape numbers
 SMOOTHING, SWEEPS = (
     0.15,

@@ -29,7 +29,7 @@ from snug.remeshing import boundary_loops
 from snug.skeleton import JOINT, JOINT_NAMES, PARENTS, BodyError
 from snug.t_pose import arm_turns, arms_below_horizontal, turned_rest
 
-SHAPES = 10  # coefficients kept when a file has more
+SHAPES = 10  # coefficients kept when a file has more, and read by networks of pose and shape
 JOINTS = len(JOINT_NAMES)
 BODY_JOINTS = JOINT["left_hand"]  # these come first in SMPL, SMPL-H and SMPL-X alike
 FOLDED = {20: JOINT["left_hand"], 21: JOINT["right_hand"], 15: 15}  # what hangs on wrists and head
