@@ -14,6 +14,7 @@ import pytest
 
 from benchmarks import run
 from benchmarks.methods import find_method
+from benchmarks.methods.program import program
 from benchmarks.request.plan import Plan
 from benchmarks.request.presets import find_preset
 from benchmarks.results import Row, RunFolder
@@ -167,6 +168,34 @@ def test_a_cell_that_hangs_is_ended_with_all_that_it_has_started(tmp_path):
     outcome = outcome_of(plan)
     assert outcome.status == "timeout" and "4 s" in outcome.reason
     assert of_session(os.getsid(0), "time.sleep(60)") == []
+
+
+LEAVING = """
+import subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+open(sys.argv[3], "w").write(str(child.pid))
+time.sleep(60)
+"""
+LOOKING = """
+import pathlib, sys
+stat = pathlib.Path("/proc", open(sys.argv[3]).read(), "stat")
+sys.exit("it runs on" if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] != "Z" else "gone")
+"""
+
+
+def test_what_a_program_has_started_ends_with_it_before_the_next_cell(tmp_path):
+    cells = []
+    for name, text, seconds in (("leaving", LEAVING, 3.0), ("looking", LOOKING, 60.0)):
+        script = tmp_path / f"{name}.py"
+        script.write_text(text)
+        command = f"{sys.executable} -I {script} {{scene}} {{out}} {tmp_path / 'pid'}"
+        entry = program(name, command, seconds=seconds)
+        cells.append(Cell(SCENES["free_fall"].at(TINY), entry, 0, ("garments",)))
+    runner = finish(
+        plan_of(tmp_path / "run", cells=tuple(cells), suites=("garments",)), "cells that are not timed"
+    )
+    first, second = (runner.outcomes["cell", cell.name] for cell in cells)
+    assert first.status == "timeout" and second.reason.endswith("gone")
 
 
 def of_session(session: int, word: str = "") -> list[int]:

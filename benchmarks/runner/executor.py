@@ -175,6 +175,8 @@ class TaskProcess:
     def do(self, task: Task, needed: Needed) -> Outcome:
         """The task's outcome; what it leaves in the memo is there for the next."""
         outcome = self._warm(task) or _called(self.process, _perform, task, needed, seconds=task.deadline)
+        if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
+            self.process.close()
         if not self.process.alive:
             self._renew()
         return outcome
