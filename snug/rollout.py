@@ -59,17 +59,19 @@ def ready_to_roll_out(
     *,
     kept: np.ndarray | None = None,
     before: Any = None,
+    then: Callable[[np.ndarray, int], np.ndarray] | None = None,
 ) -> Callable[[], Trajectory]:
     """What gives the trajectory of `roll_out` whenever it is called: all that comes before is done here.
 
     kept: the frames that the trajectory holds, or None for all; every one is computed. before: as in
-    `predictions`. Raises RollOutError.
+    `predictions`. then: what is done with each frame, (V, 3) [m], and its number. Raises RollOutError.
     """
     frames = predictions(model, dressed, motion, betas, before=before)
     held = np.arange(motion.frames) if kept is None else kept
 
     def run() -> Trajectory:
-        positions, seconds = collected(frames(), held)
+        given = frames() if then is None else (then(x, frame) for frame, x in enumerate(frames()))
+        positions, seconds = collected(given, held)
         return _trajectory(model, dressed, motion, positions, held, seconds)
 
     return run

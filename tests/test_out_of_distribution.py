@@ -26,6 +26,7 @@ from benchmarks.tasks.metrics import measured
 from benchmarks.tasks.task import Context, Outcome
 from reference_sim import Trajectory
 from snug.body import Body
+from snug.clean_up import CleanUp
 from snug.dressed_body import DressedBody
 from snug.garment_kinds import find_template
 from snug.motion_library import make_motion
@@ -175,6 +176,11 @@ def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
             assert np.array_equal(x, by_hand)
             still = roll_out(model, dressed, scene.dressed.motion, betas, quasi_static=True)
             assert np.array_equal(made.quasi_static().positions, still.positions)
+        if method == "snug+cleanup":
+            clean = CleanUp(dressed.garment.rest_positions, dressed.body.shaped(), dressed.body.faces,
+                            scene.obstacle.positions)  # fmt: skip
+            assert np.array_equal(x, [clean(frame, number) for number, frame in enumerate(by_hand)])
+            assert not np.array_equal(x, by_hand)
         depth = scene.obstacle.signed_distance(x[0], 0)
         assert np.median(depth) > -0.01, method  # [m]: a shirt of the mean body would be inside this one
     assert scene.start == pytest.approx(dressed.skinned(scene.dressed.motion, betas)[0], abs=0.05)

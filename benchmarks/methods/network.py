@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +19,12 @@ from ..scene import BuiltScene
 class Network(Method):
     """A model read from its file. Features are made and the network is warmed up before run().
 
-    precision: that of its matrices, one of snug.frame_plan.PRECISIONS.
+    precision: that of its matrices, one of snug.frame_plan.PRECISIONS. then: what is done with each frame.
     """
 
     path: Path
     precision: str = "float32"
+    then: Callable[[np.ndarray, int], np.ndarray] | None = field(default=None, init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
         from snug.dressed_body import DressedBody
@@ -35,8 +36,9 @@ class Network(Method):
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         self.frames = ready_to_roll_out(
-            self.model, self.dressed, self.motion, self.betas, kept=scene.kept, before=scene.dressed.before
-        )
+            self.model, self.dressed, self.motion, self.betas, kept=scene.kept,
+            before=scene.dressed.before, then=self.then,
+        )  # fmt: skip
 
     def run(self) -> Trajectory:
         return self.frames()
