@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..metric import Metric
-from .energy import FIRST_FULL_FRAME
+from .energy import FIRST_FULL_FRAME, energies
 
 if TYPE_CHECKING:
-    from reference_sim import Cloth
-
     from ..metric import RollOut
 
 MM = 1e3
+OF_CLOTH = ("strain", "bending", "inertia")
 
 METRICS = (
     Metric(
@@ -43,21 +42,10 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     early, late = scene.repeated
     kept = np.arange(len(x)) if scene.kept is None else scene.kept
     origins = scene.dressed.motion.translations[kept]
+    cloth = np.sum([series for term, series in energies(roll_out).items() if term in OF_CLOTH], axis=0)
     moved = (x[late] - x[early]) - (origins[late] - origins[early])[:, None]
     return {
-        "roll_out/first": cloth_energy(x[early], scene.cloth, scene.dt),
-        "roll_out/last": cloth_energy(x[late], scene.cloth, scene.dt),
+        "roll_out/first": float(cloth[early][FIRST_FULL_FRAME:].mean()),
+        "roll_out/last": float(cloth[late][FIRST_FULL_FRAME:].mean()),
         "roll_out/drift": MM * float(np.sqrt((moved[FIRST_FULL_FRAME:] ** 2).sum(-1).mean())),
     }
-
-
-def cloth_energy(positions: np.ndarray, cloth: Cloth, dt: float) -> float:
-    """Mean strain, bending and inertia of frames (T,V,3) [m] from the third on [J per frame]."""
-    from reference_sim.energies import BendHinge, Inertia, StretchStVK
-
-    static, inertia = (StretchStVK(cloth), BendHinge(cloth)), Inertia(cloth, dt)
-    total = 0.0
-    for before, previous, x in zip(positions, positions[1:], positions[FIRST_FULL_FRAME:]):
-        total += inertia.value_and_gradient(x, 2 * previous - before)[0]
-        total += sum(term.value_and_gradient(np.ascontiguousarray(x))[0] for term in static)
-    return total / (len(positions) - FIRST_FULL_FRAME)
