@@ -170,12 +170,11 @@ SUITES = (
         description="error against run time: truncated solvers beside networks",
         scenes=_clips,
         methods=_solvers,
-        # Learned ones as in suite garments.
+        # Learned ones, and solvers that start from `snug-dynamic`, as in suite garments.
         more_methods=(
-            "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4", "gradient-descent-40", "vbd-5",
-            "vbd-80", "xpbd-10", "xpbd-160", "skinning+lbfgs-1", "skinning+lbfgs-2", "skinning+lbfgs-8",
-            "skinning+newton-1", "skinning+newton-2", "skinning+newton-4", "skinning+newton-8",
-            "snug+newton-1", "snug+newton-4", "snug+newton-8", "snug+lbfgs-1", "snug+lbfgs-4", "snug+lbfgs-8",
+            "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4",
+            *(entry.name for entry in METHODS if entry.role in ("solver", "warm-started")
+              and entry.base != "snug-dynamic"),
         ),
     ),
     Suite(
