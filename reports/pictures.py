@@ -123,7 +123,7 @@ def sheet(
     wide, high = tile
     lines = max((head.count("\n") + 1 for head in heads), default=0)
     under = NAME * max((words.count("\n") + 1 for row in below for words in row), default=0) * 0.75
-    top, left = NAME * 0.75 * lines, SIDE if beside else 0.0
+    top, left = NAME * 0.75 * lines, _side(beside)
     columns = max(len(row) for row in rows)
     width = left + wide * columns + (BAR if bar else 0.0)
     height = top + len(rows) * (high + under)
@@ -132,7 +132,7 @@ def sheet(
     for line, row in enumerate(rows):
         floor = height - top - (line + 1) * (high + under) + under
         if beside:
-            figure.text(0.5 * SIDE / width, (floor + high / 2) / height, beside[line], rotation=90,
+            figure.text(0.5 * left / width, (floor + high / 2) / height, beside[line], rotation=90,
                 ha="center", va="center", fontsize=8)  # fmt: skip
         for place, image in enumerate(row):
             start = left + place * wide
@@ -149,6 +149,11 @@ def sheet(
     if bar:
         _bar(figure, bar, (width - BAR + 0.12) / width, height)
     return figure
+
+
+def _side(beside: Sequence[str]) -> float:
+    """Inches that these words take, each read upwards."""
+    return SIDE * max((words.count("\n") + 1 for words in beside), default=0)
 
 
 def _bar(figure: Figure, scale: Scale, left: float, height: float) -> None:
@@ -238,14 +243,13 @@ def strip(folder: Path, run: Run, filmed: Filmed, methods: Sequence[str], spare:
     """Frames of a motion, evenly spread, a row for each method; spare: to fill a page."""
     frames = min(filmed.series[method].frames for method in methods)
     chosen = np.unique(np.linspace(frames // 5, frames - 1, STRIP).astype(int))
-    wide = (PAGE_WIDTH - SIDE) / STRIP
+    beside = [wrapped(run.label(method), 14) for method in methods]
+    wide = (PAGE_WIDTH - _side(beside)) / STRIP
     tile = (wide, 1.05 * wide)
     seen = [shots(filmed, methods, int(frame), FRONT, tile) for frame in chosen]
     times = filmed.series[methods[0]].times
-    figure = sheet(
-        list(zip(*seen)), tile, [f"{number(float(times[frame]))} s" for frame in chosen],
-        beside=[wrapped(run.label(method), 14) for method in methods],
-    )  # fmt: skip
+    heads = [f"{number(float(times[frame]))} s" for frame in chosen]
+    figure = sheet(list(zip(*seen)), tile, heads, beside=beside)
     caption = f"{filmed.scene}: the same frames of each method."
     return save(
         figure,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from report_folder import FRAMES, mesh, row, run_of, sheet, write_model
 
 from benchmarks.results import RunFolder
@@ -403,3 +404,11 @@ def test_only_what_was_drawn_is_read(tmp_path):
     path.write_bytes(b"no mesh")
     read = lambda path: build.read_trajectory(folder, path, problems)  # noqa: E731
     assert roll_outs.draw_roll_outs(folder, run, read) == [] and problems == []
+
+
+def test_words_beside_a_row_have_room_for_all_their_lines():
+    tile = np.zeros((10, 10, 3))
+    figure = pictures.sheet([[tile]], (1.0, 1.0), ["0 s"], beside=["SNUG, paper's\ntext"])
+    (words,) = (text for text in figure.texts if text.get_rotation() == 90)
+    box = words.get_window_extent(FigureCanvasAgg(figure).get_renderer())
+    assert box.x0 >= 0.0 and box.x1 <= figure.axes[0].get_window_extent().x0
