@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 DOTS = 200  # of a picture in an inch
 FRONT, BACK = -25.0, 155.0  # turns of the camera [degrees]
-BAR, NAME, SIDE = 0.62, 0.24, 0.2  # inches for a scale, a line of words and words at the side
+BAR, NAME, SIDE = 0.62, 0.24, 0.2  # inches for a scale, a line of words and one at the side
 FULL = 97.0  # percentile of the values of the worst method: it has the darkest colour
 STRIP = 6  # frames side by side
 NOTHING = 1e-6  # of a scale's unit: what is less everywhere is not shown
@@ -121,9 +121,8 @@ def sheet(
 ) -> Figure:
     """Pictures in rows, each of `tile` [inches]; words over the columns, below each and beside each row."""
     wide, high = tile
-    lines = max((head.count("\n") + 1 for head in heads), default=0)
-    under = NAME * max((words.count("\n") + 1 for row in below for words in row), default=0) * 0.75
-    top, left = NAME * 0.75 * lines, _side(beside)
+    under = NAME * 0.75 * _lines(words for row in below for words in row)
+    top, left = NAME * 0.75 * _lines(heads), SIDE * _lines(beside)
     columns = max(len(row) for row in rows)
     width = left + wide * columns + (BAR if bar else 0.0)
     height = top + len(rows) * (high + under)
@@ -151,9 +150,9 @@ def sheet(
     return figure
 
 
-def _side(beside: Sequence[str]) -> float:
-    """Inches that these words take, each read upwards."""
-    return SIDE * max((words.count("\n") + 1 for words in beside), default=0)
+def _lines(texts: Iterable[str]) -> int:
+    """Of the one that has most."""
+    return max((text.count("\n") + 1 for text in texts), default=0)
 
 
 def _bar(figure: Figure, scale: Scale, left: float, height: float) -> None:
@@ -244,7 +243,7 @@ def strip(folder: Path, run: Run, filmed: Filmed, methods: Sequence[str], spare:
     frames = min(filmed.series[method].frames for method in methods)
     chosen = np.unique(np.linspace(frames // 5, frames - 1, STRIP).astype(int))
     beside = [wrapped(run.label(method), 14) for method in methods]
-    wide = (PAGE_WIDTH - _side(beside)) / STRIP
+    wide = (PAGE_WIDTH - SIDE * _lines(beside)) / STRIP
     tile = (wide, 1.05 * wide)
     seen = [shots(filmed, methods, int(frame), FRONT, tile) for frame in chosen]
     times = filmed.series[methods[0]].times

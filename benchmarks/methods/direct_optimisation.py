@@ -70,7 +70,7 @@ class DirectOptimisation(Method):
         from snug.recipe import DEFAULT
 
         assert scene.dressed is not None
-        if _said(scene.energies) != _said(declared_energies(scene.cloth)):
+        if _identity(scene.energies) != _identity(declared_energies(scene.cloth)):
             names = ", ".join(term.name for term in scene.energies)
             raise ValueError(
                 f"direct optimisation minimises the paper's terms, scene {scene.name} has: {names}"
@@ -148,7 +148,8 @@ class DirectOptimisation(Method):
             whole.normals = _by_kind(np.stack([p.normals for p in planes]), kinds)
 
 
-def _said(terms: Sequence[Energy]) -> list[Any]:
+def _identity(terms: Sequence[Energy]) -> list[Any]:
+    """What tells one list of terms from another."""
     return [(type(term), term.parameters()) for term in terms]
 
 

@@ -59,9 +59,10 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
         return {}
     found: dict[str, float] = {}
     common = hem.measure(x)
-    if own is None and not roll_out.entry.static_known:
-        found |= {name: v for name, v in common.items() if name.removeprefix("dynamics/") not in COMMON}
-    elif own is None or (len(own) >= len(x) and np.isfinite(own).all()):
+    if own is None:
+        known = roll_out.entry.static_known
+        found |= {n: v for n, v in common.items() if known or n.removeprefix("dynamics/") not in COMMON}
+    elif len(own) >= len(x) and np.isfinite(own).all():
         found |= hem.measure(x, own)
     return found | {f"dynamics/common_{name}": common[f"dynamics/{name}"] for name in COMMON
                     if f"dynamics/{name}" in common}  # fmt: skip
