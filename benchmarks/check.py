@@ -10,23 +10,22 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snug.command_line import Parser, command
-
-from .methods import find_method
-from .registry import DeclarationError
-from .request import outside
-from .request.plan import Motions, Plan
-from .request.presets import find_preset
-from .results import RunFolder
-from .scenes import SCENES, find_scene, of_garment
-from .tasks.cell import Cell
-from .timing import one_thread
+from benchmarks.methods import find_method
+from benchmarks.plan import plug_ins as outside
+from benchmarks.plan.plan import Motions, Plan
+from benchmarks.presets import find_preset
+from benchmarks.registry import DeclarationError
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.scenes import SCENES, find_scene, of_garment
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.timing import one_thread
+from reference_sim.command.command_line import Parser, command
 
 if TYPE_CHECKING:
-    from .runner.executor import LocalExecutor
-    from .runner.loop import Runner
-    from .runner.schedule import Schedule
-    from .tasks.task import Task
+    from benchmarks.runner.local_executor import LocalExecutor
+    from benchmarks.runner.loop import Runner
+    from benchmarks.runner.schedule import Schedule
+    from benchmarks.tasks.task import Task
 
 PROGRAM = "benchmarks.check"
 SECONDS = 120.0
@@ -95,11 +94,11 @@ def check(
     declared: dict[str, list[Any]], folder: Path, seconds: float = SECONDS
 ) -> Iterator[tuple[str, bool]]:
     """Lines on each entry in each scene, and whether they are fine. Writes into the folder."""
-    from .assets import embedded_motions, open_assets
-    from .runner.cache import Cache
-    from .runner.executor import LocalExecutor
-    from .runner.loop import NoLog, Runner
-    from .runner.schedule import Schedule
+    from benchmarks.assets.assets import embedded_motions, open_assets
+    from benchmarks.runner.cache import Cache
+    from benchmarks.runner.local_executor import LocalExecutor
+    from benchmarks.runner.loop import NoLog, Runner
+    from benchmarks.runner.schedule import Schedule
 
     plan = plan_of(declared, folder)
     for entry in declared["methods"]:
@@ -149,9 +148,9 @@ def _tasks(
     declared: dict[str, list[Any]], plan: Plan, schedule: Schedule, seconds: float
 ) -> Iterator[tuple[str, Task]]:
     """(name of the entry, task that looks at it in a scene)"""
-    from .contract.methods import CheckMethod
-    from .contract.metrics import CheckMetrics
-    from .contract.scenes import CheckScene
+    from benchmarks.contract.check_method import CheckMethod
+    from benchmarks.contract.check_metric import CheckMetrics
+    from benchmarks.contract.check_scene import CheckScene
 
     fields: dict[str, Any] = {"inputs": {}, "modules": (), "deadline": seconds}
     for cell in plan.cells:

@@ -9,14 +9,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from snug.command_line import Parser, command
-from snug.garment_file import add_garment_options
-from snug.motion_options import add_motion_options
-
-from .timing import one_thread
+from benchmarks.timing import one_thread
+from reference_sim.command.command_line import Parser, command
+from snug.garments.options import add_garment_options
+from snug.motion.options import add_motion_options
 
 if TYPE_CHECKING:
-    from snug.dataset import DataSet
+    from snug.training.simulated_data import DataSet
 
 PROGRAM = "benchmarks.dataset"
 EXAMPLES = """examples:
@@ -100,8 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _build(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from .datasets.build import build
-    from .tasks.task import RunStopped
+    from benchmarks.datasets.build import build
+    from benchmarks.tasks.task import RunStopped
 
     try:
         return _told(build(options, words))
@@ -126,10 +125,9 @@ def _told(found: DataSet) -> int:
 
 
 def _verify(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from snug.dataset import MISSING, DataSet
-
-    from .results import RunFolder
-    from .runner.cache import damaged
+    from benchmarks.results.run_folder import RunFolder
+    from benchmarks.runner.cache import damaged
+    from snug.training.simulated_data import MISSING, DataSet
 
     found = DataSet.read(options.folder)
     folder, wrong = RunFolder(found.folder), 0
@@ -147,7 +145,7 @@ def _verify(options: argparse.Namespace, words: Sequence[str]) -> int:
 
 
 def _list(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from snug.dataset import DataSet
+    from snug.training.simulated_data import DataSet
 
     found = DataSet.read(options.folder)
     for name, value in found.settings.items():
@@ -161,7 +159,7 @@ def _list(options: argparse.Namespace, words: Sequence[str]) -> int:
 
 
 def _merge(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from .datasets.join import merge
+    from benchmarks.datasets.join import merge
 
     return _told(merge([Path(folder) for folder in options.folders], Path(options.out)))
 

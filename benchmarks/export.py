@@ -10,16 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from snug.command_line import Parser, command
-
-from .request.one_scene import plan_of_scene, words_of_scene
-from .request.options import add_scene_options
-from .request.plan import Plan, PlanError
-from .timing import one_thread
+from benchmarks.plan.one_scene import plan_of_scene, words_of_scene
+from benchmarks.plan.options import add_scene_options
+from benchmarks.plan.plan import Plan, PlanError
+from benchmarks.timing import one_thread
+from reference_sim.command.command_line import Parser, command
 
 if TYPE_CHECKING:
-    from .assets import Assets
-    from .scene import BuiltScene
+    from benchmarks.assets.assets import Assets
+    from benchmarks.scene import BuiltScene
 
 PROGRAM = "benchmarks.export"
 EXAMPLES = """examples:
@@ -55,14 +54,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     options = make_export_parser().parse_args(words)
-    from reference_sim.whole_file import demand_new
+    from reference_sim.files.atomic_files import demand_new
 
     folder = Path(options.out)
     demand_new(folder)
     plan = plan_of(options)
     try:
         scene, assets = built(plan)
-        from .export_files import write_scene
+        from benchmarks.export_files import write_scene
 
         chosen = ["--scene", options.scene, *words_of_scene(options)]
         score = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
@@ -83,7 +82,7 @@ def plan_of(options: argparse.Namespace) -> Plan:
 
 def built(plan: Plan) -> tuple[BuiltScene, Assets | None]:
     """The scene of the plan, made. Raises ValueError where a garment or a motion cannot be."""
-    from .runner.execution import assets_of
+    from benchmarks.runner.whole_run import assets_of
 
     assets = assets_of(plan) if plan.garments else None
     return plan.scenes[0].build(assets), assets

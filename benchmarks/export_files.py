@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.methods import find_method
 from reference_sim import Trajectory
+from reference_sim.files.atomic_files import new_folder
 from reference_sim.material import GRAVITY
-from reference_sim.point_cache import write_point_cache
-from reference_sim.whole_file import new_folder
-
-from .methods import find_method
+from reference_sim.trajectory.point_cache import write_point_cache
 
 if TYPE_CHECKING:
-    from .assets import Assets
-    from .request.plan import Plan
-    from .scene import BuiltScene, Dressed
+    from benchmarks.assets.assets import Assets
+    from benchmarks.plan.plan import Plan
+    from benchmarks.scene import BuiltScene, Dressed
 
 FINGERS = 30  # joints of SMPL-H's hands, which a garment never meets
 # (x, y, z) with y up -> (x, -z, y) with z up.
@@ -120,8 +119,8 @@ def _obstacle(part: Path, scene: BuiltScene) -> Listed:
 def _motion(part: Path, worn: Dressed) -> Listed:
     """Poses in two layouts, and what skins the garment."""
     body, motion, garment = worn.body, worn.motion, worn.garment
-    from snug.dressed_body import DressedBody
-    from snug.recipe import DEFAULT
+    from snug.networks.dressed_body import DressedBody
+    from snug.recipes.recipe import DEFAULT
 
     joints = body.joints(worn.betas)
     betas = np.zeros(body.shape_count) if worn.betas is None else np.asarray(worn.betas)
@@ -130,7 +129,7 @@ def _motion(part: Path, worn: Dressed) -> Listed:
         part / "motion_smpl.npz", poses=motion.poses.reshape(frames, -1), trans=motion.translations,
         betas=betas, fps=motion.fps,
     )  # fmt: skip
-    from snug.skeleton import axis_angles, rotation_matrices
+    from snug.body.skeleton import axis_angles, rotation_matrices
 
     poses = np.zeros((frames, 22 + FINGERS, 3))
     poses[:, :22] = motion.poses[:, :22]

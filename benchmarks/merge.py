@@ -16,11 +16,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from snug.command_line import Parser, command
-
-from . import frame_energies
-from .results import BEFORE_FRAMES, ResultsError, Row, RunFolder, digest_of_file
-from .runner.cache import read_entry
+from benchmarks.results import frame_energies
+from benchmarks.results.run_folder import BEFORE_FRAMES, ResultsError, Row, RunFolder, digest_of_file
+from benchmarks.runner.cache import read_entry
+from reference_sim.command.command_line import Parser, command
 
 PROGRAM = "benchmarks.merge"
 EXAMPLES = """examples:
@@ -94,7 +93,7 @@ def merge(paths: Sequence[Path], out: Path, *, command: str = "") -> list[Row]:
     config = _joined(runs, command)
     check_entries([run.folder for run in runs])
     rows = joined_rows({str(run.folder.path): run.rows for run in runs}, of_machines(config))
-    from reference_sim.whole_file import new_folder
+    from reference_sim.files.atomic_files import new_folder
 
     with new_folder(out) as part:
         folder, digests = RunFolder(part), dict[str, str]()

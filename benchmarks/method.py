@@ -8,16 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .registry import DeclarationError, load
-from .results import ROLES
+from benchmarks.registry import DeclarationError, load
+from benchmarks.results.run_folder import ROLES
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from benchmarks.scene import BuiltScene, Dressed, Scene
     from reference_sim import Trajectory
-    from snug.recipes import Training
-
-    from .scene import BuiltScene, Dressed, Scene
+    from snug.recipes.named import Training
 
 
 class Method:
@@ -79,7 +78,7 @@ class MethodEntry:
     package; empty for those of the project, and filled in where it is read. files: what it reads besides,
     beside that file, so that a run knows when one has changed.
     needs_body: whether it works on dressed scenes alone. trained: the name of the network it needs, if any;
-    training: how that is trained, where snug.recipes.TRAININGS does not have it.
+    training: how that is trained, where snug.recipes.named.TRAININGS does not have it.
     seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
     dtype: the numbers it computes with; trajectories and metrics are float64 in any case.
     needs_no_obstacle: whether it knows no contact. package: what it needs installed besides this project.
@@ -89,7 +88,7 @@ class MethodEntry:
     asked for where those of the scene are. declared_ms: [ms] a frame, as its author says, where no clock of
     ours can measure it; what a trajectory says as provenance counts as well. static_known: whether its answer
     to poses held still is what quasi_static() says. left_out: why it is not run, where somebody wants it so.
-    role, family, level, base, pairing_group: see benchmarks.results.Row.
+    role, family, level, base, pairing_group: see benchmarks.results.run_folder.Row.
     """
 
     name: str

@@ -31,13 +31,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from .results import USABLE, as_right
+from benchmarks.results.run_folder import USABLE, as_right
 
 if TYPE_CHECKING:
+    from benchmarks.method import MethodEntry
+    from benchmarks.scene import BuiltScene
     from reference_sim import Trajectory
-
-    from .method import MethodEntry
-    from .scene import BuiltScene
 
 Made = TypeVar("Made")
 NUMBERS_OF = ("answer", "method", "machine")
@@ -204,8 +203,8 @@ def skinned(group: SceneRollOuts) -> np.ndarray | None:
     """(T,V,3) [m] the garment skinned to the poses, as the default recipe does; None without a body."""
     if group.scene.dressed is None:
         return None
-    from snug.dressed_body import DressedBody
-    from snug.recipe import DEFAULT
+    from snug.networks.dressed_body import DressedBody
+    from snug.recipes.recipe import DEFAULT
 
     dressed, kept = group.scene.dressed, group.scene.kept
     motion = dressed.motion

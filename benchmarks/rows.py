@@ -8,14 +8,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from .methods import find_method
-from .metric import Metric
-from .metrics import declared, find_metric
-from .request.plan import Plan, network_of
-from .results import REFERENCE_TOLERANCE, Row, as_right
-from .runner.schedule import Schedule
-from .tasks.cell import Cell
-from .tasks.task import Outcome, Task, TaskId
+from benchmarks.methods import find_method
+from benchmarks.metric import Metric
+from benchmarks.metrics import declared, find_metric
+from benchmarks.plan.plan import Plan, network_of
+from benchmarks.results.run_folder import REFERENCE_TOLERANCE, Row, as_right
+from benchmarks.runner.schedule import Schedule
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.tasks.task import Outcome, Task, TaskId
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark

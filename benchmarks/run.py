@@ -9,13 +9,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from .registry import DeclarationError
-from .request.make_plan import make_plan
-from .request.options import PROGRAM, make_parser
-from .request.plan import Plan
-from .roll_outs.option import RollOutError
-from .tasks.task import RunStopped
-from .timing import one_thread
+from benchmarks.external.roll_out_option import RollOutError
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import PROGRAM, make_parser
+from benchmarks.plan.plan import Plan
+from benchmarks.registry import DeclarationError
+from benchmarks.tasks.task import RunStopped
+from benchmarks.timing import one_thread
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = make_parser().parse_args(words)
         if options.list:
-            from .request.listing import listing
+            from benchmarks.plan.listing import listing
 
             print(listing())
             return 0
@@ -40,15 +40,15 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
     """Run the plan, or say what would be run; returns the exit status."""
     for motion in plan.motions.files.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
-    from .runner.lock import HeldError, held
+    from benchmarks.runner.lock import HeldError, held
 
     try:
         if dry_run:
-            from .runner.dry_run import describe
+            from benchmarks.runner.dry_run import describe
 
             print(describe(plan))
             return 0
-        from .runner.execution import check_roll_outs, execute
+        from benchmarks.runner.whole_run import check_roll_outs, execute
 
         assets = check_roll_outs(plan)
         with held(plan.folder):
@@ -57,7 +57,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
         print(f"{program}: {error}", file=sys.stderr)
         return 2
     except (RunStopped, OSError) as error:
-        from reference_sim.whole_file import disk_full
+        from reference_sim.files.atomic_files import disk_full
 
         line = str(error) if isinstance(error, RunStopped) else disk_full(error)
         if not line:

@@ -15,10 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from snug.command_line import Parser, command
-
-from .results import ResultsError, RunFolder, replacing
-from .runner.cache import read_entry
+from benchmarks.results.run_folder import ResultsError, RunFolder, replacing
+from benchmarks.runner.cache import read_entry
+from reference_sim.command.command_line import Parser, command
 
 if TYPE_CHECKING:
     import numpy as np

@@ -7,19 +7,18 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from .registry import DeclarationError, by_name, load
+from benchmarks.registry import DeclarationError, by_name, load
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from benchmarks.assets.assets import Assets
+    from benchmarks.presets import Preset
     from reference_sim import Cloth, Obstacle
     from reference_sim.energies import Energy
-    from snug.body import Body
-    from snug.garments import Garment
-    from snug.motion import Motion
-
-    from .assets import Assets
-    from .request.presets import Preset
+    from snug.body.parametric_body import Body
+    from snug.garments.garment import Garment
+    from snug.motion.motion import Motion
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,17 +14,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from snug.command_line import Parser
-
-from .request.one_scene import plan_of_scene
-from .request.options import add_scene_options
-from .request.plan import Plan
-from .request.selection import stored_cells
-from .results import RunFolder
-from .roll_outs.option import CHARACTERS, PLACE, RollOutError, RollOutOption, Stated, checked_ms
-from .run import carry_out
-from .tasks.cell import Cell
-from .timing import one_thread
+from benchmarks.external.roll_out_option import (
+    CHARACTERS,
+    PLACE,
+    RollOutError,
+    RollOutOption,
+    Stated,
+    checked_ms,
+)
+from benchmarks.plan.one_scene import plan_of_scene
+from benchmarks.plan.options import add_scene_options
+from benchmarks.plan.plan import Plan
+from benchmarks.plan.selection import stored_cells
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.run import carry_out
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.timing import one_thread
+from reference_sim.command.command_line import Parser
 
 PROGRAM = "benchmarks.score"
 JUDGED_BY_STEP = "speed"  # the suite in which steps are solved again: gaps and one-step errors
@@ -116,7 +122,7 @@ def _of_file(plan: Plan, option: RollOutOption, rest_mesh: str) -> tuple[Plan, R
     """The plan with the scene that the roll-out brings in place of another; what is said of the file has then
     been said of the scene, but for unit and axis.
     """
-    from .scenes.from_roll_out import declared
+    from benchmarks.scenes.from_roll_out import declared
 
     scene = declared(option, rest_mesh)
     cells = tuple(replace(cell, scene=scene, suites=(JUDGED_BY_STEP,)) for cell in plan.cells)
@@ -130,7 +136,7 @@ def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
         return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
     if options.reference is None:
         return cell
-    from .methods.stored_roll_out import entry_of
+    from benchmarks.methods.outside.stored_roll_out import entry_of
 
     stored = RollOutOption("reference", options.reference, Stated(), role="reference")
     entry = entry_of(stored, cell.scene.name)

@@ -18,11 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from snug.command_line import Parser, command
-
-from .request.plan import PlanError
-from .results import ResultsError, RunFolder, replacing
-from .timing import THREADS
+from benchmarks.plan.plan import PlanError
+from benchmarks.results.run_folder import ResultsError, RunFolder, replacing
+from benchmarks.timing import THREADS
+from reference_sim.command.command_line import Parser, command
 
 PROGRAM = "benchmarks.speedup"
 ROOT = Path(__file__).resolve().parent.parent

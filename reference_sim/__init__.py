@@ -5,16 +5,16 @@
 
 from typing import TYPE_CHECKING
 
-from .cloth import Cloth, MeshError
-from .material import GRAVITY, Material
-from .minimise import Result, minimise
-from .potential import Potential
-from .simulator import simulate
-from .trajectory import Trajectory, TrajectoryError
-from .trajectory_writer import TrajectoryWriter
+from reference_sim.cloth import Cloth, MeshError
+from reference_sim.material import GRAVITY, Material
+from reference_sim.minimise import Result, minimise
+from reference_sim.potential import Potential
+from reference_sim.simulator import simulate
+from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
+from reference_sim.trajectory.writer import TrajectoryWriter
 
 if TYPE_CHECKING:
-    from .obstacle import Obstacle
+    from reference_sim.obstacle import Obstacle
 
 __all__ = [
     "GRAVITY",
@@ -35,6 +35,6 @@ __all__ = [
 def __getattr__(name: str) -> type:
     if name != "Obstacle":
         raise AttributeError(f"module 'reference_sim' has no attribute {name!r}")
-    from .obstacle import Obstacle
+    from reference_sim.obstacle import Obstacle
 
     return Obstacle

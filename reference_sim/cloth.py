@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .material import Material
+from reference_sim.material import Material
 
 HUGE = 1e12  # times the median face: beside such a one all others seem to have no area
 

@@ -12,11 +12,11 @@ from functools import cached_property
 import igl
 import numpy as np
 
-from .closed_mesh import check_closed
-from .closest_point import Closest, FaceTree
-from .cloth import MeshError
-from .resume import fingerprint
-from .surface import carry, plane_normals, vertex_normals
+from reference_sim.cloth import MeshError
+from reference_sim.contact.closest_point import Closest, FaceTree
+from reference_sim.geometry.closed_mesh import check_closed
+from reference_sim.geometry.surface import carry, plane_normals, vertex_normals
+from reference_sim.trajectory.resume import fingerprint
 
 DEFAULT_REGION = 0.20  # [m]
 

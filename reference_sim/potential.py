@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from .energies.energy import Energy, Step
+from reference_sim.energies.energy import Energy, Step
 
 if TYPE_CHECKING:
-    from .hessian_pattern import HessianPattern
+    from reference_sim.assembly.hessian_pattern import HessianPattern
 
 
 class Potential:
@@ -108,7 +108,9 @@ class Potential:
 
     def pattern(self, free: np.ndarray, *, block: int = 3) -> HessianPattern:
         """Pattern over the vertices marked free (V,), of the Hessian or (block=1) of a scalar stiffness."""
-        from .hessian_pattern import HessianPattern  # loads numba, which a command's --help can do without
+        from reference_sim.assembly.hessian_pattern import (
+            HessianPattern,  # loads numba, which a command's --help can do without
+        )
 
         key = (np.packbits(free).tobytes(), block)
         if key not in self._patterns:

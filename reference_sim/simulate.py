@@ -5,7 +5,7 @@ Importing it would hide the function `reference_sim.simulate` behind this module
 
 import sys
 
-from .command import main
+from reference_sim.command.simulate_command import main
 
 if __name__ != "__main__":
     raise ImportError(

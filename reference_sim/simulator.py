@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .cloth import Cloth
-from .energies.energy import Energy
-from .minimise import Result
-from .progress import progress_bar
-from .recorder import Recorder
-from .resume import fingerprint, recover
-from .stepper import State, Stepper
-from .trajectory import Trajectory
+from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import Energy
+from reference_sim.minimise import Result
+from reference_sim.progress import progress_bar
+from reference_sim.stepper import State, Stepper
+from reference_sim.trajectory.recorder import Recorder
+from reference_sim.trajectory.resume import fingerprint, recover
+from reference_sim.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from .obstacle import Obstacle
+    from reference_sim.obstacle import Obstacle
 
 
 LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other

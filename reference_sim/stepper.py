@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .cloth import Cloth
-from .energies.energy import Energy, Step
-from .minimise import Minimiser, Result, make_minimiser
-from .potential import Potential
-from .resume import PartialRun, fingerprint
-from .trajectory import TrajectoryError
+from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import Energy, Step
+from reference_sim.minimise import Minimiser, Result, make_minimiser
+from reference_sim.potential import Potential
+from reference_sim.trajectory.resume import PartialRun, fingerprint
+from reference_sim.trajectory.trajectory import TrajectoryError
 
 if TYPE_CHECKING:
-    from .obstacle import Obstacle
+    from reference_sim.obstacle import Obstacle
 
 GUESSES = ("previous", "extrapolated", "body_transported")
 MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
@@ -52,7 +52,7 @@ class Stepper:
         refreeze: int,
         options: dict[str, Any],
     ) -> None:
-        from .energies.inertia import Inertia
+        from reference_sim.energies.inertia import Inertia
 
         if guess is None:
             guess = "extrapolated" if obstacle is None else "body_transported"

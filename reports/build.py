@@ -13,14 +13,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.results import ResultsError, RunFolder, replacing
-from reports.read import read_run, read_trajectory
-from snug.command_line import Parser, command
+from benchmarks.results.run_folder import ResultsError, RunFolder, replacing
+from reference_sim.command.command_line import Parser, command
+from reports.run.read import read_run, read_trajectory
 
 if TYPE_CHECKING:
-    from reports.data import Run
-    from reports.plotting import Picture
-    from reports.training import History
+    from reports.figures.plotting import Picture
+    from reports.figures.training import History
+    from reports.run.rows import Run
 
 TEMPLATE = Path(__file__).parent / "report.typ"
 # Names of what draw() makes.
@@ -39,12 +39,12 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     """
     folder = RunFolder(run_dir)
     run = read_run(folder)
-    from reports.dictionary import dictionary
-    from reports.document import document
-    from reports.latex import write_latex
+    from reports.document.document import document
+    from reports.figures.training import curves_table, read_histories, trainings
     from reports.page.write import write_page
-    from reports.tables import make_tables
-    from reports.training import curves_table, read_histories, trainings
+    from reports.tables.dictionary import dictionary
+    from reports.tables.latex import write_latex
+    from reports.tables.tables import make_tables
 
     problems: list[str] = []
     histories = read_histories(folder, run, problems)
@@ -67,15 +67,15 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
 
 def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: list[str]) -> list[Picture]:
     """Every figure that the run holds something for."""
-    from reports import figures
-    from reports.break_even import break_even
-    from reports.convergence import convergence_curve
-    from reports.equal_data import error_against_frames, held_out_curves
-    from reports.roll_outs import draw_roll_outs
-    from reports.shapes import against_shape
-    from reports.stability import stability_maps
-    from reports.training import training_curves
-    from reports.work_precision import error_against_time
+    from reports.figures import figures
+    from reports.figures.break_even import break_even
+    from reports.figures.convergence import convergence_curve
+    from reports.figures.equal_data import error_against_frames, held_out_curves
+    from reports.figures.shapes import against_shape
+    from reports.figures.stability import stability_maps
+    from reports.figures.training import training_curves
+    from reports.figures.work_precision import error_against_time
+    from reports.pictures.chosen_roll_outs import draw_roll_outs
 
     pictures = draw_roll_outs(folder, run, lambda path: read_trajectory(folder, path, problems))
     for make in (
@@ -96,7 +96,7 @@ def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Picture:
         for name in names:
             if name not in set(run.frame[what]):
                 raise ResultsError(f"{folder.rows_path}: no row has the {what} '{name}'")
-    from reports.work_precision import metric_against_metric
+    from reports.figures.work_precision import metric_against_metric
 
     asked = asked or most_shared(run, x, y)
     picture = metric_against_metric(folder.figures, run, x, y, asked)
@@ -108,7 +108,7 @@ def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Picture:
 
 def most_shared(run: Run, x: str, y: str) -> list[str]:
     """The scenes in which most methods have both metrics, the same methods in each."""
-    from reports.data import SUITES
+    from reports.run.rows import SUITES
 
     rows = run.cells(*SUITES)
     rows = rows[rows["usable"] & rows["metric"].isin((x, y))]
@@ -122,8 +122,8 @@ def typeset(folder: RunFolder, content: dict[str, Any]) -> None:
     """report.pdf from the template, with fonts of the typesetter alone and the run's own date."""
     import typst
 
-    from reports.configuration import moment
-    from reports.plotting import printable
+    from reports.figures.plotting import printable
+    from reports.run.configuration import moment
 
     config = folder.read_config()
     finished = moment(config.get("finished")) or moment(config.get("started"))

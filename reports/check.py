@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import pandas as pd
 
-from benchmarks.results import RunFolder
-from reports.data import Run
-from reports.pareto import REPEATS, TIME
-from reports.read import read_run
-from snug.command_line import Parser, command
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.command.command_line import Parser, command
+from reports.run.read import read_run
+from reports.run.rows import Run
+from reports.statistics.pareto import REPEATS, TIME
 
 SHOWN = 4  # names in a line
 CELL = ["suite", "scene", "method", "seed"]

@@ -16,12 +16,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from benchmarks.results import ResultsError, RunFolder
-from reports import paper
-from reports.configuration import moment
-from reports.data import Run
-from reports.dictionary import dictionary
-from reports.tables import make_tables
+from benchmarks.results.run_folder import ResultsError, RunFolder
+from reports.run.configuration import moment
+from reports.run.rows import Run
+from reports.tables import paper
+from reports.tables.dictionary import dictionary
+from reports.tables.tables import make_tables
 
 CONTENT = re.compile(r'<script type="text/plain" id="content">([^<]*)</script>')
 NUMBER = re.compile(

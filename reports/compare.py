@@ -12,14 +12,14 @@ from fnmatch import fnmatchcase
 
 import pandas as pd
 
-from benchmarks.results import ResultsError, RunFolder
-from reports.data import SUITES, Metric, Run
-from reports.means import Mean, means
-from reports.numbers import number, with_spread
-from reports.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
-from reports.read import read_run
-from reports.significance import OPEN, TIED, Effect, effect_on, holm, standing
-from snug.command_line import Parser, command
+from benchmarks.results.run_folder import ResultsError, RunFolder
+from reference_sim.command.command_line import Parser, command
+from reports.run.read import read_run
+from reports.run.rows import SUITES, Metric, Run
+from reports.statistics.means import Mean, means
+from reports.statistics.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
+from reports.statistics.significance import OPEN, TIED, Effect, effect_on, holm, standing
+from reports.tables.numbers import number, with_spread
 
 CELL = ["scene", "method", "seed", "metric"]
 GROUP = ["place", "method", "metric"]

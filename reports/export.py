@@ -10,11 +10,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.results import RunFolder
-from snug.command_line import Parser, command
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.command.command_line import Parser, command
 
 if TYPE_CHECKING:
-    from reference_sim.trajectory import Trajectory
+    from reference_sim.trajectory.trajectory import Trajectory
 
 EXAMPLES = """examples:
   python -m reports.export reports/runs/NAME --scene tshirt/kick --method snug -o kick.usdc
@@ -110,15 +110,15 @@ def demand_writable(path: Path) -> None:
     if path.suffix != "" and path.is_dir():
         raise ValueError(f"{path}: is a folder; name a file")
     if path.suffix == "":
-        from reference_sim.whole_file import demand_new
+        from reference_sim.files.atomic_files import demand_new
 
         demand_new(path)
 
 
 def write(path: Path, meshes: Meshes) -> None:
     """Write the meshes, each whole or not at all. Raises OSError."""
-    from reference_sim.point_cache import write_point_cache
-    from reference_sim.whole_file import replacing
+    from reference_sim.files.atomic_files import replacing
+    from reference_sim.trajectory.point_cache import write_point_cache
 
     if path.suffix in ARCHIVES:
         with replacing(path) as temporary:
@@ -131,8 +131,8 @@ def write(path: Path, meshes: Meshes) -> None:
 
 
 def _write_frames(folder: Path, meshes: Meshes) -> None:
-    from reference_sim.point_cache import write_obj
-    from reference_sim.whole_file import new_folder
+    from reference_sim.files.atomic_files import new_folder
+    from reference_sim.trajectory.point_cache import write_obj
 
     with new_folder(folder) as part:
         for name, mesh in meshes.items():
@@ -163,7 +163,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = make_parser().parse_args(arguments)
     path = Path(options.out)
     demand_writable(path)
-    from reports.kept import read_kept
+    from reports.run.kept_roll_outs import read_kept
 
     kept = read_kept(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
     cloth = kept.cloths[options.method]

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.results import RunFolder, replacing
-from reports.render import camera_axes, vertex_normals
-from snug.command_line import Parser, command
+from benchmarks.results.run_folder import RunFolder, replacing
+from reference_sim.command.command_line import Parser, command
+from reports.pictures.render import camera_axes, vertex_normals
 
 if TYPE_CHECKING:
-    from reference_sim.trajectory import Trajectory
-    from reports.kept import Kept
+    from reference_sim.trajectory.trajectory import Trajectory
+    from reports.run.kept_roll_outs import Kept
 
 EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.mp4
@@ -238,7 +238,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
         raise ValueError("--speed is .01 to 10, --width 64 to 2000")
     demand_possible(path)
-    from reports.kept import read_kept
+    from reports.run.kept_roll_outs import read_kept
 
     kept = read_kept(RunFolder(options.run_dir), options.scene, methods, options.seed)
     dt = min(cloth.dt for cloth in kept.cloths.values())

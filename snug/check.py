@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from snug.command_line import Parser, command
-from snug.garment_file import GarmentFile, add_garment_options, garment_file
+from reference_sim.command.command_line import Parser, command
+from snug.garments.options import GarmentFile, add_garment_options, garment_file
 
 if TYPE_CHECKING:
-    from snug.body import Body
-    from snug.garment_fit import Wearer
+    from snug.body.parametric_body import Body
+    from snug.garments.fit import Wearer
 
 PROGRAM = "snug.check"
 USABLE, UNUSABLE, UNREADABLE = 0, 1, 2
@@ -55,8 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     files = [garment_file(path, options) for path in options.files]
     if options.picture and not options.picture.parent.is_dir():
         raise ValueError(f"--picture {options.picture}: no such folder")
-    from snug.body import Body
-    from snug.garment_fit import Wearer
+    from snug.body.parametric_body import Body
+    from snug.garments.fit import Wearer
 
     body = Body.from_file(options.body) if options.body else Body.load()
     wearer = Wearer(body)
@@ -65,8 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _check(file: GarmentFile, body: Body, wearer: Wearer, picture: Path | None) -> int:
     """Print the table of one file; its exit status."""
-    from snug.garment_reading import examine
-    from snug.garments import GarmentError
+    from snug.garments.garment import GarmentError
+    from snug.garments.reading import examine
 
     try:
         reading = examine(file, wearer, body)
@@ -78,7 +78,7 @@ def _check(file: GarmentFile, body: Body, wearer: Wearer, picture: Path | None) 
         remedy = f"; {finding.remedy}" if finding.remedy else ""
         print(f"  {MARKS[finding.level]:<5}{finding.matter:<18}{finding.says}{remedy}")
     if picture and reading.surface is not None and reading.distances is not None:
-        from snug.check_picture import draw
+        from snug.garments.picture import draw
 
         draw(picture, body, reading.surface, reading.distances)
         print(f"  {picture}")

@@ -11,21 +11,21 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snug.command_line import command
-from snug.garment_file import demand_a_file, garment_file, is_file_name
-from snug.motion_options import reading_of
-from snug.recipes import TRAININGS, find_recipe
-from snug.train_options import check, parse
+from reference_sim.command.command_line import command
+from snug.garments.options import demand_a_file, garment_file, is_file_name
+from snug.motion.options import reading_of
+from snug.recipes.named import TRAININGS, find_recipe
+from snug.training.options import check, parse
 
 if TYPE_CHECKING:
-    from snug.body import Body
-    from snug.dataset import DataSet
-    from snug.dressed_body import DressedBody
-    from snug.garment_kinds import GarmentTemplate
-    from snug.garments import Garment
-    from snug.parallel import Group
-    from snug.recipe import Recipe
-    from snug.trained_model import TrainedModel
+    from snug.body.parametric_body import Body
+    from snug.garments.garment import Garment
+    from snug.garments.templates import GarmentTemplate
+    from snug.networks.dressed_body import DressedBody
+    from snug.networks.trained_model import TrainedModel
+    from snug.recipes.recipe import Recipe
+    from snug.training.process_group import Group
+    from snug.training.simulated_data import DataSet
 
 
 @command("snug.train", goes_on="--resume goes on from there")
@@ -34,12 +34,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parse(arguments)
     import torch
 
-    from snug.body import Body
-    from snug.dataset import DataSet
-    from snug.device import find_device
-    from snug.garment_kinds import TSHIRT, find_template
-    from snug.parallel import join_group, leave_group
-    from snug.training_run import Interrupted
+    from snug.body.parametric_body import Body
+    from snug.garments.templates import TSHIRT, find_template
+    from snug.training.device import find_device
+    from snug.training.process_group import join_group, leave_group
+    from snug.training.run import Interrupted
+    from snug.training.simulated_data import DataSet
 
     check(options)
     if not any(map(is_file_name, options.garment)):
@@ -75,8 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _of_file(path: str, options: argparse.Namespace) -> GarmentTemplate:
     """A garment that is read instead of tailored, whatever number of vertices is asked for."""
-    from snug.garment_kinds import GarmentTemplate
-    from snug.garment_reading import read_garment
+    from snug.garments.reading import read_garment
+    from snug.garments.templates import GarmentTemplate
 
     file = garment_file(path, options)
 
@@ -104,8 +104,8 @@ def _outs(out: Path, templates: Sequence[Any]) -> list[Path]:
 
 def _motions(options: argparse.Namespace, data: DataSet | None) -> tuple[list[Any], list[Any]]:
     """Motions to train on and to validate with. Raises ValueError for a name that is not there."""
-    from snug.motion_files import load_motions
-    from snug.motion_library import TRAIN, VALIDATION, make_motion
+    from snug.motion.files import load_motions
+    from snug.motion.library import TRAIN, VALIDATION, make_motion
 
     reading = reading_of(options)
     motions = data.motions() if data else [make_motion(name) for name in TRAIN]
@@ -153,12 +153,12 @@ def _train_one(
     group: Group,
     stop: Callable[[], bool],
 ) -> None:
-    from snug.dataset import settings_of
-    from snug.dressed_body import DressedBody
-    from snug.tensorboard_log import TensorBoardLog
-    from snug.training import train
-    from snug.training_run import Saving
-    from snug.validation import Validation
+    from snug.networks.dressed_body import DressedBody
+    from snug.training.run import Saving
+    from snug.training.simulated_data import settings_of
+    from snug.training.tensorboard_log import TensorBoardLog
+    from snug.training.train import train
+    from snug.training.validation import Validation
 
     saving = Saving(
         path=out.with_name(f"{out.stem}.checkpoint.safetensors"), steps=options.checkpoint_steps,
@@ -218,7 +218,7 @@ def _digest(
     """Of body, garment, motions, those that validate included, and simulated vertices."""
     import numpy as np
 
-    from snug.dataset import settings_of
+    from snug.training.simulated_data import settings_of
 
     taught = sorted((name, simulated[name].content) for name in simulated)
     body, garment = dressed.body, dressed.garment
@@ -235,7 +235,7 @@ def _digest(
 
 def _check_ended(out: Path, options: argparse.Namespace, vertices: int, learned_from: str) -> None:
     """Raises ValueError where the model there is not what this command trains."""
-    from snug.trained_model import TrainedModel
+    from snug.networks.trained_model import TrainedModel
 
     there, asked = TrainedModel.load(out), _recipe(options)
     if "learned_from" not in there.summary:
@@ -253,7 +253,7 @@ def _check_ended(out: Path, options: argparse.Namespace, vertices: int, learned_
 
 
 def _tell(model: TrainedModel) -> None:
-    from snug.trained_model import find_kind
+    from snug.networks.trained_model import find_kind
 
     unit = find_kind(model.kind).unit
     last = {name: value for name, value in model.history[-1].items() if "/" not in name}

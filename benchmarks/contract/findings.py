@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..runner.source import code_of, digest
+from benchmarks.runner.source import code_of, digest
 
 if TYPE_CHECKING:
-    from ..scene import BuiltScene
+    from benchmarks.scene import BuiltScene
 
 
 class Broken(Exception):

@@ -10,31 +10,30 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snug.dataset import INDEX, DataSet, SimulatedSequence, settings_of
-from snug.garment_file import demand_a_file, is_file_name
-from snug.motion_options import reading_of
-from snug.recipe import DEFAULT
-
-from .. import provenance
-from ..assets import embedded_motions, open_assets
-from ..methods import METHODS
-from ..registry import by_name
-from ..request.make_plan import WORKERS, choose_body, choose_garment, choose_states, split
-from ..request.plan import Motions, Plan, PlanError
-from ..request.presets import find_preset
-from ..request.roles import FEWEST
-from ..results import RunFolder
-from ..runner.cache import Cache
-from ..runner.execution import executor_of
-from ..runner.lock import held
-from ..runner.loop import NoLog, Runner
-from ..runner.schedule import Schedule
-from ..scenes import of_garment
-from ..tasks.sequence import SimulateSequence
-from ..tasks.task import Outcome
+from benchmarks import provenance
+from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.methods import METHODS
+from benchmarks.plan.make_plan import WORKERS, choose_body, choose_garment, choose_states, split
+from benchmarks.plan.motion_roles import FEWEST
+from benchmarks.plan.plan import Motions, Plan, PlanError
+from benchmarks.presets import find_preset
+from benchmarks.registry import by_name
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.lock import held
+from benchmarks.runner.loop import NoLog, Runner
+from benchmarks.runner.schedule import Schedule
+from benchmarks.runner.whole_run import executor_of
+from benchmarks.scenes import of_garment
+from benchmarks.tasks.sequence import SimulateSequence
+from benchmarks.tasks.task import Outcome
+from snug.garments.options import demand_a_file, is_file_name
+from snug.motion.options import reading_of
+from snug.recipes.recipe import DEFAULT
+from snug.training.simulated_data import INDEX, DataSet, SimulatedSequence, settings_of
 
 if TYPE_CHECKING:
-    from snug.motion import Motion
+    from snug.motion.motion import Motion
 
 LONGEST = 1_000_000  # frames of a sequence
 
@@ -95,7 +94,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
         find_preset("quick"), garment_vertices=options.vertices, frames=LONGEST, settle_frames=options.settle
     )
     if options.scheduler:
-        from ..runner.cluster import check_scheduler
+        from benchmarks.runner.cluster import check_scheduler
 
         check_scheduler(options.scheduler)
     rest = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
@@ -113,9 +112,9 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
 
 def choose_motions(options: argparse.Namespace, *, dynamic: bool) -> dict[str, Motion]:
     """Name -> motion of each sequence. Raises ValueError for names that come twice, and for none."""
-    from snug import motion_library as library
-    from snug.motion_augmentation import FRAMES, SHARED_SEED, mixed_motions
-    from snug.motion_files import load_motions
+    from snug.motion import library
+    from snug.motion.files import load_motions
+    from snug.training.motion_augmentation import FRAMES, SHARED_SEED, mixed_motions
 
     reading, given = reading_of(options), list[Any]()
     for path in options.motions or ["library"]:

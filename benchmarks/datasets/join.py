@@ -6,12 +6,11 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from snug.dataset import MISSING, DataSet, SimulatedSequence
-
-from ..merge import MergeError, check_entries, copied
-from ..results import RunFolder
-from ..runner.cache import read_entry
-from ..tasks.sequence import SimulateSequence
+from benchmarks.merge import MergeError, check_entries, copied
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import read_entry
+from benchmarks.tasks.sequence import SimulateSequence
+from snug.training.simulated_data import MISSING, DataSet, SimulatedSequence
 
 
 def merge(paths: Sequence[Path], out: Path) -> DataSet:
@@ -30,7 +29,7 @@ def merge(paths: Sequence[Path], out: Path) -> DataSet:
                 raise MergeError(f"sequence {line.name}: other bytes in {found.folder} than in {where}")
     commands = dict.fromkeys(command for found in sets for command in found.commands)
     lines = tuple(line for line, _ in taken.values())
-    from reference_sim.whole_file import new_folder
+    from reference_sim.files.atomic_files import new_folder
 
     with new_folder(out) as part:
         for line, source in taken.values():

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from ..method import MethodEntry
-from ..registry import by_name
-from .equal_data import EQUAL_DATA
-from .learned import LEARNED, RECIPE_DEVIATIONS, network
-from .solvers import SOLVERS
+from benchmarks.method import MethodEntry
+from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
+from benchmarks.methods.catalogue.learned import LEARNED, RECIPE_DEVIATIONS, network
+from benchmarks.methods.catalogue.solvers import SOLVERS
+from benchmarks.registry import by_name
 
 METHODS = (
     MethodEntry(
         name="simulation",
         label="Simulation",
         description="the reference: backward Euler minimised to tolerance 1e-6",
-        module="benchmarks.methods.simulation",
+        module="benchmarks.methods.solvers.simulation",
         role="reference",
         conserving=True,
     ),
@@ -21,7 +21,7 @@ METHODS = (
         name="skinning",
         label="Skinning alone",
         description="the garment follows the body's joints, nothing else: the free baseline",
-        module="benchmarks.methods.skinning",
+        module="benchmarks.methods.networks.skinning",
         needs_body=True,
         dtype="float32",
         gives_first_frame=True,

@@ -7,55 +7,56 @@ from dataclasses import replace
 from functools import cache
 from types import ModuleType
 
-from ..metric import Metric
-from ..registry import DeclarationError, by_name, load
+from benchmarks.metric import Metric
+from benchmarks.registry import DeclarationError, by_name, load
 
-MODULES = (
-    "energy",
-    "printed_bending",
-    "excess",
-    "curvature",
-    "shape",
-    "geometry",
-    "body",
-    "optimality",
-    "solver",
-    "exact",
-    "dynamics",
-    "training_distance",
-    "conservation",
-    "time_error",
-    "cost",
-)
-WHERE_NAMED = (
-    "extrapolation",
-    "roll_out",
-    "mesh",
-    "body_shape",
-    "training",
-)  # measured only in scenes that name them
+MODULES = {
+    "energy": "benchmarks.metrics.energies.energy",
+    "printed_bending": "benchmarks.metrics.energies.printed_bending",
+    "excess": "benchmarks.metrics.energies.excess",
+    "curvature": "benchmarks.metrics.surface.curvature",
+    "shape": "benchmarks.metrics.surface.rest_shape",
+    "geometry": "benchmarks.metrics.surface.distances",
+    "body": "benchmarks.metrics.surface.body_intersections",
+    "optimality": "benchmarks.metrics.energies.energy_gap",
+    "solver": "benchmarks.metrics.cost.solver",
+    "exact": "benchmarks.metrics.motion.exact_answer",
+    "dynamics": "benchmarks.metrics.motion.dynamics",
+    "training_distance": "benchmarks.metrics.cost.training_distance",
+    "conservation": "benchmarks.metrics.motion.conservation",
+    "time_error": "benchmarks.metrics.motion.time_step_error",
+    "cost": "benchmarks.metrics.cost.cost",
+}
+WHERE_NAMED = {
+    "extrapolation": "benchmarks.metrics.motion.extrapolation",
+    "roll_out": "benchmarks.metrics.motion.long_roll_out",
+    "mesh": "benchmarks.metrics.surface.mesh_size",
+    "body_shape": "benchmarks.metrics.surface.body_shape",
+    "training": "benchmarks.metrics.cost.training",
+}  # measured only in scenes that name them
+MODULE_OF = MODULES | WHERE_NAMED
 
 
 def names_of(chosen: Sequence[str] | None) -> tuple[str, ...]:
     """The modules that a scene measures, from what it declares."""
-    return MODULES if chosen is None else tuple(name for name in (*MODULES, *WHERE_NAMED) if name in chosen)
+    return tuple(MODULES) if chosen is None else tuple(name for name in MODULE_OF if name in chosen)
 
 
 @cache
 def modules() -> dict[str, ModuleType]:
     """Name -> module, of all there are; loads them."""
-    return {name: load(f"{__name__}.{name}") for name in (*MODULES, *WHERE_NAMED)}
+    return {name: load(module) for name, module in MODULE_OF.items()}
 
 
 @cache
 def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
     """Name -> metric, of all modules, of microbenchmarks, and of modules outside. Raises DeclarationError."""
-    from ..performance.metrics import METRICS
+    from benchmarks.performance.metrics import METRICS
 
     own: list[Metric] = []
     for name, module in modules().items():
         if not hasattr(module, "METRICS"):
-            raise DeclarationError(f"benchmarks.metrics.{name} declares no METRICS, a tuple of Metric")
+            raise DeclarationError(f"{MODULE_OF[name]} declares no METRICS, a tuple of Metric")
         own += module.METRICS
     others = [replace(metric, declared_in=home) for home in outside for metric in load(home).METRICS]
     return by_name("metric", (*own, *METRICS, *others))

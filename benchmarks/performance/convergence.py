@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from ..results import replacing
-from .learning import dressed_body, training_motions
-from .microbenchmark import Settings
-from .training_step import PAPER_STEPS
+from benchmarks.performance.learning import dressed_body, training_motions
+from benchmarks.performance.microbenchmark import Settings
+from benchmarks.performance.training_step import PAPER_STEPS
+from benchmarks.results.run_folder import replacing
 
 HELD_OUT = "lunge"  # the training motion that is rolled out
 POINTS = 60  # of the curve
@@ -26,9 +26,9 @@ COLUMNS = ("step", "seconds", "loss", "validation", "strain", "bending", "gravit
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Train; when the value on the held-out motion came close to its last one, and for good."""
-    from snug.training import train
-    from snug.training_run import Saving
-    from snug.validation import Validation
+    from snug.training.run import Saving
+    from snug.training.train import train
+    from snug.training.validation import Validation
 
     curve_path, path = settings.files
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -6,15 +6,14 @@ import dataclasses
 
 import numpy as np
 
-from snug.garment_kinds import TSHIRT
-
-from ..assets import embedded_motions, open_assets
-from ..methods.simulation import Simulation
-from ..metrics.geometry import DEEP, penetration
-from ..request.presets import find_preset
-from ..scene import BuiltScene
-from ..scenes import of_garment
-from .microbenchmark import Settings
+from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.methods.solvers.simulation import Simulation
+from benchmarks.metrics.surface.distances import DEEP, penetration
+from benchmarks.performance.microbenchmark import Settings
+from benchmarks.presets import find_preset
+from benchmarks.scene import BuiltScene
+from benchmarks.scenes import of_garment
+from snug.garments.templates import TSHIRT
 
 FRAMES = 60
 

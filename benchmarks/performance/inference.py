@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .learning import dressed_body, training_motions
-from .microbenchmark import Settings
+from benchmarks.performance.learning import dressed_body, training_motions
+from benchmarks.performance.microbenchmark import Settings
 
 if TYPE_CHECKING:
-    from snug.dressed_body import DressedBody
-    from snug.motion import Motion
-    from snug.trained_model import TrainedModel
+    from snug.motion.motion import Motion
+    from snug.networks.dressed_body import DressedBody
+    from snug.networks.trained_model import TrainedModel
 
 
 SWEPT = 48  # [MB] of other work between two cold frames: a solver, and what lies in the caches of a large CPU
@@ -28,7 +28,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Median, 95 % and least time over all frames of roll-outs, and the median of a cold one; memory and file
     of the network.
     """
-    from snug.training import untrained_model
+    from snug.training.train import untrained_model
 
     chosen = settings.chosen
     dressed, motions = dressed_body(vertices), training_motions()
@@ -58,7 +58,7 @@ def _frame_seconds(
 
     swept: [MB] read and written before each frame, off the clock.
     """
-    from snug.rollout import predictions
+    from snug.networks.roll_out import predictions
 
     other = np.zeros(swept * 125_000)
     frames, seconds = predictions(model, dressed, motion)(), []

@@ -13,12 +13,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.performance.microbenchmark import Settings
+from benchmarks.scenes.sheet import square_sheet
 from reference_sim import Cloth, Material, Potential, simulate
 from reference_sim.energies import Energy, Gravity, StretchStVK
 from reference_sim.minimise import minimise
-
-from ..scenes.sheet import square_sheet
-from .microbenchmark import Settings
 
 CELLS, FRAMES = 14, 20
 STATIC = 1e6  # [s]: inertia of such a step is below round-off
@@ -52,10 +51,9 @@ def _sheet() -> Cloth:
 
 
 def _body() -> tuple[Run, Run]:
+    from benchmarks.scenes.sheet_on_sphere import sphere
     from reference_sim import Obstacle
     from reference_sim.energies import ContactPenalty
-
-    from ..scenes.sheet_on_sphere import sphere
 
     cloth, (points, faces) = _sheet(), sphere(0.1, 24)
     far = Obstacle(points + np.array([5.0, 0.0, 0.0]), faces)

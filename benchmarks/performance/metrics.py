@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..metric import Metric
-from .microbenchmark import SUITE
+from benchmarks.metric import Metric
+from benchmarks.performance.microbenchmark import SUITE
 
 PROCESS_MEMORY = f"{SUITE}/process_memory"
 

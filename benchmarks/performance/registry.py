@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .microbenchmark import Microbenchmark
+from benchmarks.performance.microbenchmark import Microbenchmark
 
 _HERE = "benchmarks.performance"
 

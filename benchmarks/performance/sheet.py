@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.performance.microbenchmark import Settings
+from benchmarks.process.memory import peak_memory
 from reference_sim import Cloth, Material, Result
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 from reference_sim.stepper import State, Stepper
-
-from ..runner.memory import peak_memory
-from .microbenchmark import Settings
 
 FRAMES = 30
 NEWTON = {"method": "newton"}

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..request.presets import find_preset
-from .learning import dressed_body, training_motions
-from .microbenchmark import Settings
+from benchmarks.performance.learning import dressed_body, training_motions
+from benchmarks.performance.microbenchmark import Settings
+from benchmarks.presets import find_preset
 
 if TYPE_CHECKING:
-    from snug.trainer import Trainer
+    from snug.training.trainer import Trainer
 
 WARM_UP, BLOCK = 20, 20  # steps before the clock starts, and of each block that is timed
 PAPER_STEPS = find_preset("paper").steps_of("snug", "snug")
@@ -27,8 +27,8 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Median and least time of a step over blocks, and the medians of its parts."""
     import torch
 
-    from snug.device import find_device
-    from snug.trainer import Trainer
+    from snug.training.device import find_device
+    from snug.training.trainer import Trainer
 
     chosen, device = settings.chosen, find_device(settings.device)
     dressed, motions = dressed_body(vertices), training_motions()

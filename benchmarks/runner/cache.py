@@ -16,10 +16,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from ..json_file import ResultsError, read_json
-from ..results import FORMAT, RunFolder, digest_of_file, replacing
-from ..tasks.task import Outcome, Task, TaskId
-from .source import code_of, data_of, digest, packages_of
+from benchmarks.results.json_file import ResultsError, read_json
+from benchmarks.results.run_folder import FORMAT, RunFolder, digest_of_file, replacing
+from benchmarks.runner.source import code_of, data_of, digest, packages_of
+from benchmarks.tasks.task import Outcome, Task, TaskId
 
 STATES = ("finished", "failed", "stale", "missing")
 DEFAULT_ONLY = ("stale", "missing")

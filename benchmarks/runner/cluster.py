@@ -21,14 +21,14 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
-from ..assets import Assets
-from ..results import RunFolder, digest_of_file, replacing
-from ..tasks.task import Outcome, RunStopped, Task, TaskId, failure, one_line
-from . import cluster_worker
-from .cache import damaged
-from .cluster_worker import ASSETS, PIECE, Gone, Unfit
-from .executor import POLL, Done, LocalExecutor, Needed, Ready
-from .source import digest
+from benchmarks.assets.assets import Assets
+from benchmarks.results.run_folder import RunFolder, digest_of_file, replacing
+from benchmarks.runner import cluster_worker
+from benchmarks.runner.cache import damaged
+from benchmarks.runner.cluster_worker import ASSETS, PIECE, Gone, Unfit
+from benchmarks.runner.local_executor import POLL, Done, LocalExecutor, Needed, Ready
+from benchmarks.runner.source import digest
+from benchmarks.tasks.task import Outcome, RunStopped, Task, TaskId, failure, one_line
 
 ATTEMPTS = 3  # workers that may die of a task
 LOOK = 2.0  # [s] between looks at which workers there are and how far they are

@@ -19,13 +19,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import provenance
-from ..results import RunFolder, digest_of_file
-from ..tasks.cell import CellTask
-from ..tasks.task import Context, Outcome, Task, failure, one_line
-from ..timing import one_thread
-from .cache import software
-from .executor import TaskProcess, begin_tasks
+from benchmarks import provenance
+from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.runner.cache import software
+from benchmarks.runner.local_executor import TaskProcess, begin_tasks
+from benchmarks.tasks.cell_task import CellTask
+from benchmarks.tasks.task import Context, Outcome, Task, failure, one_line
+from benchmarks.timing import one_thread
 
 PIECE = 8 << 20  # bytes of a file at a time
 WATCH = 1.0  # [s] between looks at what nobody wants any more

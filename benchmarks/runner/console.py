@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..results import USABLE, Row
-from ..rows import DECLARED, NOT_FALLING, SPREAD
+from benchmarks.results.run_folder import USABLE, Row
+from benchmarks.rows import DECLARED, NOT_FALLING, SPREAD
 
 COLUMNS = (
     ("energy/total", "total J"),

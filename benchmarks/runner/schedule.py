@@ -10,27 +10,26 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
 
-from snug.recipes import TRAININGS, Simulated
-
-from ..method import MethodEntry
-from ..methods import find_method
-from ..metric import COMPARED_WITH
-from ..metrics import names_of
-from ..performance.microbenchmark import Microbenchmark, Settings
-from ..request.plan import Network, Plan, network_of, runs
-from ..scene import Scene
-from ..scenes import find_scene, of_garment
-from ..tasks.case import RunCase
-from ..tasks.cell import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
-from ..tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
-from ..tasks.metrics import MeasureCell
-from ..tasks.microbenchmark import RunMicrobenchmark
-from ..tasks.task import Task
-from ..tasks.training import LONGEST, TrainNetwork
-from ..tasks.training_windows import SUITE, CompareWindows
-from .cache import dependencies
-from .source import digest, find_module
-from .task_inputs import ASSETS, TaskInputs, declared, modules_behind, modules_of
+from benchmarks.method import MethodEntry
+from benchmarks.methods import find_method
+from benchmarks.metric import COMPARED_WITH
+from benchmarks.metrics import MODULE_OF, names_of
+from benchmarks.performance.microbenchmark import Microbenchmark, Settings
+from benchmarks.plan.plan import Network, Plan, network_of, runs
+from benchmarks.runner.cache import dependencies
+from benchmarks.runner.source import digest, find_module
+from benchmarks.runner.task_inputs import ASSETS, TaskInputs, declared, modules_behind, modules_of
+from benchmarks.scene import Scene
+from benchmarks.scenes import find_scene, of_garment
+from benchmarks.tasks.case import RunCase
+from benchmarks.tasks.cell_task import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
+from benchmarks.tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
+from benchmarks.tasks.metric_task import MeasureCell
+from benchmarks.tasks.microbenchmark import RunMicrobenchmark
+from benchmarks.tasks.task import Task
+from benchmarks.tasks.training import LONGEST, TrainNetwork
+from benchmarks.tasks.training_windows import SUITE, CompareWindows
+from snug.recipes.named import TRAININGS, Simulated
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 TASKS = "benchmarks.tasks"
@@ -163,7 +162,7 @@ class Schedule:
                 )
 
     def cell(self, cell: Cell) -> RunCell:
-        of_scene = self.inputs.of_scene(cell.scene, f"{TASKS}.cell", *modules_behind(cell.entry))
+        of_scene = self.inputs.of_scene(cell.scene, f"{TASKS}.cell_task", *modules_behind(cell.entry))
         inputs = of_scene["inputs"] | {"method": declared(cell.entry)}
         if cell.timed:
             inputs["least"] = self._least(cell)
@@ -184,7 +183,7 @@ class Schedule:
         first = self.cell(cell)
         return kind(
             name=name, label=cell.label, cell=cell, inputs={"least": first.least},
-            modules=(f"{TASKS}.cell",), needs=(first.id,),
+            modules=(f"{TASKS}.cell_task",), needs=(first.id,),
             process=first.process, deadline=first.deadline, least=first.least, **fields,
         )  # fmt: skip
 
@@ -217,8 +216,8 @@ class Schedule:
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, ("cell", counterpart.name))
         names = names_of(scene.metrics)
-        modules = [f"benchmarks.metrics.{name}" for name in names] + list(plan.metrics)
-        of_scene = self.inputs.of_scene(scene, f"{TASKS}.metrics", *modules)
+        modules = [MODULE_OF[name] for name in names] + list(plan.metrics)
+        of_scene = self.inputs.of_scene(scene, f"{TASKS}.metric_task", *modules)
         inputs = {
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,

@@ -23,8 +23,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from ..registry import DeclarationError
-from ..results import digest_of_file
+from benchmarks.registry import DeclarationError
+from benchmarks.results.run_folder import digest_of_file
 
 ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
 ROOT = Path(__file__).resolve().parents[2]

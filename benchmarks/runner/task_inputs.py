@@ -8,16 +8,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from snug.recipe import TERMS
+from benchmarks import provenance
+from benchmarks.method import MethodEntry
+from benchmarks.plan.plan import Plan
+from benchmarks.results.run_folder import digest_of_file
+from benchmarks.runner.source import digest
+from benchmarks.scene import Scene
+from snug.recipes.recipe import TERMS
 
-from .. import provenance
-from ..method import MethodEntry
-from ..request.plan import Plan
-from ..results import digest_of_file
-from ..scene import Scene
-from .source import digest
-
-ASSETS = "benchmarks.assets"
+ASSETS = "benchmarks.assets.assets"
 
 
 class TaskInputs:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from ..registry import DeclarationError, by_name
-from ..request.presets import PRESETS
-from ..scene import Scene
-from .further import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
+from benchmarks.presets import PRESETS
+from benchmarks.registry import DeclarationError, by_name
+from benchmarks.scene import Scene
+from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 
 SHEET = ("sheet_cells", "sheet_frames")
 
@@ -67,7 +67,7 @@ def further_scenes(garment: str) -> tuple[Scene, ...]:
 
 @dataclass(frozen=True)
 class GarmentScenes:
-    """A garment of snug.garments: its scenes are "<garment>/<motion>", and "<garment>/<motion>@clip".
+    """A garment of snug.garments.garment: its scenes are "<garment>/<motion>", and "<garment>/<motion>@clip".
 
     dynamic: whether its motions are those that stop within a frame, instead of the run's own.
     """

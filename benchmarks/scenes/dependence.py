@@ -9,15 +9,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from snug.garment_kinds import find_template
-from snug.motion_library import make_motion
-
-from ..scene import BuiltScene, Scene
-from . import dressed_body
+from benchmarks.scene import BuiltScene, Scene
+from benchmarks.scenes import dressed_body
+from snug.garments.templates import find_template
+from snug.motion.library import make_motion
 
 if TYPE_CHECKING:
-    from ..assets import Assets
-    from ..request.presets import Dependence
+    from benchmarks.assets.assets import Assets
+    from benchmarks.presets import Dependence
 
 WARM_UP = 2  # it starts at rest, and few frames are simulated
 

@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.assets.assets import Assets
+from benchmarks.scene import BuiltScene, Dressed, Scene
 from reference_sim import Cloth, Obstacle, Trajectory, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
-from snug.garments import Garment
-from snug.motion import Motion
-
-from ..assets import Assets
-from ..scene import BuiltScene, Dressed, Scene
+from snug.garments.garment import Garment
+from snug.motion.motion import Motion
 
 if TYPE_CHECKING:
-    from snug.body import Body
+    from snug.body.parametric_body import Body
 
 HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
 SHORT = 0.25  # share of a motion's frames that is left out at most
@@ -96,7 +95,7 @@ def settled(
 
     Raises RuntimeError when the simulation of the approach did not stay finite.
     """
-    from snug.motion import transition
+    from snug.motion.motion import transition
 
     body = assets.body
     first = motion.poses[0]

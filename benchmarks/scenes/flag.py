@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.scene import BuiltScene, Scene
+from benchmarks.scenes.sheet import square_sheet
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-
-from ..scene import BuiltScene, Scene
-from .sheet import square_sheet
 
 SIZE = 0.4  # [m]
 SWING = 0.15  # [m] to either side

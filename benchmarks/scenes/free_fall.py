@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.scene import BuiltScene, Scene
+from benchmarks.scenes.sheet import square_sheet
 from reference_sim import Cloth, Material
 from reference_sim.energies import Gravity
 from reference_sim.material import GRAVITY
-
-from ..scene import BuiltScene, Scene
-from .sheet import square_sheet
 
 VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s]
 

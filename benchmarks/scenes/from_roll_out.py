@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.external.roll_out_files import StoredRollOut, read_roll_out
+from benchmarks.external.roll_out_option import RollOutError, RollOutOption, digest_of
+from benchmarks.scene import BuiltScene, Scene
 from reference_sim import Cloth, Material, MeshError, Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
-from reference_sim.mesh_io import METRES, read_mesh, to_metres_y_up
-
-from ..roll_outs.files import StoredRollOut, read_roll_out
-from ..roll_outs.option import RollOutError, RollOutOption, digest_of
-from ..scene import BuiltScene, Scene
+from reference_sim.files.mesh_files import METRES, read_mesh, to_metres_y_up
 
 FPS = 30.0  # where neither the file nor the user says another rate
 LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn

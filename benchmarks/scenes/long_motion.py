@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.scene import BuiltScene, Dressed, Scene
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from snug.motion import Motion, transition
-from snug.motion_library import make_motion
-
-from ..scene import BuiltScene, Dressed, Scene
+from snug.motion.library import make_motion
+from snug.motion.motion import Motion, transition
 
 if TYPE_CHECKING:
-    from ..assets import Assets
+    from benchmarks.assets.assets import Assets
 
 FRAMES, ENDS = 1000, 100  # there and back: at least so many in all, and at either end
 LOOP_BLEND = 10  # frames from a loop's end to its start

@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.scene import BuiltScene, Dressed, Scene
+from benchmarks.scenes.dressed_body import declared_energies, settled, shape_of
 from reference_sim import Obstacle
-from snug.motion import Motion, transition
-from snug.motion_library import make_motion
-from snug.skeleton import JOINT, axis_angles, rotation_matrices
-
-from ..scene import BuiltScene, Dressed, Scene
-from .dressed_body import declared_energies, settled, shape_of
+from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.motion.library import make_motion
+from snug.motion.motion import Motion, transition
 
 if TYPE_CHECKING:
-    from ..assets import Assets
+    from benchmarks.assets.assets import Assets
 
 ORDINARY = 44  # frames of the walk that the others are compared with
 APPROACH = 12  # frames from the walk's first pose to another

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.scene import BuiltScene, Scene
+from benchmarks.scenes.sheet import square_sheet
+from benchmarks.validation.meshes import in_space, rectangle
 from reference_sim import Cloth, Material, Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
-
-from ..scene import BuiltScene, Scene
-from ..validation.meshes import in_space, rectangle
-from .sheet import square_sheet
 
 RADIUS = 0.12  # [m]
 SIZE = 0.5  # [m]

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.scene import BuiltScene, Scene
+from benchmarks.scenes.sheet import sheet
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-
-from ..scene import BuiltScene, Scene
-from .sheet import sheet
 
 LENGTH, WIDTH = 0.4, 0.12  # [m]
 TURN = np.pi  # of each end, against the other

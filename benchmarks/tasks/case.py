@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..results import Row
-from .task import Context, Outcome, Task, TaskId
+from benchmarks.results.run_folder import Row
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
-    from ..validation.case import Case
+    from benchmarks.validation.case import Case
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..method import MethodEntry
-from ..results import RunFolder, replacing
-from ..scene import BuiltScene, Scene
-from .cell import built
-from .task import Context, Outcome, Task, TaskId
+from benchmarks.method import MethodEntry
+from benchmarks.results.run_folder import RunFolder, replacing
+from benchmarks.scene import BuiltScene, Scene
+from benchmarks.tasks.cell_task import built
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
     import numpy as np
 
     from reference_sim import Trajectory
-    from snug.motion import Motion
+    from snug.motion.motion import Motion
 
 # With this time step [s] and no velocities inertia weighs a thousandth of what it weighs in a frame: a hem
 # that swings once in a second comes within 3 % of its static place, and there is still one minimum to go to.
@@ -40,7 +40,7 @@ class SettleStart(Task):
             path.unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        from reference_sim.array_file import read_array, write_array
+        from reference_sim.files.array_file import read_array, write_array
 
         scene, run, shared = self.scene.build(context.assets), context.folder, self.scene.start_of
         assert scene.obstacle is not None
@@ -115,7 +115,7 @@ class SimulateClips(Task):
 
     scene: that of any motion in the garment; entry: the method that simulates; motions: those that are mixed.
     clips: a name of all of them; part: number of these: those that `part` + 1 mixed frames for each given one
-    have, and `part` have not; swinging: see snug.recipes.Simulated. Only clips that are whole and converged
+    have, and `part` have not; swinging: see snug.recipes.named.Simulated. Only clips that are whole and converged
     are kept, and taught.
     """
 
@@ -133,7 +133,7 @@ class SimulateClips(Task):
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import numpy as np
 
-        from snug.motion_augmentation import shared_clips
+        from snug.training.motion_augmentation import shared_clips
 
         assets, run, garment = context.assets, context.folder, self.scene.garment
         assert assets is not None

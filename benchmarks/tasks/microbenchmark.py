@@ -8,14 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..method import MethodEntry
-from ..performance.microbenchmark import SUITE, Settings
-from ..results import Row, RunFolder
-from ..runner.memory import peak_memory
-from .task import Context, Outcome, Task, TaskId, failure
+from benchmarks.method import MethodEntry
+from benchmarks.performance.microbenchmark import SUITE, Settings
+from benchmarks.process.memory import peak_memory
+from benchmarks.results.run_folder import Row, RunFolder
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId, failure
 
 if TYPE_CHECKING:
-    from ..performance.microbenchmark import Microbenchmark
+    from benchmarks.performance.microbenchmark import Microbenchmark
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,7 +34,7 @@ class RunMicrobenchmark(Task):
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """Measure. A failure has the memory of its process too."""
-        from ..performance.metrics import PROCESS_MEMORY
+        from benchmarks.performance.metrics import PROCESS_MEMORY
 
         files = self.benchmark.files
         settings = dataclasses.replace(
@@ -48,7 +48,7 @@ class RunMicrobenchmark(Task):
 
     def rows(self, outcome: Outcome) -> list[Row]:
         """One for each number; where the process died, one that says so."""
-        from ..performance.metrics import PROCESS_MEMORY
+        from benchmarks.performance.metrics import PROCESS_MEMORY
 
         benchmark, entry = self.benchmark, self.entry
         base = Row(

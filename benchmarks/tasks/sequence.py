@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from .ground_truth import SimulateMotion
-from .task import Context, Outcome, TaskId
+from benchmarks.tasks.ground_truth import SimulateMotion
+from benchmarks.tasks.task import Context, Outcome, TaskId
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -17,8 +17,8 @@ class SimulateSequence(SimulateMotion):
     stage = "sequences"
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        from reference_sim.trajectory import Trajectory
-        from snug.dataset import write_motion, write_vertices
+        from reference_sim.trajectory.trajectory import Trajectory
+        from snug.training.simulated_data import write_motion, write_vertices
 
         outcome, folder, assets = super().run(context, needed), context.folder, context.assets
         assert assets is not None

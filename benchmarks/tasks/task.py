@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..runner.process import WorkerDied
+from benchmarks.process.isolated_process import WorkerDied
 
 if TYPE_CHECKING:
-    from ..assets import Assets
-    from ..results import Row, RunFolder
+    from benchmarks.assets.assets import Assets
+    from benchmarks.results.run_folder import Row, RunFolder
 
 TaskId = tuple[str, str]  # kind and name
 
@@ -136,7 +136,7 @@ def failure(error: BaseException) -> Outcome:
     """The outcome of a task that raised, or whose process died. torch's allocator on a CPU raises a plain
     RuntimeError. Raises RunStopped for what is no fault of the task.
     """
-    from reference_sim.whole_file import disk_full
+    from reference_sim.files.atomic_files import disk_full
 
     if isinstance(error, RunStopped):
         raise error

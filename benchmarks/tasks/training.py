@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..registry import load
-from ..results import RunFolder, model_path
-from ..runner.source import digest
-from .task import Context, Outcome, Task, TaskId
+from benchmarks.registry import load
+from benchmarks.results.run_folder import RunFolder, model_path
+from benchmarks.runner.source import digest
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from snug.motion import Motion
-    from snug.recipes import Training
-
-    from ..assets import Assets
+    from benchmarks.assets.assets import Assets
+    from snug.motion.motion import Motion
+    from snug.recipes.named import Training
 
 LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
 VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
@@ -64,11 +63,11 @@ class TrainNetwork(Task):
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import torch
 
-        from reference_sim.trajectory import Trajectory
-        from snug.dressed_body import DressedBody
-        from snug.training import train, untrained_model
-        from snug.training_run import Saving
-        from snug.validation import Validation
+        from reference_sim.trajectory.trajectory import Trajectory
+        from snug.networks.dressed_body import DressedBody
+        from snug.training.run import Saving
+        from snug.training.train import train, untrained_model
+        from snug.training.validation import Validation
 
         torch.set_num_threads(1)
         if self.home:
@@ -132,8 +131,8 @@ class TrainNetwork(Task):
         self, assets: Assets, folder: RunFolder, needed: Mapping[TaskId, Outcome]
     ) -> tuple[list[Motion], dict[str, np.ndarray]]:
         """The mixed clips that were simulated, and their vertices by name."""
-        from reference_sim.array_file import read_arrays
-        from snug.motion_augmentation import shared_clips
+        from reference_sim.files.array_file import read_arrays
+        from snug.training.motion_augmentation import shared_clips
 
         found: dict[str, np.ndarray] = {}
         for id in self.clips:

@@ -14,20 +14,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from snug.recipe import DEFAULT
-
-from ..method import MethodEntry
-from ..registry import load
-from ..results import Row
-from .task import Context, Outcome, Task, TaskId, one_line
-from .training import TrainNetwork
+from benchmarks.method import MethodEntry
+from benchmarks.registry import load
+from benchmarks.results.run_folder import Row
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId, one_line
+from benchmarks.tasks.training import TrainNetwork
+from snug.recipes.recipe import DEFAULT
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from snug.dressed_body import DressedBody
-    from snug.trained_model import TrainedModel
-    from snug.training_set import Batch
+    from snug.networks.dressed_body import DressedBody
+    from snug.networks.trained_model import TrainedModel
+    from snug.training.training_set import Batch
 
 SUITE, SCENE = "garments", "training"
 STRIDE = 18  # frames from one window that is looked at to the next: the searches for contact take the time
@@ -44,9 +43,9 @@ class CompareWindows(Task):
     entry: MethodEntry
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        from snug.dressed_body import DressedBody
-        from snug.trained_model import TrainedModel, find_kind
-        from snug.training_set import TrainingError
+        from snug.networks.dressed_body import DressedBody
+        from snug.networks.trained_model import TrainedModel, find_kind
+        from snug.training.training_set import TrainingError
 
         training, assets = self.training, context.assets
         assert assets is not None
@@ -96,8 +95,8 @@ def both_losses(model: TrainedModel, dressed: DressedBody, motions: Sequence[Any
     import numpy as np
     import torch
 
-    from snug.skinning import skin
-    from snug.trainer import Trainer
+    from snug.body.skinning import skin
+    from snug.training.trainer import Trainer
 
     # Mixed motions, and bodies of other shapes, are no motions that were given.
     window = model.recipe.window

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..results import Row
+from benchmarks.results.run_folder import Row
 
 METHOD = "simulation"
 

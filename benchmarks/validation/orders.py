@@ -2,40 +2,40 @@
 
 from __future__ import annotations
 
-from .case import known_answer
+from benchmarks.validation.case import known_answer
 
 ORDERS = (
     known_answer("manufactured_order",
         "order in h of positions (L2) for a manufactured solution on jittered Delaunay meshes",
-        "manufactured_solution", "mean_square_order", expected=2.0, tolerance=0.2,
+        "membrane.manufactured_solution", "mean_square_order", expected=2.0, tolerance=0.2,
         reason="linear triangles; random meshes scatter the slope"),
     known_answer("manufactured_gradient_order",
         "order in h of the deformation gradient for the same solution",
-        "manufactured_solution", "gradient_order", expected=1.0, tolerance=0.1,
+        "membrane.manufactured_solution", "gradient_order", expected=1.0, tolerance=0.1,
         reason="linear triangles; random meshes scatter the slope"),
     known_answer("hanging_strip_order", "order in h of the tip of a hanging strip",
-        "statics", "hanging_strip_order", expected=2.0, tolerance=0.2,
+        "membrane.hanging_strip", "hanging_strip_order", expected=2.0, tolerance=0.2,
         reason="12, 24 and 48 cells are few"),
     known_answer("catenary_order", "order in h of the sag of an elastic catenary",
-        "statics", "catenary_order", expected=2.0, tolerance=0.1, reason="12, 24 and 48 cells are few"),
+        "membrane.hanging_strip", "catenary_order", expected=2.0, tolerance=0.1, reason="12, 24 and 48 cells are few"),
     known_answer("time_step_order", "order in dt of the place of an elastic pendulum after half a second",
-        "oscillators", "time_step_order", expected=1.0, tolerance=0.1,
+        "dynamics.oscillators", "time_step_order", expected=1.0, tolerance=0.1,
         reason="backward Euler; its second order still shows at 1/480 s"),
     known_answer("leaving_order", "order in dt of where a point leaves a sphere",
-        "round_bodies", "leaving_order", expected=1.0, tolerance=0.15,
+        "contact.round_bodies", "leaving_order", expected=1.0, tolerance=0.15,
         reason="backward Euler; the place is extrapolated from the force"),
     known_answer("membrane_time_step_order", "order in dt of a vibrating membrane, against its exact motion",
-        "time_steps", "membrane_order", expected=1.0, tolerance=0.1,
+        "dynamics.time_steps", "membrane_order", expected=1.0, tolerance=0.1,
         reason="backward Euler; its second order still shows at 1/3840 s"),
     known_answer("swing_time_step_order", "order in dt of a sheet that swings from its upper edge",
-        "time_steps", "swing_order", expected=1.0, tolerance=0.15,
+        "dynamics.time_steps", "swing_order", expected=1.0, tolerance=0.15,
         reason="backward Euler; faster vibrations still show at 1/1920 s"),
     known_answer("pressed_time_step_order", "order in dt of a taut sheet that a ball is pressed into",
-        "time_steps", "pressed_order", expected=1.0, tolerance=0.1,
+        "dynamics.time_steps", "pressed_order", expected=1.0, tolerance=0.1,
         reason="backward Euler; its second order still shows at 1/1200 s"),
     known_answer("viscous_time_step_order",
         "order in dt of a sheet held at two corners, wrinkled, with viscous edges",
-        "time_steps", "hanging_sheet_order", options={"viscous": True}, expected=1.0, tolerance=0.1,
+        "dynamics.time_steps", "hanging_sheet_order", options={"viscous": True}, expected=1.0, tolerance=0.1,
         reason="backward Euler; nothing swings too fast for the steps"),
     *(
         known_answer(f"curvature_{surface}_order", f"order in h of mean curvature on {words}, worst vertex",
@@ -51,12 +51,12 @@ ORDERS = (
 VALUES = (
     known_answer("hanging_strip_tip",
         "tip of a 1 m strip (lambda = 0) hanging by its top, against its exact curve",
-        "statics", "hanging_strip_tip", unit="m", tolerance=2e-6,
+        "membrane.hanging_strip", "hanging_strip_tip", unit="m", tolerance=2e-6,
         reason="second order in 1/24 of the length"),
     known_answer("catenary_sag", "sag of an elastic catenary, 1 m over a span of 0.8 m",
-        "statics", "catenary_sag", unit="m", tolerance=1e-4, reason="second order in 1/48 of the length"),
+        "membrane.hanging_strip", "catenary_sag", unit="m", tolerance=1e-4, reason="second order in 1/48 of the length"),
     known_answer("catenary_force", "horizontal force per width of the same",
-        "statics", "catenary_force", unit="N/m", tolerance=2e-4, reason="second order in 1/48 of the length"),
+        "membrane.hanging_strip", "catenary_force", unit="N/m", tolerance=2e-4, reason="second order in 1/48 of the length"),
     known_answer("curvature_sphere",
         "largest relative error of mean curvature on a sphere of 642 vertices",
         "curvature", "sphere_curvature", expected=0.0, tolerance=1e-4,
@@ -78,18 +78,18 @@ IRREGULAR = tuple(
 UNDAMPED = (
     known_answer("hanging_sheet_time_step_order",
         "order in dt of the same sheet as it is, without viscosity",
-        "time_steps", "hanging_sheet_order", options={"viscous": False},
+        "dynamics.time_steps", "hanging_sheet_order", options={"viscous": False},
         reason="reported: its vibrations are too fast for the steps, so the first order does not show"),
     known_answer("chord_time_step_distance",
         "distance of the sheet on the ball to one whose ball moves linearly between frames of 1/30 s",
-        "time_steps", "chord_distance", unit="m",
+        "dynamics.time_steps", "chord_distance", unit="m",
         reason="reported: sub-steps converge to the motion along chords, not to the smooth one"),
 )  # fmt: skip
 
 DEPENDENCE = tuple(
     known_answer(f"{kind}_dependence_{quantity}",
         f"mean {title} of a hanging cloth with {change}, over that without",
-        "dependence", f"{kind}_dependence", options={"quantity": quantity}, smoke=False,
+        "dynamics.mesh_and_time_step", f"{kind}_dependence", options={"quantity": quantity}, smoke=False,
         reason="reported: nobody should compare across meshes or time steps unawares")
     for kind, change in (("mesh", "cells half as wide"), ("time_step", "a quarter of the time step"))
     for quantity, title in (

@@ -5,8 +5,9 @@ The smallest preset runs those marked `smoke`. Known answers without a tolerance
 
 from __future__ import annotations
 
-from . import exact, orders, references, stress_tests
-from .case import Case
+from benchmarks.validation import exact, orders, references
+from benchmarks.validation.case import Case
+from benchmarks.validation.stress import cases as stress_tests
 
 KNOWN_ANSWERS: tuple[Case, ...] = (*exact.CASES, *orders.CASES, *references.CASES)
 STRESS_TESTS: tuple[Case, ...] = stress_tests.CASES

@@ -8,18 +8,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .area_barrier import AreaBarrier as AreaBarrier
-    from .barrier_friction import BarrierFriction as BarrierFriction
-    from .bend_hinge import BendHinge as BendHinge
-    from .contact_barrier import ContactBarrier as ContactBarrier
-    from .contact_friction import ContactFriction as ContactFriction
-    from .contact_penalty import ContactPenalty as ContactPenalty
-    from .energy import Energy as Energy
-    from .energy import Step as Step
-    from .gravity import Gravity as Gravity
-    from .inertia import Inertia as Inertia
-    from .stretch_spring import StretchSpring as StretchSpring
-    from .stretch_stvk import StretchStVK as StretchStVK
+    from reference_sim.energies.area_barrier import AreaBarrier as AreaBarrier
+    from reference_sim.energies.barrier_friction import BarrierFriction as BarrierFriction
+    from reference_sim.energies.bend_hinge import BendHinge as BendHinge
+    from reference_sim.energies.contact_barrier import ContactBarrier as ContactBarrier
+    from reference_sim.energies.contact_friction import ContactFriction as ContactFriction
+    from reference_sim.energies.contact_penalty import ContactPenalty as ContactPenalty
+    from reference_sim.energies.energy import Energy as Energy
+    from reference_sim.energies.energy import Step as Step
+    from reference_sim.energies.gravity import Gravity as Gravity
+    from reference_sim.energies.inertia import Inertia as Inertia
+    from reference_sim.energies.stretch_spring import StretchSpring as StretchSpring
+    from reference_sim.energies.stretch_stvk import StretchStVK as StretchStVK
 
 MODULE_OF = {
     "StretchStVK": "stretch_stvk",

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cloth import Cloth
-from ..kernel_cache import njit
-from .energy import Energy
+from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import Energy
+from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
     from torch import Tensor

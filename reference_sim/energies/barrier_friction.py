@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .contact_barrier import ContactBarrier
-from .energy import Energy, Step
+from reference_sim.energies.contact_barrier import ContactBarrier
+from reference_sim.energies.energy import Energy, Step
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

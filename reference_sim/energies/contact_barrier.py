@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cloth import Cloth
-from ..collisions import NO_OBSTACLE, Collisions
-from .energy import Energy, Step
+from reference_sim.cloth import Cloth
+from reference_sim.contact.collisions import NO_OBSTACLE, Collisions
+from reference_sim.energies.energy import Energy, Step
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

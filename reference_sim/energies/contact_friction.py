@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kernel_cache import njit
-from .contact_penalty import ContactPenalty
-from .energy import Energy, Step
+from reference_sim.energies.contact_penalty import ContactPenalty
+from reference_sim.energies.energy import Energy, Step
+from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from ..obstacle import Planes
+    from reference_sim.obstacle import Planes
 
 
 class ContactFriction(Energy):

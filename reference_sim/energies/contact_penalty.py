@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..cloth import Cloth
-from ..kernel_cache import njit
-from ..material import GRAVITY
-from .energy import Energy, Step
+from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import Energy, Step
+from reference_sim.kernels.kernel_cache import njit
+from reference_sim.material import GRAVITY
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from ..block_places import BlockPlaces
-    from ..obstacle import Planes
+    from reference_sim.kernels.block_indices import BlockPlaces
+    from reference_sim.obstacle import Planes
 
 DEFAULT_STIFFNESS = 3.4e6  # [J/m^5]: 2500 J/m^3 on a vertex of a T-shirt with 1000 vertices
 DEFAULT_MARGIN = 4e-3  # [m]

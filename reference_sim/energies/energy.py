@@ -1,7 +1,7 @@
 """What every physical term is: a definition in torch on one stencil, and its derivatives.
 
 A term states `element_energy` once, in torch. Gradient and Hessian follow from it by automatic
-differentiation; a term may override them with closed-form kernels in its own file. tests/test_derivatives.py
+differentiation; a term may override them with closed-form kernels in its own file. tests/reference_sim/energies/test_derivatives.py
 holds every override to the default. Torch is imported only where the definition is evaluated.
 """
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
     from torch import Tensor
 
-    from ..block_places import BlockPlaces
-    from ..cloth import Cloth
-    from ..obstacle import Obstacle
+    from reference_sim.cloth import Cloth
+    from reference_sim.kernels.block_indices import BlockPlaces
+    from reference_sim.obstacle import Obstacle
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cloth import Cloth
-from ..material import GRAVITY
-from .energy import Energy
+from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import Energy
+from reference_sim.material import GRAVITY
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cloth import Cloth
-from .energy import Energy, Step
+from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import Energy, Step
 
 if TYPE_CHECKING:
     from torch import Tensor

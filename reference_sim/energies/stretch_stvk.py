@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..block_places import BlockPlaces
-from ..cloth import Cloth
-from ..kernel_cache import njit
-from ..lanes import LANES, add_blocks
-from .energy import Energy
+from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import Energy
+from reference_sim.kernels.block_indices import BlockPlaces
+from reference_sim.kernels.kernel_cache import njit
+from reference_sim.kernels.lanes import LANES, add_blocks
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -5,10 +5,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..potential import Potential
-from .lbfgs import LBFGS
-from .newton import Newton
-from .result import STATUSES, Result
+from reference_sim.minimise.lbfgs import LBFGS
+from reference_sim.minimise.newton import Newton
+from reference_sim.minimise.result import STATUSES, Result
+from reference_sim.potential import Potential
 
 METHODS = {"newton": Newton, "lbfgs": LBFGS}
 

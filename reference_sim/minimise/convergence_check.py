@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .factorised import FactorisedDescent
-from .lbfgs_history import dot
-from .result import Result
+from reference_sim.minimise.factorised import FactorisedDescent
+from reference_sim.minimise.lbfgs_history import dot
+from reference_sim.minimise.result import Result
 
 POWER = 8  # inverse iterations for the direction of most negative curvature
 FIRST_ESCAPE = 100  # of the step tolerance: first length of the step along it

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..material import GRAVITY
-from ..potential import Potential
-from .lbfgs_history import LBFGSHistory, dot
-from .result import Result
+from reference_sim.material import GRAVITY
+from reference_sim.minimise.lbfgs_history import LBFGSHistory, dot
+from reference_sim.minimise.result import Result
+from reference_sim.potential import Potential
 
 SUFFICIENT_DECREASE = 1e-4
 HALVINGS = 24  # of a step before its direction is given up

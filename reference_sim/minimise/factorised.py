@@ -6,9 +6,9 @@ import time
 
 import numpy as np
 
-from ..linear_solver import analyse
-from ..potential import Potential
-from .descent import Descent, Observer, mean_weight
+from reference_sim.assembly.cholesky import analyse
+from reference_sim.minimise.descent import Descent, Observer, mean_weight
+from reference_sim.potential import Potential
 
 
 class FactorisedHessian:

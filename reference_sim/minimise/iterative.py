@@ -16,12 +16,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
-from ..linear_solver import analyse
-from ..potential import Potential
-from .descent import mean_weight
-from .factorised import FactorisedHessian
-from .lbfgs_history import dot
-from .scalar_preconditioner import ScalarPreconditioner
+from reference_sim.assembly.cholesky import analyse
+from reference_sim.minimise.descent import mean_weight
+from reference_sim.minimise.factorised import FactorisedHessian
+from reference_sim.minimise.lbfgs_history import dot
+from reference_sim.minimise.scalar_preconditioner import ScalarPreconditioner
+from reference_sim.potential import Potential
 
 LARGEST_FACTORISED = 200_000  # unknowns: from about here on a factorisation takes more than 2 s
 LARGEST_RESIDUAL = 0.03  # of a solve, as a share of its right-hand side
@@ -44,7 +44,9 @@ class IterativeHessian(FactorisedHessian):
         self._first, self._along_normals = indptr[:-1], analyse(indptr, rows, order)
 
     def assemble(self, x: np.ndarray, convexity: float) -> np.ndarray:
-        from ..surface import vertex_normals  # loads numba, which a command's --help can do without
+        from reference_sim.geometry.surface import (
+            vertex_normals,  # loads numba, which a command's --help can do without
+        )
 
         self._scalar_data = self._scalar.assemble(x)
         self._normals = vertex_normals(x, self._faces)[self._pattern.free]

@@ -20,16 +20,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..known_terms import has_kernels
-from ..potential import Potential
-from .descent import Descent, Observer
-from .lbfgs_history import LBFGSHistory
-from .newton import Newton
-from .result import Result, check_tolerance
-from .scalar_preconditioner import ScalarPreconditioner
+from reference_sim.energies.term_kinds import has_kernels
+from reference_sim.minimise.descent import Descent, Observer
+from reference_sim.minimise.lbfgs_history import LBFGSHistory
+from reference_sim.minimise.newton import Newton
+from reference_sim.minimise.result import Result, check_tolerance
+from reference_sim.minimise.scalar_preconditioner import ScalarPreconditioner
+from reference_sim.potential import Potential
 
 if TYPE_CHECKING:
-    from ..compiled.minimiser import CompiledLBFGS
+    from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
 
 SWITCH, COMPILED_SWITCH = 1.0, 0.1  # relative residuals
 LARGEST_COMPILED = 10_000  # vertices: from about here on a package's factorisation is faster
@@ -126,7 +126,9 @@ class LBFGS:
 
 
 def _compiled(potential: Potential, max_iterations: int, switch: float) -> CompiledLBFGS:
-    from ..compiled.minimiser import CompiledLBFGS  # its kernels are loaded only where they serve
+    from reference_sim.minimise.compiled.minimiser import (
+        CompiledLBFGS,  # its kernels are loaded only where they serve
+    )
 
     return CompiledLBFGS(potential, max_iterations=max_iterations, tolerance=switch)
 

@@ -44,7 +44,10 @@ class LBFGSHistory:
 
         solve applies the first guess of the inverse Hessian, which the pairs correct.
         """
-        from .two_loop import first_loop, second_loop  # loads numba, which a command's --help can do without
+        from reference_sim.minimise.two_loop import (  # loads numba, which a command's --help can do without
+            first_loop,
+            second_loop,
+        )
 
         q, alphas = -g, np.empty(len(self))
         order = np.arange(self._count - len(self), self._count) % max(self._memory, 1)  # oldest first

@@ -24,13 +24,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..potential import Potential
-from .convergence_check import convergence_check
-from .descent import Descent, Observer, approximate_wolfe, sufficient_decrease
-from .factorised import FactorisedDescent, FactorisedHessian
-from .iterative import LARGEST_FACTORISED, IterativeHessian
-from .lbfgs_history import LBFGSHistory, dot
-from .result import Result, check_tolerance
+from reference_sim.minimise.convergence_check import convergence_check
+from reference_sim.minimise.descent import Descent, Observer, approximate_wolfe, sufficient_decrease
+from reference_sim.minimise.factorised import FactorisedDescent, FactorisedHessian
+from reference_sim.minimise.iterative import LARGEST_FACTORISED, IterativeHessian
+from reference_sim.minimise.lbfgs_history import LBFGSHistory, dot
+from reference_sim.minimise.result import Result, check_tolerance
+from reference_sim.potential import Potential
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
 MAX_SHIFT = 1e12  # beyond it a step is shorter than round-off

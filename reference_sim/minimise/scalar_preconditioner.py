@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..linear_solver import analyse
-from ..potential import Potential
+from reference_sim.assembly.cholesky import analyse
+from reference_sim.potential import Potential
 
 # In units of M/dt^2 at 30 steps a second. Cloth that nothing holds needs it against its rigid motions alone;
 # 1 in its place slows the soft bending modes down ten times.

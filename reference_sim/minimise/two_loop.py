@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernel_cache import njit
+from reference_sim.kernels.kernel_cache import njit
 
 FAST = {"reassoc", "contract", "nsz"}  # sums in vector instructions
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.results import RunFolder
-from reports.data import SUITES, Run, shown_seeds
+from benchmarks.results.run_folder import RunFolder
+from reports.run.rows import SUITES, Run, shown_seeds
 
 BUDGET = 25_000_000  # bytes of the whole page
 FIRST = ("reference", "bound", "baseline", "network")  # roles of the methods of page one

@@ -8,15 +8,15 @@ from typing import Any
 
 import pandas as pd
 
-from reports.data import Run
-from reports.layout import column_texts, remarks_of
-from reports.means import Mean, value_of
-from reports.pareto import ERRORS, WHOLE, indistinct, run_time
-from reports.significance import Effect
-from reports.styles import style
-from reports.table import Cell, Column, Table
-from reports.tables import merged
-from reports.work_precision import error_points
+from reports.document.layout import column_texts, remarks_of
+from reports.figures.styles import style
+from reports.figures.work_precision import error_points
+from reports.run.rows import Run
+from reports.statistics.means import Mean, value_of
+from reports.statistics.pareto import ERRORS, WHOLE, indistinct, run_time
+from reports.statistics.significance import Effect
+from reports.tables.table import Cell, Column, Table
+from reports.tables.tables import merged
 
 NOT_SHOWN = "metrics"  # the file to plot from: everything that the other tables hold, line by line
 MEANING = {"stalled": "with frames left unconverged"}

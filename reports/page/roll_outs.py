@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.results import RunFolder
-from reports.data import STEP, Run
+from benchmarks.results.run_folder import RunFolder
 from reports.page.choice import groups
 from reports.page.pack import Pack
 from reports.page.vertex_values import area_change, depth, distance, mean_curvature, skin_of
+from reports.run.rows import STEP, Run
 
 if TYPE_CHECKING:
     from reference_sim import Obstacle
-    from reference_sim.trajectory import Trajectory
+    from reference_sim.trajectory.trajectory import Trajectory
 
 SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one
 BLOCK = 32  # frames at a time, to bound memory

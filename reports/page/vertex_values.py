@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse
 
-from benchmarks.metrics.curvature import curvature_series
+from benchmarks.metrics.surface.curvature import curvature_series
 
 if TYPE_CHECKING:
     from reference_sim import Obstacle

@@ -11,14 +11,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.results import RunFolder, replacing
-from reports.data import Run
-from reports.document import subtitle
+from benchmarks.results.run_folder import RunFolder, replacing
+from reports.document.document import subtitle
 from reports.page.choice import BUDGET, RULE
 from reports.page.content import methods_of, plots_of, tables_of, trouble_of
 from reports.page.pack import deflated
 from reports.page.roll_outs import Embedded, Reader, embed
-from reports.table import Table
+from reports.run.rows import Run
+from reports.tables.table import Table
 
 HERE = Path(__file__).parent
 SCRIPTS = ("data", "draw", "view", "plots", "tables", "page")  # in this order: each uses those before

@@ -1,0 +1,1 @@
+"""Body, garments and motions that scenes share."""

@@ -1,0 +1,95 @@
+"""What all dressed scenes share: one body, the garments tailored to it, and the motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from benchmarks.presets import Preset
+    from snug.body.parametric_body import Body
+    from snug.garments.garment import Garment
+    from snug.garments.options import GarmentFile
+    from snug.motion.motion import Motion
+
+
+@dataclass(frozen=True)
+class Assets:
+    """A body, what it may wear and the motions, all by name; each motion at most `preset.frames` long.
+
+    clips: motion -> frames of its liveliest part. bodies: motion or clip -> posed body (T,B,3) [m], where
+    ready made.
+    """
+
+    body: Body
+    garments: dict[str, Garment]
+    motions: dict[str, Motion]
+    clips: dict[str, range]
+    bodies: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def named(self, names: Iterable[str]) -> list[Motion]:
+        """The motions of those names, in that order."""
+        return [self.motions[name] for name in names]
+
+    def motion(self, name: str, part: str) -> Motion:
+        """The whole motion of that name, or its clip, named "<motion>@clip"."""
+        whole = self.motions[name]
+        if part != "clip":
+            return whole
+        frames = self.clips[name]
+        return replace(whole.cut(frames.start, frames.stop), name=f"{name}@clip")
+
+    def before(self, name: str, part: str) -> Motion | None:
+        """What comes before that part of the motion; None where it begins with the motion."""
+        start = self.clips[name].start if part == "clip" else 0
+        return self.motions[name].cut(0, start) if start else None
+
+    def only(self, motion: str) -> Assets:
+        """The same with this motion alone: little to hand to another process."""
+        names = {motion} & self.motions.keys()
+        own = {name: self.motions[name] for name in names}
+        return replace(self, motions=own, clips={name: self.clips[name] for name in names}, bodies={})
+
+    def posed_body(self, motion: Motion, betas: np.ndarray | None = None) -> np.ndarray:
+        """The body (T,B,3) [m] of that shape, or of the mean one, in that motion."""
+        ready = self.bodies.get(motion.name)
+        return self.body.vertices(motion.poses, motion.translations, betas) if ready is None else ready
+
+
+def open_assets(
+    preset: Preset,
+    motions: Iterable[Motion],
+    garments: Iterable[str],
+    *,
+    body: Path | None = None,
+    own: GarmentFile | None = None,
+) -> Assets:
+    """Load the body, or that of a file, tailor these garments and no other, or read the user's own; motions
+    are cut to the preset's length.
+    """
+    from benchmarks.assets.liveliest_part import clip
+    from snug.body.parametric_body import Body
+    from snug.garments.reading import read_garment
+    from snug.garments.templates import find_template
+
+    wearer = Body.from_file(body) if body else Body.load()
+    tailored = {
+        name: read_garment(own, wearer)
+        if own and name == own.name
+        else find_template(name).tailor(wearer, vertices=preset.garment_vertices)
+        for name in garments
+    }
+    whole = [motion.cut(0, preset.frames) for motion in motions]
+    clips = {motion.name: clip(wearer, motion, preset.clip_frames, preset.warm_up_frames) for motion in whole}
+    return Assets(wearer, tailored, {motion.name: motion for motion in whole}, clips)
+
+
+def embedded_motions(names: Iterable[str]) -> list[Motion]:
+    """Motions of the embedded library."""
+    from snug.motion.library import make_motion
+
+    return [make_motion(name) for name in names]

@@ -1,0 +1,110 @@
+"""Does a module of metrics keep the contract of benchmarks.metric? On two roll-outs of one scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import Any
+
+from benchmarks.contract.findings import Findings
+from benchmarks.methods import find_method
+from benchmarks.registry import load
+from benchmarks.results.run_folder import STATUSES
+from benchmarks.scene import Scene
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId
+
+SHIFT = 1e-3  # [m] by which the second roll-out is off
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CheckMetrics(Task):
+    """A module measures the simulation, and the same moved by a little; what is wrong is in the result."""
+
+    kind = "check"
+    stage = "check"
+    home: str
+    scene: Scene
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        findings = Findings(self.home)
+        findings.look(lambda found: self._check(found, context))
+        return Outcome(result={"wrong": findings.wrong, "notes": findings.notes})
+
+    def _check(self, found: Findings, context: Context) -> None:
+        import numpy as np
+
+        from benchmarks.metric import RollOut, SceneRollOuts
+
+        entry, scene = find_method("simulation"), self.scene.build(context.assets)
+        simulation = entry.make(models=context.folder.models, seed=0)
+        simulation.prepare(scene)
+        first = simulation.run()
+        random = np.random.default_rng(0)
+        moved = first.positions + SHIFT * random.standard_normal(first.positions.shape)
+        group = SceneRollOuts(scene)
+        other = replace(entry, name="moved", role="solver")
+        group.roll_outs += [
+            RollOut(group, entry, first, suites=("speed",)),
+            RollOut(group, other, replace(first, positions=moved), suites=("speed",)),
+        ]
+        module, names = load(self.home), set[str]()
+        for roll_out in group.roll_outs:
+            kept = roll_out.positions.copy()
+            names |= self._measure(found, module, roll_out)
+            found.demand(
+                np.array_equal(roll_out.positions, kept),
+                "alters the positions of a roll-out: copy what you change; other metrics read it too",
+            )
+        silent = [metric.name for metric in module.METRICS if not _declares(metric.name, names)]
+        if silent:
+            found.notes.append(f"{self.scene.name} gives no {', '.join(silent)}")
+
+    def _measure(self, found: Findings, module: ModuleType, roll_out: Any) -> set[str]:
+        """The names of what it has measured."""
+        import numpy as np
+
+        on = f"of {roll_out.entry.name}"
+        with found.call(f"measure() {on}", ": leave out of the dictionary what does not apply"):
+            values, again = (module.measure(roll_out) if hasattr(module, "measure") else {} for _ in range(2))
+        if hasattr(module, "compare") and roll_out.reference is not None:
+            with found.call(f"compare() {on}"):
+                compared = module.compare(roll_out, roll_out.reference)
+                values, again = values | compared, again | module.compare(roll_out, roll_out.reference)
+        for name, value in values.items():
+            number = value[0] if isinstance(value, tuple) else value
+            found.demand(
+                any(_declares(metric.name, {name}) for metric in module.METRICS),
+                f"measures {name}, which METRICS does not declare",
+            )
+            fine = isinstance(number, int | float) and not isinstance(number, bool)
+            if not found.demand(fine, f"{name} {on} is a {type(number).__name__}: give a float"):
+                continue
+            found.demand(math.isfinite(number), f"{name} {on} is {number}: leave out what does not apply")
+            found.demand(
+                again.get(name) == value, f"{name} {on} is {value}, then {again.get(name)}: fix its seed"
+            )
+        if hasattr(module, "series"):
+            with found.call(f"series() {on}"):
+                curves = module.series(roll_out)
+            due = roll_out.positions.shape[:2]
+            for name, curve in curves.items():
+                found.demand(
+                    np.shape(curve) in (due[:1], due),
+                    f"series() gives {name} {np.shape(curve)}: one number a frame is {due[:1]}, one a frame "
+                    f"and vertex {due}",
+                )
+        if hasattr(module, "judge"):
+            with found.call(f"judge() {on}"):
+                said = module.judge(roll_out, values)
+            found.demand(
+                said is None or (isinstance(said, tuple) and len(said) == 2 and said[0] in STATUSES),
+                f"judge() gives {said!r}: None, or a status ({', '.join(STATUSES)}) and a reason are due",
+            )
+        return set(values)
+
+
+def _declares(metric: str, names: set[str]) -> bool:
+    """Whether one of the names is the metric, or fits its pattern "family/*"."""
+    return any(name == metric or (metric.endswith("/*") and name.startswith(metric[:-1])) for name in names)

@@ -1,0 +1,162 @@
+"""Does a scene keep the contract of benchmarks.scene, and do the energies that come with it their own?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from benchmarks.contract.findings import Findings, altered, fingerprints
+from benchmarks.methods import find_method
+from benchmarks.scene import BuiltScene, Scene
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from benchmarks.assets.assets import Assets
+    from reference_sim.energies import Energy
+
+FEWEST = 3  # frames: inertia needs two before the one that is judged
+MOVED = 0.02  # of the mean edge, for the places at which derivatives are compared
+STEP = 1e-6  # [m] of central differences: their error is some 1e-7 of the derivative
+CLOSE = 1e-4  # of the norm of the gradient, of the Hessian's largest entry
+ROUND_OFF = 1e-13  # of a sum of many terms, as a share of it
+DIRECTIONS = 3  # along which derivatives are compared
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CheckScene(Task):
+    """Built twice, its parts looked at, and simulated; what is wrong is in the result."""
+
+    kind = "check"
+    stage = "check"
+    scene: Scene
+
+    def assets(self, assets: Assets | None) -> Assets | None:
+        return assets.only(self.scene.motion) if assets is not None and self.scene.dressed else None
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        findings = Findings(self.scene.declared_in or self.scene.module)
+        findings.look(lambda found: self._check(found, context))
+        return Outcome(result={"wrong": findings.wrong, "notes": findings.notes})
+
+    def _check(self, found: Findings, context: Context) -> None:
+        with found.call("build()", ": it is called as build(scene, assets, **sizes and options)"):
+            scene, again = (self.scene.build(context.assets) for _ in range(2))
+        if not found.demand(
+            isinstance(scene, BuiltScene), f"build() gives a {type(scene).__name__}: return a BuiltScene"
+        ):
+            return
+        self._check_parts(found, scene)
+        if found.wrong:
+            return
+        with found.call("settle()"):
+            before = fingerprints(scene)
+            other = altered(before, again)
+        found.demand(
+            not other, f"is built otherwise the second time: {other}: fix the seed of all that is random"
+        )
+        own = [e for e in scene.energies if not type(e).__module__.startswith("reference_sim.")]
+        for energy in own:
+            with found.call(f"energy {energy.name}"):
+                check_derivatives(found, energy, scene)
+        if found.wrong:
+            return
+        with found.call("its simulation"):
+            simulation = find_method("simulation").make(models=context.folder.models, seed=0)
+            simulation.prepare(scene)
+            trajectory = simulation.run()
+        if trajectory.status != "converged":
+            found.notes.append(f"its simulation ends as {trajectory.status}: {trajectory.reason}")
+
+    def _check_parts(self, found: Findings, scene: BuiltScene) -> None:
+        import numpy as np
+
+        declared, vertices = self.scene, scene.cloth.vertex_count
+        found.demand(scene.name == declared.name, f"is built as '{scene.name}': give name=scene.name")
+        found.demand(
+            0.0 < scene.dt < np.inf, f"has a time step of {scene.dt} s: give a positive number of seconds"
+        )
+        found.demand(scene.frames >= FEWEST, f"has {scene.frames} frames: at least {FEWEST} are needed")
+        found.demand(bool(scene.energies), "declares no energies: without one there is nothing to minimise")
+        for energy in scene.energies:
+            found.demand(
+                energy.cloth is scene.cloth, f"energy {energy.name} is made of another cloth: use the scene's"
+            )
+        found.demand(
+            (scene.obstacle is not None) == (declared.obstacle or declared.dressed),
+            "builds an obstacle and declares none, or the reverse: say obstacle=True where it has one",
+        )
+        found.demand(
+            (scene.dressed is not None) == declared.dressed,
+            "is built dressed and names no garment, or the reverse: say garment= and motion= where it is",
+        )
+        with found.call("settle()"):
+            start = np.asarray(scene.settle(), dtype=np.float64)
+        found.demand(
+            start.shape in ((vertices, 3), (2, vertices, 3)) and bool(np.isfinite(start).all()),
+            f"settle() gives {start.shape}: finite positions {(vertices, 3)} [m], or these and velocities",
+        )
+        for frame in (0, scene.frames - 1) if scene.pin_positions is not None else ():
+            with found.call(f"pin_positions({frame})"):
+                place = np.shape(scene.pin_positions(frame)) if scene.pin_positions else ()
+            pins = (len(scene.cloth.pins), 3)
+            found.demand(
+                place == pins, f"pin_positions({frame}) gives {place}: one place for each pin is {pins}"
+            )
+        if scene.exact is not None:
+            due = (scene.frames, vertices, 3)
+            found.demand(np.shape(scene.exact) == due, f"exact is {np.shape(scene.exact)}, {due} are due")
+
+
+def check_derivatives(found: Findings, energy: Energy, scene: BuiltScene) -> None:
+    """Gradient and Hessian against central differences of value and gradient."""
+    import numpy as np
+
+    from reference_sim.energies import Step
+
+    cloth, random = scene.cloth, np.random.default_rng(0)
+    edges = cloth.edges
+    length = float(np.linalg.norm(scene.start[edges[:, 0]] - scene.start[edges[:, 1]], axis=1).mean())
+    x = scene.start + MOVED * length * random.standard_normal(scene.start.shape)
+    energy.prepare(Step(scene.start, scene.start_velocity, x, scene.dt, scene.obstacle, 1))
+    value, gradient = energy.value_and_gradient(x)
+    what = f"energy {energy.name}: its"
+    if not found.demand(
+        bool(np.isfinite(value)) and np.shape(gradient) == x.shape and bool(np.isfinite(gradient).all()),
+        f"{what} value {value} and gradient {np.shape(gradient)}: a finite number and {x.shape} are due",
+    ):
+        return
+    moved = np.abs(gradient).max(axis=1) > 0.0  # elsewhere any direction says the same
+    for _ in range(DIRECTIONS):
+        direction = random.standard_normal(x.shape) * (moved[:, None] if moved.any() else 1.0)
+        ahead, behind = (energy.value_and_gradient(x + sign * STEP * direction) for sign in (1.0, -1.0))
+        slope, told = (ahead[0] - behind[0]) / (2.0 * STEP), float((gradient * direction).sum())
+        found.demand(
+            bool(abs(slope - told) <= CLOSE * np.linalg.norm(gradient) + ROUND_OFF * abs(value) / STEP),
+            f"{what} gradient is not the derivative of its value: {told:.6g} N along a direction, "
+            f"differences say {slope:.6g} N",
+        )
+    turned = (ahead[1] - behind[1]) / (2.0 * STEP)
+    product = _times_hessian(energy, x, direction)
+    off, most = float(np.abs(turned - product).max()), float(np.abs(turned).max())
+    found.demand(
+        off <= CLOSE * max(most, float(np.abs(product).max())) + ROUND_OFF * np.abs(gradient).max() / STEP,
+        f"{what} Hessian is not the derivative of its gradient: off by {off:.3g} of {most:.3g} N/m; leave it "
+        "to automatic differentiation, or mend it",
+    )
+
+
+def _times_hessian(energy: Energy, x: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(V, 3) [N]."""
+    import numpy as np
+
+    if energy.dynamic:
+        return (energy.sparse_hessian(x) @ direction.ravel()).reshape(x.shape)
+    elements, blocks = energy.active_hessian_blocks(x)
+    corners = energy.stencils[elements]
+    local = np.einsum("nij,nj->ni", blocks, direction[corners].reshape(len(corners), blocks.shape[-1]))
+    product = np.zeros_like(x)
+    np.add.at(product, corners.ravel(), local.reshape(-1, 3))
+    return product

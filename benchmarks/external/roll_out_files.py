@@ -1,0 +1,191 @@
+"""Roll-outs of other programs: positions over time from the files that the field writes.
+
+    .vtkhdf .hdf          trajectories of this project
+    .npz                  positions (T,V,3), and where they are there: faces (F,3), fps, obstacle (T,B,3),
+                          obstacle_faces (G,3), quasi_static (T,V,3), the answer to each pose held still
+    .pkl .pickle          a dict of plain arrays: pred (T,V,3), cloth_faces, obstacle, obstacle_faces
+    .pc2 .pc16            point caches; faces from the .obj of the same name, where there is one
+    folder, pattern       one mesh a frame (.obj, .ply, ...), in the order of the numbers in their names
+
+What a file declares of its size is compared with the file before anything of that size is allocated. Nothing
+is executed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.external.roll_out_option import RollOutError, digest_of
+from reference_sim.files.mesh_files import MESH_SUFFIXES, read_mesh, read_sequence
+
+PACKED = 1032  # bytes that deflate packs into one at most
+KEYS = {  # of an npz, and of a pickle
+    "positions": "positions",
+    "pred": "positions",
+    "faces": "faces",
+    "cloth_faces": "faces",
+    "fps": "fps",
+    "obstacle": "obstacle",
+    "obstacle_faces": "obstacle_faces",
+    "quasi_static": "quasi_static",
+}
+SUFFIXES = (".vtkhdf", ".hdf", ".npz", ".pkl", ".pickle", ".pc2", ".pc16", *MESH_SUFFIXES)
+
+
+@dataclass(frozen=True, eq=False)
+class StoredRollOut:
+    """What a file holds, in its own unit, axes and order; positions are finite or not, as they are.
+
+    positions: (T,V,3) float64. dtype: of the numbers in the file. faces: (F,3). fps [1/s]. obstacle: (T,B,3).
+    obstacle_faces: (G,3). quasi_static: (T,V,3). converged: (T,) whether each frame claims to be. None: the
+    file does not say.
+    """
+
+    positions: np.ndarray
+    dtype: str = "float64"
+    faces: np.ndarray | None = None
+    fps: float | None = None
+    obstacle: np.ndarray | None = None
+    obstacle_faces: np.ndarray | None = None
+    quasi_static: np.ndarray | None = None
+    converged: np.ndarray | None = None
+
+
+def read_roll_out(path: str | Path) -> StoredRollOut:
+    """Read a file, a folder or a pattern of files. Raises RollOutError, one line, for whatever is wrong."""
+    return _read(str(path), digest_of(str(path)))
+
+
+@lru_cache(maxsize=1)  # a plan, its checks and a cell ask for the same file one after another
+def _read(path: str, digest: str) -> StoredRollOut:
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES and not (Path(path).is_dir() or "*" in path):
+        raise RollOutError(
+            f"{path}: unknown kind of roll-out: give one of {', '.join(SUFFIXES)}, or a folder"
+        )
+    reader = _READERS.get(suffix, _meshes)
+    try:
+        return _checked(reader(path))
+    except Exception as error:  # a damaged file can fail in nearly every way, and none is this program's own
+        why = " ".join(str(error).split())[:300] or type(error).__name__
+        named = why if path in why else f"{path}: {why}"
+        raise RollOutError(named) from None
+
+
+def _checked(found: Mapping[str, Any]) -> StoredRollOut:
+    """The arrays with their shapes compared. Raises ValueError, without the file's name."""
+    positions = found.get("positions")
+    if positions is None:
+        raise ValueError("holds no positions (T,V,3): name them 'positions' in an npz, 'pred' in a pickle")
+    positions = np.asarray(positions)
+    dtype = str(positions.dtype.newbyteorder("="))
+    known = {"positions": _floats("positions", positions)}
+    frames, vertices = known["positions"].shape[:2]
+    for name, count in (("faces", vertices), ("obstacle_faces", None)):
+        if found.get(name) is not None:
+            known[name] = _triangles(name, np.asarray(found[name]), count)
+    for name in ("obstacle", "quasi_static"):
+        if found.get(name) is not None:
+            known[name] = _floats(name, np.asarray(found[name]))
+            if len(known[name]) != frames:
+                raise ValueError(f"{name} has {len(known[name])} frames, positions {frames}")
+    if "quasi_static" in known and known["quasi_static"].shape != known["positions"].shape:
+        raise ValueError(f"quasi_static is {known['quasi_static'].shape}, positions {(frames, vertices, 3)}")
+    if "obstacle" in known and "obstacle_faces" in known:
+        _triangles("obstacle_faces", known["obstacle_faces"], known["obstacle"].shape[1])
+    fps = found.get("fps")
+    if fps is not None:
+        fps = float(np.asarray(fps, dtype=np.float64).item())
+        if not (np.isfinite(fps) and 0.0 < fps < 1e6):
+            raise ValueError(f"states {fps} frames per second")
+    return StoredRollOut(dtype=dtype, fps=fps, converged=found.get("converged"), **known)
+
+
+def _floats(name: str, array: np.ndarray) -> np.ndarray:
+    if array.ndim != 3 or array.shape[2] != 3 or array.dtype.kind not in "fiu" or 0 in array.shape:
+        raise ValueError(f"{name} is {array.dtype} {array.shape}: numbers of shape (frames, vertices, 3)")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _triangles(name: str, array: np.ndarray, vertices: int | None) -> np.ndarray:
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu" or not len(array):
+        raise ValueError(f"{name} is {array.dtype} {array.shape}: whole numbers of shape (triangles, 3)")
+    if array.min() < 0 or (vertices is not None and array.max() >= vertices):
+        raise ValueError(f"{name} names vertex {array.max()} of {vertices}")
+    return array.astype(np.int64)
+
+
+# --- one reader for each kind of file: name -> value -------------------------------------------------------
+
+
+def _npz(path: str) -> dict[str, Any]:
+    from reference_sim.files.array_file import read_arrays
+
+    return {KEYS[name]: array for name, array in read_arrays(path, KEYS).items()}
+
+
+def _pickle(path: str) -> dict[str, Any]:
+    from snug.body.plain_pickle import read_plain_pickle
+
+    held = read_plain_pickle(path)
+    if not isinstance(held, dict):
+        raise ValueError(f"holds a {type(held).__name__}: a dict with 'pred' (T,V,3) is due")
+    return {KEYS[name]: value for name, value in held.items() if name in KEYS}
+
+
+def _point_cache(path: str) -> dict[str, Any]:
+    from reference_sim.trajectory.point_cache import read_point_cache
+
+    mesh = Path(path).with_suffix(".obj")
+    positions = read_point_cache(path)
+    return {"positions": positions, "faces": read_mesh(mesh).faces if mesh.is_file() else None}
+
+
+def _meshes(path: str) -> dict[str, Any]:
+    positions, surface = read_sequence(path)
+    return {"positions": positions, "faces": surface.faces}
+
+
+def _trajectory(path: str) -> dict[str, Any]:
+    from reference_sim.trajectory.trajectory import Trajectory
+
+    _check_hdf(path)
+    trajectory = Trajectory.load(path)
+    claims = trajectory.frame_fields.get("converged")
+    return {
+        "positions": trajectory.positions,
+        "faces": trajectory.faces,
+        "fps": 1.0 / trajectory.dt if trajectory.frames > 1 else None,
+        "converged": None if claims is None else np.asarray(claims),
+    }
+
+
+def _check_hdf(path: str) -> None:
+    """A data set that declares more than its packed bytes can hold is not read. Raises ValueError."""
+    import h5py
+
+    def check(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.nbytes > PACKED * (item.id.get_storage_size() + 1):
+            raise ValueError(f"{name} declares {item.nbytes} bytes in {item.id.get_storage_size()}")
+
+    if not Path(path).is_file():
+        raise ValueError("no such file")
+    with h5py.File(path, "r") as file:
+        file.visititems(check)
+
+
+_READERS: dict[str, Callable[[str], dict[str, Any]]] = {
+    ".vtkhdf": _trajectory,
+    ".hdf": _trajectory,
+    ".npz": _npz,
+    ".pkl": _pickle,
+    ".pickle": _pickle,
+    ".pc2": _point_cache,
+    ".pc16": _point_cache,
+}

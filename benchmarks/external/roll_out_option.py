@@ -1,0 +1,111 @@
+"""--rollout NAME=FILE: a stored roll-out as a method of a run."""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
+MODULE = "benchmarks.methods.outside.stored_roll_out"
+PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
+HELP = (
+    "a roll-out of another program as a method; the path may have {scene}, the scene's name with hyphens for "
+    "slashes; after it units=cm, up=z, fps=60, match-vertices, ms=2.2 (a frame, as its author says)"
+)
+
+
+class RollOutError(ValueError):
+    """A roll-out that cannot be read or does not belong to the scene; the message names file and remedy."""
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What the user says of a roll-out: unit, up axis, frames per second, whether to match vertices."""
+
+    units: str = "m"
+    up: str = "y"
+    fps: float | None = None
+    match_vertices: bool = False
+
+    def __post_init__(self) -> None:
+        from reference_sim.files.mesh_files import METRES, UP_AXES
+
+        for what, value, known in (("units", self.units, tuple(METRES)), ("up", self.up, UP_AXES)):
+            if value not in known:
+                raise RollOutError(f"--{what} {value}: choose from {', '.join(known)}")
+        if self.fps is not None and not 0.0 < self.fps < 1e6:
+            raise RollOutError(f"--fps {self.fps}: give a positive number of frames per second")
+
+
+@dataclass(frozen=True)
+class RollOutOption:
+    """One roll-out: its name, its path, what is said of the file, and the declared time of a frame [ms]."""
+
+    name: str
+    path: str
+    stated: Stated
+    declared_ms: float | None = None
+    role: str = "external"
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(rf"[{CHARACTERS}]+", self.name):
+            raise RollOutError(f"{self.path}: the name '{self.name}' has other than letters, digits and _-+.")
+
+    @property
+    def places(self) -> bool:
+        """Whether it has a file for each of several scenes."""
+        return PLACE in self.path
+
+    def path_for(self, scene: str) -> str:
+        return self.path.replace(PLACE, scene.replace("/", "-"))
+
+
+def parse(text: str) -> RollOutOption:
+    """NAME=FILE[,key=value...]. Raises RollOutError."""
+    given, *words = text.split(",")
+    name, equals, path = (part.strip() for part in given.partition("="))
+    if not (name and equals and path):
+        raise RollOutError(f"--rollout {text}: give NAME=FILE, with ,units=cm and the like behind it")
+    said: dict[str, Any] = {}
+    for word in words:
+        key, _, value = (part.strip() for part in word.partition("="))
+        if key not in _WORDS:
+            raise RollOutError(f"--rollout {text}: unknown word '{key}'; there are {', '.join(_WORDS)}")
+        field, convert = _WORDS[key]
+        try:
+            said[field] = convert(value)
+        except ValueError:
+            raise RollOutError(f"--rollout {text}: {key}={value} is no number") from None
+    declared = said.pop("declared_ms", None)
+    return RollOutOption(name, path, Stated(**said), checked_ms(declared))
+
+
+def checked_ms(value: float | None) -> float | None:
+    """[ms] a frame. Raises RollOutError where it is no time."""
+    if value is not None and not 0.0 < value < 1e9:
+        raise RollOutError(f"declared time {value} ms: give a positive number of milliseconds a frame")
+    return value
+
+
+_WORDS: dict[str, tuple[str, Callable[[str], Any]]] = {
+    "units": ("units", str),
+    "up": ("up", str),
+    "fps": ("fps", float),
+    "match-vertices": ("match_vertices", lambda value: True),
+    "ms": ("declared_ms", float),
+}
+
+
+def digest_of(path: str) -> str:
+    """Of all that is read: the file, those of a folder or of a pattern, and the mesh beside a point cache."""
+    from benchmarks.runner.source import digest, digest_of_file
+
+    given = Path(path)
+    files = sorted(given.iterdir()) if given.is_dir() else sorted(map(Path, glob.glob(path))) or [given]
+    if given.suffix.lower() in (".pc2", ".pc16"):
+        files.append(given.with_suffix(".obj"))
+    return digest([[file.name, digest_of_file(file)] for file in files if file.is_file()])

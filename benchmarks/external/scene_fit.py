@@ -1,0 +1,236 @@
+"""Does a stored roll-out belong to the scene? Unit, axes, order of vertices, frame rate, place are compared.
+
+What does not fit is refused with the remedy and never guessed: a roll-out in centimetres would otherwise get
+numbers, and nobody would see that they mean nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.external.roll_out_files import StoredRollOut
+from benchmarks.external.roll_out_option import RollOutError, Stated
+from benchmarks.external.vertex_correspondence import faces_alike, nearest_order, same_topology
+from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
+
+if TYPE_CHECKING:
+    from benchmarks.scene import BuiltScene
+
+NEAR = 0.25  # of the cloth's diagonal: from where the scene's cloth is, a first frame lies nearer than that
+BETTER = 0.5  # another unit or axis fits better where its distance is less than so much of the stated one's
+SIZES = 2.0  # times as large, or as small, as the cloth a first frame may be
+LONG = 3.0  # times as long as at rest, edges in the mean: then they join vertices that are no neighbours
+ALIKE = 1e-6  # of a frame rate
+
+
+def fitted(stored: StoredRollOut, scene: BuiltScene, stated: Stated) -> tuple[StoredRollOut, tuple[str, ...]]:
+    """The roll-out in metres, y up, in the order of the scene's vertices, a frame for each of the scene's;
+    and what was done to it, in words. Raises RollOutError with the remedy, without the file's name.
+    """
+    count, cloth = stored.positions.shape[1], scene.cloth
+    if count != cloth.vertex_count:
+        raise RollOutError(
+            f"has {count} vertices, the cloth of {scene.name} {cloth.vertex_count}: write one position for "
+            "each vertex of the scene's mesh, of the same preset; corners split at seams are one vertex"
+        )
+    if not np.isfinite(stored.positions[0]).all():
+        raise RollOutError("its first frame, the scene's start, is not finite")
+    expected, done = expected_positions(scene), []
+    in_metres = replace(stored, positions=to_metres_y_up(stored.positions, units=stated.units, up=stated.up))
+    _check_axes(stored, expected[0], stated)
+    if stored.quasi_static is not None:
+        held = to_metres_y_up(stored.quasi_static, units=stated.units, up=stated.up)
+        in_metres = replace(in_metres, quasi_static=held)
+    order, words = _order(in_metres, scene, expected[0], stated)
+    if order is not None:
+        in_metres = _reordered(in_metres, order)
+        done.append(words)
+    timed, words = _retimed(in_metres, scene, stated)
+    if words:
+        done.append(words)
+    _check_place(timed.positions, expected)
+    return timed, tuple(done)
+
+
+def expected_positions(scene: BuiltScene) -> np.ndarray:
+    """(T,V,3) [m] the garment carried by the body's joints; without a body the start alone, (1,V,3)."""
+    if scene.dressed is None:
+        return scene.start[None]
+    worn = scene.dressed
+    body, garment, motion = worn.body, worn.garment, worn.motion
+    kept = np.arange(motion.frames) if scene.kept is None else scene.kept
+    transforms = body.transforms(motion.poses[kept], motion.translations[kept], worn.betas)
+    rest = garment.rest_for(body, worn.betas)
+    points = np.concatenate([rest, np.ones((len(rest), 1))], axis=1)
+    spread = (garment.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(rest), -1)
+    columns = transforms.transpose(0, 1, 3, 2).reshape(len(kept), spread.shape[1], 3)
+    return np.einsum("vk,tkc->tvc", spread, columns, optimize=True)
+
+
+# --- unit, axes and place ----------------------------------------------------------------------------------
+
+
+def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: Stated) -> None:
+    """Among all units and up axes the stated ones are those with which the first frame fits best."""
+    first, size = stored.positions[0], _diagonal(expected)
+    alike = [units for units in METRES if 1 / SIZES < METRES[units] * _diagonal(first) / size < SIZES]
+    if not alike:
+        across = METRES[stated.units] * _diagonal(first)
+        raise RollOutError(
+            f"its first frame is {across:.3g} m across, the scene's cloth {size:.3g} m, in whatever unit of "
+            f"{', '.join(METRES)}: write metres"
+        )
+    apart = {
+        (units, up): _cloud_distance(to_metres_y_up(first, units=units, up=up), expected)
+        for units in alike
+        for up in UP_AXES
+    }
+    best, given = min(apart, key=lambda names: apart[names]), (stated.units, stated.up)
+    here = apart.get(given, np.inf)
+    if best != given and apart[best] < BETTER * here and (given[0] not in alike or apart[best] < NEAR * size):
+        pairs = zip(("units", "up"), best, given)
+        remedy = [f"--{name} {value}" for name, value, said in pairs if value != said]
+        raise RollOutError(
+            f"its first frame fits the scene's cloth in {best[0]}, {best[1]} up, {apart[best]:.2g} m off, "
+            f"and not in {stated.units}, {stated.up} up: give {' '.join(remedy)}"
+        )
+    if here > NEAR * size:
+        raise RollOutError(
+            f"its first frame lies {here:.3g} m from where the scene's cloth starts: write world coordinates "
+            "(not relative to the pelvis), from the scene's first frame on"
+        )
+
+
+def _check_place(positions: np.ndarray, expected: np.ndarray) -> None:
+    """The cloth's centre stays with the body that carries it, in most of the frames: a roll-out that explodes
+    in the end is a result, one of another motion is none.
+    """
+    frames = min(len(positions), len(expected))
+    if frames < 2:
+        return
+    with np.errstate(over="ignore", invalid="ignore"):
+        away = np.linalg.norm(positions[:frames].mean(axis=1) - expected[:frames].mean(axis=1), axis=1)
+    far = np.flatnonzero(~(away <= NEAR * _diagonal(expected[0])))
+    if 2 * len(far) > frames:
+        frame = far[0]
+        raise RollOutError(
+            f"from frame {frame} on its centre lies {away[frame]:.2g} m from where the body carries it: "
+            "another motion, another frame rate (--fps), or coordinates that are not the world's"
+        )
+
+
+def _cloud_distance(points: np.ndarray, others: np.ndarray) -> float:
+    """Mean distance [m] to the nearest point of the other set, both ways: blind to the order."""
+    from scipy.spatial import cKDTree
+
+    there, back = cKDTree(others).query(points)[0], cKDTree(points).query(others)[0]
+    return float(there.mean() + back.mean()) / 2.0
+
+
+def _diagonal(points: np.ndarray) -> float:
+    """Of the bounding box [m]."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+# --- order of vertices -------------------------------------------------------------------------------------
+
+
+def _order(
+    stored: StoredRollOut, scene: BuiltScene, expected: np.ndarray, stated: Stated
+) -> tuple[np.ndarray | None, str]:
+    """Which vertex of the file is each of the scene's, (V,), and how it was found; None: the same."""
+    ours, first = scene.cloth.faces, stored.positions[0]
+    remedy = "; give --match-vertices" if not stated.match_vertices else ""
+    if stored.faces is not None:
+        if faces_alike(stored.faces, ours):
+            return None, ""
+        if not stated.match_vertices:
+            raise RollOutError(
+                f"its {len(stored.faces)} triangles join other vertices than the scene's {len(ours)}: "
+                f"vertices are missing or reordered{remedy}"
+            )
+        order = same_topology(stored.faces, ours, first, expected)
+        if order is None:
+            raise RollOutError(
+                f"its {len(stored.faces)} triangles are another mesh than the scene's {len(ours)}, whatever "
+                "the order: no vertex can be matched; export the scene's mesh and use that"
+            )
+        return order, "vertices matched by topology"
+    shuffled = _stretch(first, scene) > LONG
+    if not stated.match_vertices:
+        if shuffled:
+            raise RollOutError(
+                "neighbours in the scene's mesh are no neighbours in its first frame: vertices are reordered"
+                f"{remedy}"
+            )
+        return None, ""
+    order = nearest_order(first, scene.start, reach=0.5 * float(np.median(_lengths(scene.start, scene))))
+    if order is None:
+        raise RollOutError(
+            "has no triangles, and its first frame is not the scene's start to within half an edge: vertices "
+            "cannot be matched one to one; add its triangles (faces of an npz, .obj beside a point cache)"
+        )
+    return order, "vertices matched by nearest position in the first frame"
+
+
+def _reordered(stored: StoredRollOut, order: np.ndarray) -> StoredRollOut:
+    held = None if stored.quasi_static is None else stored.quasi_static[:, order]
+    return replace(stored, positions=stored.positions[:, order], quasi_static=held)
+
+
+def _lengths(positions: np.ndarray, scene: BuiltScene) -> np.ndarray:
+    edges = scene.cloth.edges
+    return np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
+
+
+def _stretch(positions: np.ndarray, scene: BuiltScene) -> float:
+    """Mean length of edges over that at rest."""
+    return float(_lengths(positions, scene).mean() / _lengths(scene.cloth.rest_positions, scene).mean())
+
+
+# --- frame rate --------------------------------------------------------------------------------------------
+
+
+def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: Stated) -> tuple[StoredRollOut, str]:
+    """A frame for each of the scene's, linear in time between the file's; and how it was done."""
+    rate = 1.0 / scene.dt
+    said, there = stored.fps, len(stored.positions)
+    if stated.fps is None and said is not None and abs(said - rate) > ALIKE * rate:
+        raise RollOutError(
+            f"states {said:g} frames a second, the scene has {rate:g}: give --fps {said:g} to re-time it"
+        )
+    own = rate if stated.fps is None else stated.fps
+    due = scene.frames
+    places = np.arange(due) * own / rate
+    places = np.where(np.abs(places - np.round(places)) < 1e-6, np.round(places), places)
+    spare = there - 1 - places[-1]  # frames of the file behind the scene's last; up to one of the scene's
+    if spare < 0.0 or spare > (0.0 if own == rate else max(own / rate, 1.0)):
+        times = (there - 1) / own
+        hint = _rate_hint(there, due, rate) if stated.fps is None else ""
+        raise RollOutError(
+            f"has {there} frames, {times:.3g} s at {own:g} a second; the scene has {due} with its start, "
+            f"{(due - 1) / rate:.3g} s{hint}"
+        )
+    if own == rate:
+        return stored, ""
+    low = np.minimum(np.floor(places).astype(int), there - 1)
+    high, share = np.minimum(low + 1, there - 1), (places - low)[:, None, None]
+
+    def at(positions: np.ndarray) -> np.ndarray:
+        return np.where(share > 0.0, (1.0 - share) * positions[low] + share * positions[high], positions[low])
+
+    held = None if stored.quasi_static is None else at(stored.quasi_static)
+    how = "every frame of the scene is one of the file" if not share.any() else "linear in between"
+    words = f"re-timed from {own:g} to {rate:g} frames a second, {how}"
+    return replace(stored, positions=at(stored.positions), quasi_static=held, converged=None), words
+
+
+def _rate_hint(there: int, due: int, rate: float) -> str:
+    ratio = (there - 1) / max(due - 1, 1)
+    near: Mapping[float, float] = {own: abs(ratio - own / rate) for own in (15, 24, 25, 50, 60, 90, 100, 120)}
+    guess = min(near, key=lambda own: near[own])
+    return f": if it has {guess} a second, give --fps {guess}" if near[guess] < 0.05 * guess / rate else ""

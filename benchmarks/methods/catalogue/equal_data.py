@@ -1,0 +1,59 @@
+"""Networks that learn from the same motions: the equal-data block. They run when they are named.
+
+The last training motion is held out of all of them. Those that simulated vertices teach get the same mixed
+clips with every seed, simulated once; the others mix as many anew. All have SNUG's number of steps, or go on
+until the held-out motion gets no better. Members of a family differ in their number of frames alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from benchmarks.method import MethodEntry
+from benchmarks.methods.catalogue.learned import cleaned, network
+from snug.recipes.named import TRAININGS, Simulated, Training
+
+# Mixed frames for each given one; between the ends for the curve of error against training frames.
+ENDS, CURVE = (0, 12), (0, 1, 3, 12)
+NETWORKS = (
+    ("snug", "SNUG", CURVE),
+    ("pbns", "PBNS", ENDS),
+    ("supervised", "Supervised", CURVE),
+    ("santesteban2019", "Santesteban 2019", ENDS),
+    ("tailornet", "TailorNet", ENDS),
+)
+
+
+def _training(name: str, mixed: int, *, converged: bool) -> Training:
+    own = TRAININGS[name]
+    recipe = replace(own.recipe, name=f"{own.recipe.name}-data-{mixed}")
+    if own.simulated:
+        own = replace(own, simulated=Simulated(mixed=mixed))
+    else:
+        recipe = replace(recipe, mixed=float(mixed))
+    return replace(own, recipe=recipe, steps_of="snug", held_out=1, converged=converged)
+
+
+def _entry(name: str, label: str, mixed: int, *, converged: bool) -> MethodEntry:
+    """Its run time is that of the network whose data it changes: nobody asks for it again."""
+    family = f"{name}-data" + "-converged" * converged
+    data = f"given frames and {mixed} mixed for each" if mixed else "given frames"
+    title = f"{label}, with {mixed} mixed" if mixed else f"{label}, given frames"
+    return network(
+        f"{family}-{mixed}", title + ", converged" * converged,
+        f"{name} that learns from {data}" + ", until a held-out motion gets no better" * converged,
+        training=_training(name, mixed, converged=converged), family=family, level=float(mixed),
+        base=f"{name}-data-{mixed}" if converged else name, role="ablation", batched=False, timed=False,
+        pairing_group=name,
+    )  # fmt: skip
+
+
+def _block(name: str, label: str, numbers: tuple[int, ...]) -> tuple[MethodEntry, ...]:
+    """All numbers at equal steps; the ends to convergence too, and each of these cleaned up."""
+    equal = tuple(_entry(name, label, mixed, converged=False) for mixed in numbers)
+    converged = tuple(_entry(name, label, mixed, converged=True) for mixed in ENDS)
+    ends = (entry for entry in (*equal, *converged) if entry.level in ENDS)
+    return (*equal, *converged, *map(cleaned, ends))
+
+
+EQUAL_DATA = tuple(entry for own in NETWORKS for entry in _block(*own))

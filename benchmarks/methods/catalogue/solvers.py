@@ -1,0 +1,201 @@
+"""Solvers: the reference at other tolerances and time steps, and everything that stops before the minimum."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from benchmarks.method import MethodEntry
+
+SHIFTS = (1e-9, 3e-9, 1e-8, 1e-7, 1e-6, 1e-5, 3e-5, 1e-4)  # [m]
+_SIMULATION = "benchmarks.methods.solvers.simulation"
+# Newton: every iteration is a factorisation of the true Hessian, or several. L-BFGS: the preconditioner
+# (mass over dt^2, a cotangent Laplacian, contacts) is factorised once a step; an iteration then costs one
+# evaluation of the energies and three triangular solves. Without memory it is preconditioned gradient
+# descent, in the manner of projective dynamics: one constant matrix, a line search, nothing learned from one
+# iteration to the next.
+# A few iterations of Newton begin with all negative curvature taken out: moving cloth needs that in nearly
+# every first one, and five Hessians would be assembled to find it out.
+_NEWTON: dict[str, Any] = {
+    "module": _SIMULATION,
+    "counted": "max_iterations",
+    "method": "newton",
+    "start_projected": True,
+}
+_LBFGS: dict[str, Any] = {
+    "module": _SIMULATION,
+    "counted": "max_iterations",
+    "method": "lbfgs",
+    "finish": False,
+}
+
+
+def _truncated(
+    family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *, module: str,
+    counted: str = "iterations", dtype: str = "float64", conserving: bool = False, **options: Any,
+) -> tuple[MethodEntry, ...]:  # fmt: skip
+    """One entry for each number of iterations, which is the option `counted` of the module."""
+    return tuple(
+        MethodEntry(
+            name=f"{family}-{count}",
+            label=f"{label}, {_counted(count, unit)}",
+            description=description.format(_counted(count, unit)),
+            module=module,
+            options={counted: count, **options},
+            dtype=dtype,
+            conserving=conserving,
+            truncated=True,
+            role="solver",
+            family=family,
+            level=count,
+        )
+        for count in counts
+    )
+
+
+def warm_started(
+    base: str, label: str, solver: str, *, trained: str | None, pairing_group: str = ""
+) -> tuple[MethodEntry, ...]:
+    """A network or skinning, and some iterations of "newton", "lbfgs" or "fast-lbfgs" from there."""
+    return tuple(
+        MethodEntry(
+            name=f"{base}+{solver}-{count}",
+            label=f"{label} + {_LABELS[solver]}, {_counted(count, 'iteration')}",
+            description=f"each step from {base}'s frame by {_counted(count, 'iteration')} of {solver}",
+            module="benchmarks.methods.solvers.warm_started",
+            options={"guess": base, "solver": solver, "iterations": count},
+            needs_body=True,
+            trained=trained,
+            seeded=trained is not None,
+            truncated=True,
+            conserving=solver == "fast-lbfgs",
+            static_known=False,  # a pose held still leads back to the guess, and not to the simulator's drape
+            role="warm-started",
+            family=f"{base}+{solver}",
+            level=count,
+            base=base,
+            pairing_group=pairing_group,
+        )
+        for count in (1, 2, 4, 8)
+    )
+
+
+def _counted(count: int, unit: str) -> str:
+    return f"{count} {unit}{'s' * (count > 1)}"
+
+
+_LABELS = {"newton": "Newton", "lbfgs": "L-BFGS", "fast-lbfgs": "fast L-BFGS"}
+
+SOLVERS = (
+    *(
+        MethodEntry(
+            name=f"simulation-1e-{power}",
+            label=f"Simulation to 1e-{power}",
+            description=f"the reference, minimised to tolerance 1e-0{power}",
+            module=_SIMULATION,
+            options={"tolerance": float(f"1e-{power}")},
+            role="reference-variant",
+            family="simulation-tolerance",
+            level=float(f"1e-{power}"),
+        )
+        for power in (2, 4, 8)
+    ),
+    *(
+        MethodEntry(
+            name=f"simulation-dt/{substeps}",
+            label=f"Simulation, step dt/{substeps}",
+            description=f"the reference with {substeps} time steps a frame",
+            module=_SIMULATION,
+            options={"substeps": substeps},
+            role="reference-variant",
+            family="simulation-dt",
+            level=substeps,
+        )
+        for substeps in (2, 4, 8)
+    ),
+    *(
+        MethodEntry(
+            name=f"simulation-perturbed-{shift:.0e}".replace("e-0", "e-"),
+            label=f"Simulation, start moved by {shift * 1e9:,.0f} nm",
+            description=f"the reference again, its start moved by {shift:g} m: how far apart they end",
+            module="benchmarks.methods.solvers.perturbed_start",
+            options={"shift": shift},
+            role="reference-variant",
+            family="simulation-perturbed",
+            timed=False,
+            level=shift,
+        )
+        for shift in SHIFTS
+    ),
+    MethodEntry(
+        name="simulation-refrozen",
+        label="Simulation, planes searched twice",
+        description="the reference, each step solved again with contact planes searched at its end",
+        module=_SIMULATION,
+        options={"refreeze": 1},
+        role="reference-variant",
+        family="simulation-refrozen",
+        timed=False,
+    ),
+    # A variant of the physics, set beside its base: a "reference-variant" would be read as an uncertainty of
+    # the reference, and a "solver" as an approximation of it.
+    *(
+        MethodEntry(
+            name=f"simulation-{exchange}",
+            label=f"Simulation, {exchange.replace('-', ' ')}",
+            description=f"the reference with {words}",
+            module="benchmarks.methods.solvers.other_material",
+            options={"exchange": exchange},
+            role="ablation",
+            base="simulation",
+        )
+        for exchange, words in (
+            ("printed-bending", "hinges as the paper prints them, not scaled: some 3 times as stiff"),
+            ("springs", "springs on the edges in place of StVK's membrane, those of recipe springs"),
+            ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),
+        )
+    ),
+    *_truncated(
+        "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
+        (1, 2, 4, 8), **_NEWTON,
+    ),
+    *_truncated(
+        "lbfgs", "L-BFGS", "iteration", "L-BFGS, factored preconditioner, stopped after {}",
+        (5, 10, 20, 40), **_LBFGS, memory=10,
+    ),
+    *_truncated(
+        "fast-lbfgs", "Fast L-BFGS", "iteration",
+        "L-BFGS compiled as a whole, float32, sliding contact planes, stopped after {}", (5, 10, 20, 40),
+        module="benchmarks.methods.solvers.fast_lbfgs", dtype="float32", conserving=True,
+    ),
+    *_truncated(
+        "gradient-descent", "Gradient descent", "iteration",
+        "preconditioned gradient descent, stopped after {}", (10, 40), **_LBFGS, memory=0,
+    ),
+    *_truncated(
+        "vbd", "Vertex block descent", "sweep", "vertex block descent on our energies, {} a step",
+        (5, 20, 80), module="benchmarks.methods.solvers.vertex_block_descent",
+    ),
+    *_truncated(
+        "xpbd", "XPBD", "sweep", "position-based dynamics with our energies, {} a step",
+        (10, 40, 160), module="benchmarks.methods.solvers.xpbd",
+    ),
+    *(
+        MethodEntry(
+            name=f"newton-{solver.lower()}",
+            label=f"newton's {solver}",
+            description=f"newton's {solver} on its own energies, {iterations} x {substeps} a frame",
+            module="benchmarks.methods.solvers.newton_physics",
+            options={"solver": solver, "iterations": iterations, "substeps": substeps},
+            dtype="float32",
+            needs_no_obstacle=True,
+            package="newton",
+            role="external",
+        )
+        for solver, iterations, substeps in (("VBD", 10, 20), ("XPBD", 1, 128))
+    ),
+    *warm_started("skinning", "Skinning", "lbfgs", trained=None),
+    *warm_started("skinning", "Skinning", "newton", trained=None),
+    *warm_started("snug", "SNUG", "lbfgs", trained="snug", pairing_group="snug"),
+    *warm_started("snug", "SNUG", "newton", trained="snug", pairing_group="snug"),
+    *warm_started("snug", "SNUG", "fast-lbfgs", trained="snug", pairing_group="snug"),
+)  # fmt: skip

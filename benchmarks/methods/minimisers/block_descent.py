@@ -1,0 +1,69 @@
+"""Vertex block descent (Chen et al. 2024) on the energies of reference_sim.
+
+One sweep visits the free vertices one after the other. Each takes a Newton step of its own three coordinates,
+all others held still:
+
+    x_i <- x_i - H_ii^-1 g_i,    g_i, H_ii: gradient and 3 x 3 block of the whole step's potential
+
+with H_ii made positive definite as in the simulator (compressive stress and the hinge's second derivative
+left out). So it minimises exactly the potential that Newton minimises, and a vertex at rest for all sweeps is
+a stationary point of it. On one core a sweep in the order of the mesh needs no colours. As in the paper there
+is no line search; its guess and its Chebyshev acceleration are left out: all solvers start alike here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, swept, weights
+from benchmarks.methods.minimisers.kernels import sweep_vertices
+from reference_sim import Potential
+from reference_sim.energies.term_kinds import terms_of
+from reference_sim.minimise import Result
+from reference_sim.minimise.descent import Descent
+
+
+class VertexBlockDescent:
+    """A minimiser bound to one potential.
+
+    Args:
+        max_iterations: sweeps over all free vertices.
+
+    Raises:
+        ValueError: the potential has a term without a sweep, or no inertia.
+    """
+
+    def __init__(self, potential: Potential, *, max_iterations: int) -> None:
+        self.potential, self.max_iterations = potential, max_iterations
+        self._terms = terms = terms_of(potential, "vertex block descent")
+        self._free = np.flatnonzero(potential.cloth.free)
+        self._membrane, self._hinges = membrane(terms.strain), hinges(terms.bending)
+        _, sample_weights, *_ = touching = contacts(terms.contact)
+        vertices = potential.cloth.vertex_count
+        self._around = (
+            *incidence(self._membrane[0], np.ones_like(self._membrane[0]), vertices),
+            *incidence(self._hinges[0], np.ones_like(self._hinges[0]), vertices),
+            *incidence(touching[0], sample_weights > 0.0, vertices),
+        )
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        """Run from x0 (V, 3) [m]. The status is "max_iterations" or, where it runs away, "diverged"."""
+        run, terms = Descent(self.potential, x0), self._terms
+        inertia = terms.inertia.masses / terms.inertia.dt**2, terms.inertia.x_hat, weights(terms)
+        touching = contacts(terms.contact)
+
+        def sweep(x: np.ndarray) -> None:
+            sweep_vertices(x, self._free, inertia, self._membrane, self._hinges, touching, self._around)
+
+        return swept(run, run.x.copy(), x0, self.max_iterations, sweep)
+
+
+def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
+    """Elements around each vertex: corner c of element e is e * k + c, for the corners marked used (N, k).
+
+    Returns first (V + 1,) and corners (M,): those of vertex v are corners[first[v] : first[v + 1]].
+    """
+    corners = np.flatnonzero(used)
+    owner = stencils.ravel()[corners]
+    first = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=vertices))])
+    return first, corners[np.argsort(owner, kind="stable")]

@@ -1,0 +1,1 @@
+"""Methods that roll out a network, or need a body."""

@@ -1,0 +1,67 @@
+"""The trained networks, rolled out one frame at a time as an application would run them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.method import Method
+from benchmarks.results.run_folder import model_path
+from benchmarks.scene import BuiltScene
+from reference_sim.trajectory.trajectory import Trajectory
+
+
+@dataclass
+class Network(Method):
+    """A model read from its file. Features are made and the network is warmed up before run().
+
+    precision: that of its matrices, one of snug.networks.one_frame.PRECISIONS. then: what is done with each frame.
+    """
+
+    path: Path
+    precision: str = "float32"
+    then: Callable[[np.ndarray, int], np.ndarray] | None = field(default=None, init=False)
+
+    def prepare(self, scene: BuiltScene) -> None:
+        from snug.networks.dressed_body import DressedBody
+        from snug.networks.roll_out import ready_to_roll_out
+        from snug.networks.trained_model import TrainedModel
+
+        assert scene.dressed is not None
+        self.model = TrainedModel.load(self.path).rounded(self.precision)
+        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
+        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.frames = ready_to_roll_out(
+            self.model, self.dressed, self.motion, self.betas, kept=scene.kept,
+            before=scene.dressed.before, then=self.then,
+        )  # fmt: skip
+
+    def run(self) -> Trajectory:
+        return self.frames()
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Features and joint transforms."""
+        from snug.networks.roll_out import frame_inputs
+
+        assert scene.dressed is not None
+        return frame_inputs(self.model, self.dressed, self.motion, self.betas, before=scene.dressed.before)
+
+    def batch(self, copies: int) -> Callable[[], np.ndarray]:
+        """What computes so many bodies in this motion at once when called: (T, copies, V, 3) [m]."""
+        from snug.networks.roll_out import ready_for_many
+
+        return ready_for_many(self.model, self.dressed, self.motion, copies=copies)
+
+    def quasi_static(self) -> Trajectory:
+        """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""
+        from snug.networks.roll_out import roll_out
+
+        return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
+
+
+def make(*, models: Path, seed: int, kind: str, precision: str = "float32") -> Network:
+    """The network of that name, "untrained" or one of snug.recipes.named.TRAININGS, and seed."""
+    return Network(model_path(models, kind, seed), precision)

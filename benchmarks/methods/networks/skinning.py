@@ -1,0 +1,58 @@
+"""The garment follows the body's joints and nothing else: the free baseline that belongs in every table.
+
+Weights are smoothed as much as those of the networks' default recipe, so that what a network adds to
+skinning is all that tells them apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.method import Method
+from benchmarks.scene import BuiltScene
+from reference_sim import Trajectory
+
+
+class Skinning(Method):
+    """One linear blend a frame; joint transforms are ready before, as for the networks."""
+
+    def prepare(self, scene: BuiltScene) -> None:
+        from snug.networks.dressed_body import DressedBody
+        from snug.networks.roll_out import skinned_frames
+        from snug.recipes.recipe import DEFAULT
+
+        assert scene.dressed is not None
+        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
+        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.frames = skinned_frames(self.dressed, self.motion, DEFAULT.smoothing, self.betas)
+        self.faces = np.asarray(scene.cloth.faces)
+
+    def run(self) -> Trajectory:
+        from snug.networks.roll_out import collected
+
+        positions, seconds = collected(self.frames(), np.arange(self.motion.frames))
+        return Trajectory(
+            positions=positions,
+            faces=self.faces,
+            times=np.arange(len(positions)) / self.motion.fps,
+            frame_seconds=seconds,
+            provenance={"method": "skinning"},
+        )
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Joint transforms."""
+        from snug.networks.roll_out import frame_inputs
+
+        return frame_inputs(None, self.dressed, self.motion, self.betas)
+
+    def quasi_static(self) -> Trajectory:
+        """Its answer to poses held still: the same."""
+        return self.run()
+
+
+def make(*, models: Path, seed: int) -> Skinning:
+    """Skinning alone; it has no seed and no model."""
+    return Skinning()

@@ -1,0 +1,130 @@
+"""A method that is a program with its own environment: it reads an exported scene and writes a roll-out.
+
+What its start, its imports and its files take is no work of the method, so the harness's clock says nothing
+of it. A time of its own that it writes beside the positions is reported, and marked as declared.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from benchmarks.export_files import write_for_program
+from benchmarks.external.roll_out_option import Stated
+from benchmarks.method import MethodEntry
+from benchmarks.methods.outside.stored_roll_out import Stored
+from benchmarks.process.isolated_process import WorkerDied
+from benchmarks.registry import DeclarationError
+from benchmarks.scene import BuiltScene
+from reference_sim import Trajectory
+from reference_sim.files.array_file import read_arrays
+
+SECONDS = 100.0  # after which it is ended
+PLACES = ("{scene}", "{out}")
+TAIL = 4096  # bytes of what it has said that are looked at
+OURS = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")  # of this process: another environment has its own
+
+
+def program(
+    name: str, command: str, *, seconds: float = SECONDS, description: str = "", **fields: Any
+) -> MethodEntry:
+    """The entry of a program.
+
+    command: words as in a shell, which is not used. {scene} becomes the folder of the exported scene, {out}
+    the npz file to be written: positions (T,V,3) [m], and what else benchmarks.score reads. In it
+    seconds_per_frame, one number, is its declared time. {seed} becomes the seed, for an entry that is seeded.
+    seconds: after which it is ended. fields: of MethodEntry, as label, files and needs_body.
+    Raises DeclarationError.
+    """
+    for place in PLACES:
+        if place not in command:
+            raise DeclarationError(f"program {name}: its command has no {place}: {command}")
+    return MethodEntry(**{
+        "name": name, "description": description or f"the program {shlex.split(command)[0]}",
+        "module": __name__, "options": {"command": command, "seconds": seconds}, "timed": False,
+        "gives_first_frame": True, "static_known": False, "role": "external", **fields,
+    })  # fmt: skip
+
+
+@dataclass
+class Program(Stored):
+    """A roll-out that is written when it is asked for."""
+
+    command: str = ""
+    seconds: float = SECONDS
+    seed: int = 0
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Nothing yet: all that is said of its time is what it says itself."""
+        self.scene = scene
+
+    def run(self) -> Trajectory:
+        """What the program writes, in a folder that is gone afterwards.
+
+        Raises RuntimeError where it fails, WorkerDied where it takes too long, and RollOutError where what it
+        has written does not belong to the scene.
+        """
+        with tempfile.TemporaryDirectory(prefix="program-") as folder:
+            exported, out, said = (Path(folder) / name for name in ("scene", "out.npz", "said.txt"))
+            write_for_program(exported, self.scene)
+            places = {"{scene}": str(exported), "{out}": str(out), "{seed}": str(self.seed)}
+            self._execute([_filled(word, places) for word in shlex.split(self.command)], said)
+            if not out.is_file():
+                raise RuntimeError(f"the program has ended well and has not written {{out}}{_said(said)}")
+            self.path = str(out)
+            super().prepare(self.scene)
+            declared = read_arrays(out, ("seconds_per_frame",)).get("seconds_per_frame")
+        told = {} if declared is None else {"declared_ms": _milliseconds(declared)}
+        provenance = {"method": "program", "changes": list(self.done), **told}
+        return replace(super().run(), provenance=provenance)
+
+    def _execute(self, words: list[str], said: Path) -> None:
+        environment = {name: value for name, value in os.environ.items() if name not in OURS}
+        with said.open("wb") as stream:
+            try:
+                process = subprocess.Popen(
+                    words, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream, env=environment
+                )
+            except OSError as error:
+                raise RuntimeError(f"the program cannot be started: {error}") from None
+            try:
+                status = process.wait(self.seconds)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+                why = f"the program was ended after {self.seconds:g} s{_said(said)}"
+                raise WorkerDied(why, "timeout") from None
+        if status:
+            raise RuntimeError(f"the program has ended with status {status}{_said(said)}")
+
+
+def _filled(word: str, places: dict[str, str]) -> str:
+    for place, path in places.items():
+        word = word.replace(place, path)
+    return word
+
+
+def _said(said: Path) -> str:
+    """Its last line, behind a colon; empty where it has said nothing."""
+    with said.open("rb") as stream:
+        stream.seek(max(0, stream.seek(0, os.SEEK_END) - TAIL))
+        lines = stream.read().decode("utf-8", "replace").split("\n")
+    last = next((" ".join(line.split()) for line in reversed(lines) if line.strip()), "")
+    return f": {last}" if last else ""
+
+
+def _milliseconds(seconds: Any) -> float:
+    """[ms] of its number [s]. Raises ValueError where it is none."""
+    if seconds.size != 1 or not 0.0 < float(seconds.item()) < 1e6:
+        raise ValueError("seconds_per_frame of the program is no positive number of seconds")
+    return 1e3 * float(seconds.item())
+
+
+def make(*, models: Path, seed: int, command: str, seconds: float) -> Program:
+    """A fresh one; it has no model."""
+    return Program("", Stated(), command=command, seconds=seconds, seed=seed)

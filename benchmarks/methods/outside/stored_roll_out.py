@@ -1,0 +1,83 @@
+"""A roll-out that another program has made, from its file: judged as a method, and never timed as one."""
+
+from __future__ import annotations
+
+import glob
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.external.roll_out_files import StoredRollOut, read_roll_out
+from benchmarks.external.roll_out_option import MODULE, RollOutError, RollOutOption, Stated, digest_of
+from benchmarks.external.scene_fit import fitted
+from benchmarks.method import Method, MethodEntry
+from benchmarks.scene import BuiltScene
+from reference_sim import Trajectory
+
+
+@dataclass
+class Stored(Method):
+    """The positions of a file, once they have been found to belong to the scene."""
+
+    path: str
+    stated: Stated
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Read the file and compare it with the scene. Raises RollOutError."""
+        self.scene = scene
+        try:
+            self.stored, self.done = fitted(read_roll_out(self.path), scene, self.stated)
+        except RollOutError as error:
+            raise RollOutError(str(error) if self.path in str(error) else f"{self.path}: {error}") from None
+
+    def run(self) -> Trajectory:
+        """What the file holds."""
+        return self._trajectory(self.stored.positions, self.stored)
+
+    def quasi_static(self) -> Trajectory | None:
+        """What the file says of poses held still; None where it says nothing."""
+        held = self.stored.quasi_static
+        return None if held is None else self._trajectory(held, self.stored)
+
+    def _trajectory(self, positions: np.ndarray, stored: StoredRollOut) -> Trajectory:
+        finite, changes = bool(np.isfinite(positions).all()), "; ".join(self.done)
+        # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
+        claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
+        return Trajectory(
+            positions=positions,
+            faces=np.asarray(self.scene.cloth.faces),
+            times=np.arange(len(positions)) * self.scene.dt,
+            status="ok" if finite else "diverged",
+            reason=changes if finite else f"{self.path}: holds a position that is not finite",
+            provenance={"method": "stored roll-out", "file": Path(self.path).name, "changes": changes},
+            frame_fields={"converged": claims},
+        )
+
+
+def make(*, models: Path, seed: int, path: str, digest: str, **stated: object) -> Stored:
+    """The roll-out of that file; digest is of its content, for the cache. It has no seed and no model."""
+    return Stored(path, Stated(**stated))  # type: ignore[arg-type]
+
+
+def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
+    """The method of that scene; None where it has no file. Raises RollOutError for one that is not read."""
+    path = option.path_for(scene)
+    if option.places and not Path(path).exists() and not glob.glob(path):
+        return None
+    stored = read_roll_out(path)
+    declared = option.declared_ms is not None
+    return MethodEntry(
+        name=option.name,
+        label=option.name,
+        description=f"roll-out of {Path(path).name}" + ", time as its author says" * declared,
+        module=MODULE,
+        options={"path": path, "digest": digest_of(path), **asdict(option.stated)},
+        dtype=stored.dtype,
+        gives_first_frame=True,
+        conserving=True,
+        timed=False,
+        declared_ms=option.declared_ms,
+        static_known=False,
+        role=option.role,
+    )

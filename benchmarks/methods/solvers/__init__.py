@@ -1,0 +1,1 @@
+"""Methods that minimise: the reference and solvers stopped early."""

@@ -1,0 +1,14 @@
+"""Vertex block descent on our own energies, cut after a number of sweeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from benchmarks.methods.solvers.simulation import Simulation
+
+
+def make(*, models: Path, seed: int, iterations: int) -> Simulation:
+    """A simulation whose every step is `iterations` sweeps of vertex block descent."""
+    from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
+
+    return Simulation(options={"method": VertexBlockDescent, "max_iterations": iterations})

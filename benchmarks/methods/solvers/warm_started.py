@@ -1,0 +1,150 @@
+"""A network's frame, or skinning's, as the first guess of a step, and a few iterations of a solver from it.
+
+The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while the
+network sees what it always sees. The potential of the step is frozen as for every solver (contact planes at
+the guess that the body carries), and only the starting point differs. The time of the network or of skinning
+is that of run(); posed body, features and joint transforms are ready before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.method import Method, posed_body
+from benchmarks.methods.solvers.simulation import Simulation
+from benchmarks.results.run_folder import model_path
+from benchmarks.scene import BuiltScene
+from reference_sim import Potential, Trajectory
+from reference_sim.minimise import Minimiser, Result, make_minimiser
+
+if TYPE_CHECKING:
+    from benchmarks.methods.solvers.carried_residual import CarriedResidual
+
+SKINNING = "skinning"
+SHARE = 0.6  # of the last residual
+
+
+class FromElsewhere:
+    """A minimiser that starts each step where `starts` says, whatever guess it is given."""
+
+    def __init__(self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray) -> None:
+        self._inner, self._starts, self._pins = inner, starts, pins
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        """Run from the next start; pinned vertices stay where x0 (V, 3) [m] has them."""
+        start = next(self._starts)
+        start[self._pins] = x0[self._pins]
+        return self._inner.minimise(start)
+
+
+class WithResidual(FromElsewhere):
+    """The same, and SHARE of what the inner minimiser added to the last frame, carried by the skin.
+
+    first: (V, 3) [m] what the start of the scene adds to frame 0 from elsewhere.
+    """
+
+    def __init__(
+        self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray, first: np.ndarray,
+        carry: CarriedResidual,
+    ) -> None:  # fmt: skip
+        super().__init__(inner, starts, pins)
+        self._added, self._carry, self._frame = first, carry, 0
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        self._frame += 1
+        given = next(self._starts)
+        start = given + SHARE * self._carry.carried(self._added, self._frame)
+        start[self._pins] = x0[self._pins]
+        result = self._inner.minimise(start)
+        self._added = result.positions - given
+        return result
+
+
+@dataclass
+class WarmStarted(Method):
+    """A simulation whose steps start at frames from elsewhere and are cut short.
+
+    residual: whether the last frame's residual is carried. simulation: what does the steps.
+    Raises ValueError for a scene of several steps a frame: there is a start for its last alone.
+    """
+
+    guess: str
+    path: Path
+    solver: dict[str, Any]
+    residual: bool = False
+    simulation: Simulation = field(default_factory=lambda: Simulation(options={}))
+    of_guess: Callable[[int], object] = field(init=False)
+
+    def prepare(self, scene: BuiltScene) -> None:
+        if scene.substeps > 1:
+            raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
+        frames = self._frames(scene)
+        carry = self._carry(scene) if self.residual else None
+
+        def from_elsewhere(potential: Potential, **options: Any) -> FromElsewhere:
+            starts = frames()
+            first = next(starts)  # frame 0 is the scene's start, as for every solver
+            inner, pins = make_minimiser(potential, **self.solver), np.asarray(potential.cloth.pins)
+            if carry is None:
+                return FromElsewhere(inner, starts, pins)
+            assert scene.start is not None
+            return WithResidual(inner, starts, pins, scene.start - first, carry)
+
+        self.simulation.options = {"method": from_elsewhere}
+        self.simulation.prepare(scene)
+
+    def run(self) -> Trajectory:
+        return self.simulation.run()
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Those of the network or of skinning, and the posed body."""
+        assert scene.dressed is not None
+        body = posed_body(scene.dressed)
+        return lambda frame: (self.of_guess(frame), body(frame))
+
+    def _frames(self, scene: BuiltScene) -> Callable[[], Iterator[np.ndarray]]:
+        """What gives world positions (V, 3) [m] frame after frame, from the first one on, at each call."""
+        from snug.networks.dressed_body import DressedBody
+        from snug.networks.roll_out import frame_inputs, predictions, skinned_frames
+        from snug.networks.trained_model import TrainedModel
+        from snug.recipes.recipe import DEFAULT
+
+        assert scene.dressed is not None
+        motion, betas, before = scene.dressed.motion, scene.dressed.betas, scene.dressed.before
+        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        model = None if self.guess == SKINNING else TrainedModel.load(self.path)
+        self.of_guess = frame_inputs(model, dressed, motion, betas, before=before)
+        if model is None:
+            return skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
+        return predictions(model, dressed, motion, betas, before=before)
+
+    def _carry(self, scene: BuiltScene) -> CarriedResidual:
+        from benchmarks.methods.solvers.carried_residual import CarriedResidual
+        from snug.networks.dressed_body import DressedBody
+        from snug.recipes.recipe import DEFAULT
+
+        assert scene.dressed is not None
+        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        transforms = dressed.transforms(scene.dressed.motion.poses, scene.dressed.betas)
+        return CarriedResidual(dressed.weights(DEFAULT.smoothing), transforms)
+
+
+def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:
+    """`iterations` of "newton", "lbfgs" or "fast-lbfgs" from the network of kind `guess`, or from "skinning".
+
+    With "fast-lbfgs" the last residual is carried.
+    """
+    options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
+    path, fast = model_path(models, guess, seed), solver == "fast-lbfgs"
+    if fast:
+        from benchmarks.methods.solvers.fast_lbfgs import FastSimulation
+        from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
+
+        return WarmStarted(guess, path, options | {"method": CompiledLBFGS}, fast, FastSimulation(options={}))
+    options |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
+    return WarmStarted(guess, path, options)

@@ -1,0 +1,1 @@
+"""Metrics of cost, and of what a network was trained on."""

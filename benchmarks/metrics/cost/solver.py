@@ -1,0 +1,22 @@
+"""What a minimising method says of its own steps."""
+
+from __future__ import annotations
+
+from benchmarks.metric import Metric, RollOut
+
+RELAXED = "relaxed"  # the simulator's field of frames
+METRICS = (
+    Metric(
+        name="solver/relaxed_frames",
+        unit="frames",
+        title="Relaxed",
+        definition="frames that count as converged though a step ended above its tolerance, at round-off",
+        lower_is_better=True,
+    ),
+)
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Of methods that minimise to a tolerance, over all frames."""
+    fields = roll_out.trajectory.frame_fields
+    return {METRICS[0].name: float(fields[RELAXED].sum())} if RELAXED in fields else {}

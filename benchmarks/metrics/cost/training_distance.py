@@ -1,0 +1,41 @@
+"""How new the poses of a scene are to a network: the distance of each to the nearest pose that it trained on.
+
+Mixed training poses count. See snug.motion.motion.nearest_pose for the distance.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.metric import Metric
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
+
+DISTANCE = "angle to the nearest training pose, mixed ones included, mean over joints: "
+
+METRICS = (
+    Metric(
+        name="training_distance/median", unit="deg", title="From training poses", table="training_distance",
+        definition=f"{DISTANCE}median over frames",
+    ),
+    Metric(
+        name="training_distance/p95", unit="deg", title="95 % of frames below", table="training_distance",
+        definition=f"{DISTANCE}95th percentile of frames",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    from snug.motion.motion import nearest_pose
+
+    dressed, known = roll_out.scene.dressed, roll_out.training_poses
+    if dressed is None or known is None:
+        return {}
+    degrees = np.rad2deg(nearest_pose(dressed.motion.poses[roll_out.judged], known))
+    return {
+        "training_distance/median": float(np.median(degrees)),
+        "training_distance/p95": float(np.percentile(degrees, 95)),
+    }

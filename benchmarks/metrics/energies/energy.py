@@ -1,0 +1,152 @@
+"""Energy of every declared term at every frame of a trajectory, by the very terms that were minimised.
+
+Each method is judged on its own history: inertia compares a frame with the two before it in the same
+trajectory, and contact planes are searched at the method's own positions. A frame before the third has no
+two before it; it counts as moving freely, hence inertia 0 there. Means are over the frames after the warm-up.
+
+"Sudden motion changes naturally produce peaks in the inertial term", the paper says. `inertia/correlation` is
+Pearson's between two root mean square accelerations by mass, each the square root of an inertia: the
+method's, and that of the garment that the body's joints move alone. It says whether the one peaks where the
+other does, not how high.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Metric, skinned
+from benchmarks.metrics.energies.time_step import own_terms
+from reference_sim.energies.gravity import Gravity
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut, SceneRollOuts
+    from benchmarks.scene import BuiltScene
+    from reference_sim.energies import Energy
+
+FIRST_FULL_FRAME = 2
+
+
+def _energy(term: str, definition: str, title: str = "", *, arbitrary_zero: bool = False) -> Metric:
+    return Metric(
+        name=f"energy/{term}", unit="J", title=title or term.capitalize(), definition=definition,
+        table="energies", lower_is_better=True, arbitrary_zero=arbitrary_zero,
+    )  # fmt: skip
+
+
+METRICS = (
+    _energy("strain", "membrane energy of the declared material, mean over frames"),
+    _energy("bending", "energy of the hinges, mean over frames"),
+    _energy("gravity", "weight times height above the pelvis in that frame, mean over frames: its zero moves "
+            "with the body", arbitrary_zero=True),
+    _energy("inertia", "sum of m / (2 dt^2) |x - 2 x' + x''|^2 over vertices, x' and x'' the method's "
+            "own last two frames; mean over frames"),
+    _energy("collision", "cubic penalty of vertices, edge midpoints and centroids nearer to the body than "
+            "the margin, contact planes searched at the method's own positions; mean over frames"),
+    _energy("total", "sum of all terms that the scene declares, and inertia; its zero is that of gravity",
+            arbitrary_zero=True),
+    _energy("*", "energy of that term, mean over frames", "{}"),
+    Metric(
+        name="inertia/correlation", unit="1", title="Inertia with the body's",
+        definition="correlation over frames of the square roots of two inertias: the method's, and that of "
+        "the garment skinned to the poses, which is the body's acceleration where the garment lies",
+    ),
+)  # fmt: skip
+
+
+def energy_series(
+    scene: BuiltScene, trajectories: Sequence[NDArray[np.float64]]
+) -> list[dict[str, NDArray[np.float64]]]:
+    """Of each trajectory (T,V,3) [m]: term -> (T,) [J], plus "total". Terms not declared have no entry.
+
+    Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
+    """
+    own = [own_terms(scene) for _ in trajectories]
+    found = [{name: np.zeros(len(positions)) for name in scene.terms} for positions in trajectories]
+    for frame in range(max(map(len, trajectories), default=0)):
+        for positions, terms, series in zip(trajectories, own, found):
+            if frame < len(positions):
+                for name, value in _terms_at(scene, terms, positions, frame).items():
+                    series[name][frame] = value
+    for series in found:
+        series["total"] = np.sum(list(series.values()), axis=0)
+    return found
+
+
+def _terms_at(
+    scene: BuiltScene, terms: Sequence[Energy], positions: NDArray[np.float64], frame: int
+) -> dict[str, float]:
+    from reference_sim.energies import Step
+
+    x = np.ascontiguousarray(positions[frame])
+    previous, before = positions[max(frame - 1, 0)], positions[max(frame - 2, 0)]
+    step = Step(
+        previous=previous,
+        velocity=(previous - before) / scene.dt,
+        guess=x,
+        dt=scene.dt,
+        obstacle=scene.obstacle,
+        frame=frame,
+    )
+    values = {}
+    for term in terms:
+        if term.name == "inertia" and frame < FIRST_FULL_FRAME:
+            continue
+        term.prepare(step)
+        values[term.name] = term.value_and_gradient(x)[0]
+        if term.name == "gravity" and scene.origin_heights is not None:
+            assert isinstance(term, Gravity)
+            values["gravity"] -= term.weights.sum() * (scene.origin_heights[frame] - term.origin_height)
+    return values
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Means over the judged frames [J per frame]."""
+    found = energies(roll_out)
+    means = {f"energy/{term}": float(series[roll_out.judged].mean()) for term, series in found.items()}
+    correlation = correlation_with_body(roll_out)
+    return means if correlation is None else means | {"inertia/correlation": correlation}
+
+
+def series(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
+    return {f"energy/{term}": series for term, series in energies(roll_out).items()}
+
+
+def energies(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
+    """Term -> (T,) [J], and "total"; of all roll-outs of the scene at once."""
+    return roll_out.group.kept(_of_all)[roll_out.place]
+
+
+def _of_all(group: SceneRollOuts) -> list[dict[str, NDArray[np.float64]]]:
+    return energy_series(group.scene, group.positions)
+
+
+def correlation_with_body(roll_out: RollOut) -> float | None:
+    """Of the method's accelerations with the body's; None without a body, where frames of the motion are left
+    out, or where one of them does not vary.
+    """
+    group = roll_out.group
+    bare = group.kept(skinned)
+    if bare is None or group.scene.kept is not None:
+        return None
+    frames = roll_out.judged_beside(bare)
+    masses = group.scene.cloth.masses
+    own, body = (accelerations(x, masses, group.scene.dt)[frames] for x in (roll_out.positions, bare))
+    if len(own) < 3 or min(np.ptp(size) / size.max(initial=1e-300) for size in (own, body)) < 1e-9:
+        return None
+    return float(np.corrcoef(own, body)[0, 1])
+
+
+def accelerations(
+    positions: NDArray[np.float64], masses: NDArray[np.float64], dt: float
+) -> NDArray[np.float64]:
+    """(T,) root mean square by mass of the second difference of positions (T,V,3) [m] [m/s^2]; the first two
+    are 0. Half the whole mass times dt^2 times its square is the inertia energy.
+    """
+    found = np.zeros(len(positions))
+    squared = (np.diff(positions, 2, axis=0) ** 2).sum(2)
+    found[FIRST_FULL_FRAME:] = np.sqrt(squared @ masses / masses.sum()) / dt**2
+    return found

@@ -1,0 +1,94 @@
+"""The dynamic metrics of a dressed scene: the hem of a method beside those of the simulator. See hem.py."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.metric import Metric
+from benchmarks.metrics.motion.hem import AFTER, HemMotion, stop_frame
+from benchmarks.metrics.surface.distances import rms
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
+
+
+def _dynamics(name: str, unit: str, title: str, definition: str, table: str = "dynamics") -> Metric:
+    return Metric(name=f"dynamics/{name}", unit=unit, title=title, definition=definition, table=table)
+
+
+COMMON = ("amplitude", "correlation", "gain", "lag")
+
+METRICS = (
+    _dynamics("quasi_static_difference", "mm", "From quasi-static",
+              "root mean square distance to the method's own answer to each pose held still"),
+    _dynamics("amplitude", "1", "A", "amplitude of the hem's dynamic part over that of the simulation's; the "
+              "dynamic part is what motion adds to the own answer to poses held still"),
+    _dynamics("correlation", "1", "Correlation", "cosine between the two dynamic parts"),
+    _dynamics("gain", "1", "Gain", "factor by which the hem answers its own quasi-static turn or shift"),
+    _dynamics("lag", "frames", "Lag", "frames by which it comes later"),
+    *(_dynamics(f"common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
+                "the same where every method's dynamic part is taken from the simulator's answer to poses "
+                "held still instead of its own", table="dynamics" if name in COMMON[:2] else "")
+      for name, title in zip(COMMON, ("A", "Correlation", "Gain", "Lag"))),
+    _dynamics("ringing", "mm", "Ringing", "distance of the hem to where it ends, after the body has stopped"),
+    *(_dynamics(f"ringing/{after}", "mm", f"Ringing, {after} frames",
+                f"the same {after} frames after the stop", table="") for after in AFTER),
+    _dynamics("spectrum", "1", "Spectrum", "difference of the hem's acceleration spectrum from the "
+              "simulation's, as a share of the latter"),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    x, group = roll_out.positions, roll_out.group
+    own = group.quasi_static if roll_out is group.reference else roll_out.quasi_static
+    found: dict[str, float] = compare(roll_out, roll_out) if roll_out is group.reference else {}
+    if own is not None:
+        frames = roll_out.judged_beside(own)
+        found["dynamics/quasi_static_difference"] = rms(x[frames], own[frames])
+    return found
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """By the method's own answer to poses held still and, under other names, by the simulator's. Where nobody
+    knows the own one, what it does not enter is left.
+    """
+    hem, x, own = reference.kept(hem_motion), roll_out.positions, roll_out.quasi_static
+    if hem is None:
+        return {}
+    found: dict[str, float] = {}
+    common = hem.measure(x)
+    if own is None:
+        known = roll_out.entry.static_known
+        found |= {n: v for n, v in common.items() if known or n.removeprefix("dynamics/") not in COMMON}
+    elif len(own) >= len(x) and np.isfinite(own).all():
+        found |= hem.measure(x, own)
+    return found | {f"dynamics/common_{name}": common[f"dynamics/{name}"] for name in COMMON
+                    if f"dynamics/{name}" in common}  # fmt: skip
+
+
+def series(roll_out: RollOut) -> dict[str, np.ndarray]:
+    reference = roll_out.group.reference
+    hem = None if reference is None else reference.kept(hem_motion)
+    return {} if hem is None else hem.curves(roll_out.positions)
+
+
+def hem_motion(reference: RollOut) -> HemMotion | None:
+    """What to measure hems of this scene in; None without a body or the simulator's static answer."""
+    group, dressed = reference.group, reference.scene.dressed
+    if dressed is None or group.quasi_static is None:
+        return None
+    from snug.body.skeleton import rotation_matrices
+
+    motion = dressed.motion
+    return HemMotion(
+        axes=rotation_matrices(motion.poses[:, 0]),
+        origins=dressed.pelvis,
+        stop=stop_frame(motion.poses, motion.translations),
+        hem=dressed.garment.hem,
+        simulated=reference.positions,
+        quasi_static=group.quasi_static,
+        dt=group.scene.dt,
+        first=group.scene.warm_up,
+    )

@@ -1,0 +1,1 @@
+"""Metrics of a surface, from positions alone."""

@@ -1,0 +1,59 @@
+"""Does the body pass through itself? Cloth in such a fold has nowhere to be, whichever method moves it.
+
+Asked of the motion, so of the reference's rows alone.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Metric
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
+
+SAMPLES = 24  # frames that are looked at, evenly spaced: 50 ms each
+OFF = 1e-3  # [m] off the skin, where a point is inside the body only if another part of it is there
+
+METRICS = (
+    Metric(
+        name="body/self_intersection", unit="%", title="Body in itself", lower_is_better=True,
+        definition="vertices of the body inside another part of it and not so at rest, in the worst of 24 "
+        "judged frames",
+    ),
+    Metric(
+        name="body/self_intersection_frame", unit="1", title="Worst frame",
+        definition="the frame of these in which most vertices of the body are inside another part of it",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    scene, frames = roll_out.scene, len(roll_out.positions)
+    if roll_out.entry.role != "reference" or scene.dressed is None or scene.obstacle is None:
+        return {}
+    faces, rest = scene.obstacle.faces, scene.dressed.body.shaped(scene.dressed.betas)
+    at_rest = inside_itself(rest, faces)  # eyes in their sockets
+    judged = np.unique(np.linspace(scene.warm_up, frames - 1, SAMPLES).round().astype(int))
+    share = [(inside_itself(scene.obstacle.at(frame), faces) & ~at_rest).mean() for frame in judged]
+    worst = int(np.argmax(share))
+    return {
+        "body/self_intersection": 100.0 * float(share[worst]),
+        "body/self_intersection_frame": float(judged[worst]),
+    }
+
+
+def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(B,) which vertices x (B,3) [m] of a closed surface, faces (F,3) outward, are inside another part.
+
+    There the winding number of the surface around a point a little off the vertex, along its normal, is one.
+    """
+    import igl
+
+    from reference_sim.geometry.surface import vertex_normals
+
+    points = np.asfortranarray(x + OFF * vertex_normals(x, faces))
+    return np.asarray(igl.fast_winding_number(np.asfortranarray(x), faces, points)).ravel() > 0.5

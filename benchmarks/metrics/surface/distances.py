@@ -1,0 +1,154 @@
+"""Distances between surfaces and into the body, from positions alone. No physics here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Metric
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut, SceneRollOuts
+    from reference_sim import Obstacle
+
+Floats = NDArray[np.float64]
+
+MM = 1e3
+DEEP = 5e-3  # [m] below the skin: what an eye sees
+
+METRICS = (
+    Metric(
+        name="distance/rms", unit="mm", title="Distance", table="penetration", lower_is_better=True,
+        definition="root mean square distance between the same vertices of method and simulation",
+    ),
+    Metric(
+        name="distance/p95", unit="mm", title="95 %", table="penetration", lower_is_better=True,
+        definition="95 % of these distances are smaller",
+    ),
+    Metric(
+        name="penetration/vertices", unit="%", title="Below the skin", table="penetration",
+        lower_is_better=True, definition="vertices inside the body, none left out, mean over frames",
+    ),
+    Metric(
+        name="penetration/deep", unit="%", title="Deep", table="penetration", lower_is_better=True,
+        definition="vertices more than 5 mm inside the body",
+    ),
+    Metric(
+        name="penetration/depth_p99", unit="mm", title="Depth, 99 %", lower_is_better=True,
+        definition="99 % of all vertices and frames are less deep; 0 outside",
+    ),
+    Metric(
+        name="penetration/own_part_p999", unit="mm", title="Own part", table="penetration",
+        lower_is_better=True,
+        definition="99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold of a "
+        "hip does not count",
+    ),
+    Metric(
+        name="drift/hem", unit="mm", title="Hem drift", table="penetration",
+        definition="how far the hem's mean height above the pelvis has risen from the first judged frame to "
+        "the last",
+    ),
+)  # fmt: skip
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    frames = roll_out.judged_beside(reference.positions)
+    x, y = roll_out.positions[frames], reference.positions[frames]
+    return {
+        "distance/rms": rms(x, y),
+        "distance/p95": MM * float(np.percentile(np.linalg.norm(x - y, axis=2), 95)),
+    }
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    scene, x, judged = roll_out.scene, roll_out.positions, roll_out.judged
+    if scene.obstacle is None:
+        return {}
+    own = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
+    inside = inside_of(roll_out)
+    depth = inside.depth[judged]
+    found = {
+        "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
+        "penetration/deep": 100.0 * float((depth > DEEP).mean()),
+        "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
+        "penetration/own_part_p999": MM * float(np.percentile(own, 99.9)),
+    }
+    if scene.dressed is not None and scene.origin_heights is not None:
+        heights = scene.origin_heights[: len(x)][judged]
+        found["drift/hem"] = MM * hem_drift(x[judged], scene.dressed.garment.hem, heights)
+    return found
+
+
+def inside_of(roll_out: RollOut) -> Penetration:
+    """How deep its vertices lie in the obstacle; of all roll-outs of the scene at once."""
+    return roll_out.group.kept(_of_all)[roll_out.place]
+
+
+def _of_all(group: SceneRollOuts) -> list[Penetration]:
+    assert group.scene.obstacle is not None
+    return penetration(group.positions, group.scene.obstacle)
+
+
+def rms(x: Floats, y: Floats) -> float:
+    """Root mean square distance [mm] between the vertices of x and y (T,V,3) [m], over all frames."""
+    return MM * float(np.sqrt((distance_rms(x, y) ** 2).mean()))
+
+
+def distance_rms(positions: Floats, reference: Floats) -> Floats:
+    """(T,) root mean square distance [m] between the same vertices of (T,V,3) and (T,V,3) [m].
+
+    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read
+    this beside the spread between two references, never alone.
+    """
+    return np.sqrt(((positions - reference) ** 2).sum(2).mean(1))
+
+
+@dataclass(frozen=True)
+class Penetration:
+    """Per frame, over all vertices with none left out: share below the skin and depth (0 outside) [m]."""
+
+    share: Floats  # (T,)
+    depth: Floats  # (T,V)
+
+
+def penetration(trajectories: Sequence[Floats], obstacle: Obstacle) -> list[Penetration]:
+    """How deep the vertices of each trajectory (T,V,3) [m] lie in the obstacle, by its true signed distance.
+
+    All trajectories are asked about together at each frame: the obstacle's search tree is made once.
+    """
+    depths = [np.empty(positions.shape[:2]) for positions in trajectories]
+    for frame in range(max(map(len, trajectories), default=0)):
+        present = [k for k, positions in enumerate(trajectories) if frame < len(positions)]
+        points = np.concatenate([trajectories[k][frame] for k in present])
+        inside = np.maximum(0.0, -np.asarray(obstacle.signed_distance(points, frame)))
+        ends = np.cumsum([trajectories[k].shape[1] for k in present])
+        for k, part in zip(present, np.split(inside, ends[:-1])):
+            depths[k][frame] = part
+    return [Penetration(share=(depth > 0.0).mean(1), depth=depth) for depth in depths]
+
+
+def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats) -> Floats:
+    """(T,V) depth [m] of positions (T,V,3) under the part of the body that each vertex belongs to.
+
+    The true signed distance also counts cloth in the fold of a hip or between arm and chest, which no eye
+    sees; this one measures against the faces near a vertex's own rest position (V,3) alone.
+    """
+    depth = np.empty(positions.shape[:2])
+    for frame, x in enumerate(positions):
+        planes = obstacle.planes(np.ascontiguousarray(x), frame, rest_positions)
+        gap = np.einsum("vi,vi->v", planes.normals, x - planes.points)
+        depth[frame] = np.maximum(0.0, -gap)
+    return depth
+
+
+def hem_drift(positions: Floats, hem: NDArray[np.int64], origin_heights: Floats) -> float:
+    """How far the hem's mean height above the pelvis has risen from the first frame to the last [m].
+
+    positions (T,V,3) [m], hem: vertex indices, origin_heights (T,) [m]. A shirt that crept up stays up.
+    """
+    heights = positions[:, hem, 1].mean(1) - origin_heights[: len(positions)]
+    return float(heights[-1] - heights[0])

@@ -1,0 +1,81 @@
+"""Triangles of a cloth that pass through others of the same cloth. No physics here.
+
+Two triangles without a common vertex intersect where an edge of one crosses the inside of the other. Pairs
+come from a sweep along x over bounding boxes. Triangles that touch in one plane count as apart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference_sim.kernels.kernel_cache import njit
+
+Floats = NDArray[np.float64]
+
+
+def intersecting_share(positions: Floats, faces: NDArray[np.int64]) -> Floats:
+    """(T,) share of the faces (F,3) that pass through another one, in positions (T,V,3) [m]."""
+    return np.array([intersecting(np.ascontiguousarray(x), faces).mean() for x in positions])
+
+
+def intersecting(x: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(F,) which faces (F,3) of positions (V,3) [m] pass through another one without a common vertex."""
+    corners = x[faces]
+    low, high = corners.min(1), corners.max(1)
+    order = np.argsort(low[:, 0], kind="stable")
+    hit = np.zeros(len(faces), dtype=np.bool_)
+    _sweep(x, np.ascontiguousarray(faces, dtype=np.int64), low, high, order, hit)
+    return hit
+
+
+@njit(cache=True)
+def _sweep(x, faces, low, high, order, hit):
+    count = len(order)
+    for at in range(count):
+        e = order[at]
+        for other in range(at + 1, count):
+            f = order[other]
+            if low[f, 0] > high[e, 0]:
+                break
+            if low[f, 1] > high[e, 1] or low[e, 1] > high[f, 1]:
+                continue
+            if low[f, 2] > high[e, 2] or low[e, 2] > high[f, 2]:
+                continue
+            if (hit[e] and hit[f]) or _neighbours(faces[e], faces[f]):
+                continue
+            if _crosses(x, faces[e], faces[f]) or _crosses(x, faces[f], faces[e]):
+                hit[e] = True
+                hit[f] = True
+
+
+@njit(cache=True, inline="always")
+def _neighbours(e, f):
+    for i in range(3):
+        for j in range(3):
+            if e[i] == f[j]:
+                return True
+    return False
+
+
+@njit(cache=True, inline="always")
+def _volume(x, a, b, c, d):
+    """Six times the signed volume of a tetrahedron."""
+    p0, p1, p2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+    q0, q1, q2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+    r0, r1, r2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]
+    return p0 * (q1 * r2 - q2 * r1) + p1 * (q2 * r0 - q0 * r2) + p2 * (q0 * r1 - q1 * r0)
+
+
+@njit(cache=True)
+def _crosses(x, edges_of, face):
+    """Whether an edge of one triangle passes through the inside of the other."""
+    a, b, c = face[0], face[1], face[2]
+    for i in range(3):
+        p, q = edges_of[i], edges_of[(i + 1) % 3]
+        if _volume(x, a, b, c, p) * _volume(x, a, b, c, q) >= 0.0:
+            continue
+        first, second, third = _volume(x, p, q, a, b), _volume(x, p, q, b, c), _volume(x, p, q, c, a)
+        if (first > 0.0 and second > 0.0 and third > 0.0) or (first < 0.0 and second < 0.0 and third < 0.0):
+            return True
+    return False

@@ -1,0 +1,36 @@
+"""How fine the mesh of a scene is; said once, with the reference."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from benchmarks.metric import Metric
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
+
+METRICS = (
+    Metric(
+        name="mesh/vertices", unit="1", title="Vertices", table="dependence",
+        definition="vertices of the garment",
+    ),
+    Metric(
+        name="mesh/edge", unit="mm", title="Edge", table="dependence",
+        definition="mean length of its edges at rest",
+    ),
+    Metric(
+        name="mesh/steps", unit="1", title="Steps of a frame", table="dependence",
+        definition="time steps that a frame is simulated in",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    cloth = roll_out.scene.cloth
+    if roll_out.entry.role != "reference":
+        return {}
+    return {
+        "mesh/vertices": float(cloth.vertex_count),
+        "mesh/edge": 1e3 * float(cloth.edge_lengths.mean()),
+        "mesh/steps": float(roll_out.scene.substeps),
+    }

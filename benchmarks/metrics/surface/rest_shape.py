@@ -1,0 +1,74 @@
+"""How far a frame is from the shape that the cloth was cut in: edges, areas and folds. No physics here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Metric
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+METRICS = (
+    Metric(
+        name="deformation/edges", unit="%", title="Edges", table="shape",
+        definition="|length / rest length - 1|, mean over edges and frames",
+    ),
+    Metric(
+        name="deformation/areas", unit="%", title="Areas", table="shape",
+        definition="|area / rest area - 1|, mean over faces and frames",
+    ),
+    Metric(
+        name="dihedral/mean", unit="deg", title="Folds", table="shape",
+        definition="angle between the normals of the two faces of an inner edge, mean over edges and frames",
+    ),
+    Metric(
+        name="intersections/triangles", unit="%", title="Self-cut", table="shape", lower_is_better=True,
+        definition="triangles that pass through another one of the same cloth, mean over frames",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    from benchmarks.metrics.surface.intersections import intersecting_share
+
+    cloth, x = roll_out.scene.cloth, roll_out.positions[roll_out.judged]
+    return {
+        "deformation/edges": 100.0 * float(edge_change(x, cloth.edges, cloth.edge_lengths).mean()),
+        "deformation/areas": 100.0 * float(area_change(x, cloth.faces, cloth.areas).mean()),
+        "dihedral/mean": float(np.rad2deg(dihedral_angle(x, cloth.hinges).mean())),
+        "intersections/triangles": 100.0 * float(intersecting_share(x, cloth.faces).mean()),
+    }
+
+
+def edge_change(positions: Floats, edges: Indices, rest_lengths: Floats) -> Floats:
+    """(T,) mean over edges of |length / rest length - 1| [1]; positions (T,V,3), rest lengths (E,) [m]."""
+    vectors = positions[:, edges[:, 1]] - positions[:, edges[:, 0]]
+    return np.abs(np.linalg.norm(vectors, axis=2) / rest_lengths - 1.0).mean(1)
+
+
+def area_change(positions: Floats, faces: Indices, rest_areas: Floats) -> Floats:
+    """(T,) mean over faces of |area / rest area - 1| [1]; positions (T,V,3) [m], rest areas (F,) [m^2]."""
+    corners = positions[:, faces]
+    normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
+    return np.abs(0.5 * np.linalg.norm(normals, axis=2) / rest_areas - 1.0).mean(1)
+
+
+def dihedral_angle(positions: Floats, hinges: Indices) -> Floats:
+    """(T,) mean over inner edges of the angle between the normals of their two faces [rad], 0 where flat.
+
+    hinges: (H,4) the edge's ends, then the tip of either face.
+    """
+    if not len(hinges):
+        return np.zeros(len(positions))
+    a, b, left, right = (positions[:, hinges[:, k]] for k in range(4))
+    edge = b - a
+    n1, n2 = np.cross(edge, left - a), np.cross(right - a, edge)
+    sine = np.linalg.norm(np.cross(n1, n2), axis=2)
+    return np.arctan2(sine, (n1 * n2).sum(2)).mean(1)

@@ -1,0 +1,81 @@
+"""The text of --list: every name that the command knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from benchmarks.method import MethodEntry
+from benchmarks.methods import METHODS
+from benchmarks.performance.microbenchmark import SUITE
+from benchmarks.performance.registry import MICROBENCHMARKS
+from benchmarks.plan import plug_ins as outside
+from benchmarks.plan.selection import default_suites
+from benchmarks.plan.suites import SUITES
+from benchmarks.presets import PRESETS, find_preset
+from benchmarks.scenes import FURTHER, GARMENT_SCENES, SCENES
+from benchmarks.scenes.variations import shapes, there_and_back
+from benchmarks.validation.registry import CASES
+
+
+def listing() -> str:
+    """Suites, scenes, methods, motions and presets, one line each."""
+    from snug.motion.library import DYNAMIC_TEST, DYNAMIC_TRAIN, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
+
+    swinging = dict.fromkeys(DYNAMIC_TEST, "test") | dict.fromkeys(DYNAMIC_VALIDATION, "validation")
+    roles = dict.fromkeys(TEST, "test") | dict.fromkeys(VALIDATION, "validation") | swinging
+    dressed = [
+        (scene.name, f"{scene.description} ({role})")
+        for scenes in GARMENT_SCENES
+        for motion, role in (swinging if scenes.dynamic else roles).items()
+        for scene in (scenes.scene(motion),)
+    ]
+    parts = (
+        ("suites", ((s.name, s.description) for s in SUITES)),
+        (
+            "scenes; of a dressed body, in a test or validation motion, also its liveliest part, as "
+            f"{dressed[0][0]}@clip",
+            [
+                *((s.name, s.description) for s in SCENES),
+                *dressed,
+                *((s.name, s.description) for s in map(there_and_back, TEST[:1])),
+                *((s.name, s.description) for s in shapes(TEST[0])),
+                *((s.name, s.description) for s in FURTHER),
+            ],
+        ),
+        (
+            "methods, and the suites in which they take part without being named",
+            ((m.name, f"{m.description} {_where(m)}") for m in METHODS),
+        ),
+        ("training motions", ((name, "") for name in TRAIN)),
+        ("training motions of garments with dynamics", ((name, "") for name in DYNAMIC_TRAIN)),
+        ("presets", ((p.name, p.description) for p in PRESETS)),
+        *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
+        (f"microbenchmarks of suite {SUITE}", {b.name: b.description for b in MICROBENCHMARKS}.items()),
+        *(
+            (f"{kind.word} of installed packages", rows)
+            for kind in outside.KINDS
+            if (rows := outside.described(kind))
+        ),
+    )
+    return "\n\n".join(_section(title, rows) for title, rows in parts)
+
+
+def _cases(suite: str) -> list[tuple[str, str]]:
+    """Of a suite; points of one map, which share a scene, in one line."""
+    found: dict[str, list[str]] = {}
+    for case in (case for case in CASES if case.suite == suite):
+        found.setdefault(f"{case.scene}/*" if case.scene else case.name, []).append(case.description)
+    return [(name, f"{len(d)} points, {d[0]} the first" if d[1:] else d[0]) for name, d in found.items()]
+
+
+def _where(method: MethodEntry) -> str:
+    suites = default_suites(method.name, find_preset("quick"))
+    return f"[{', '.join(suites)}]" if suites else "[when named]"
+
+
+def _section(title: str, rows: Iterable[tuple[str, str]]) -> str:
+    rows = list(rows)
+    if not any(description for _, description in rows):
+        return f"{title}\n  {', '.join(name for name, _ in rows)}"
+    width = max(len(name) for name, _ in rows)
+    return "\n".join([title, *(f"  {name:<{width}}  {description}".rstrip() for name, description in rows)])

@@ -1,0 +1,115 @@
+"""The options of benchmarks.run, and those of a scene, which benchmarks.score and benchmarks.export take too.
+
+Light, so that --help answers at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from benchmarks.external.roll_out_option import HELP as ROLL_OUT_HELP
+from benchmarks.presets import PRESETS
+from reference_sim.command.command_line import Parser
+from snug.garments.options import add_garment_options
+from snug.motion.options import add_motion_options
+
+PROGRAM = "benchmarks.run"
+EXAMPLES = """examples:
+  python -m benchmarks.run                                    the quick run: every suite's quick subset
+  python -m benchmarks.run --preset smoke                     everything once, tiny, about 3 minutes
+  python -m benchmarks.run --suite garments -o reports/runs/mine
+  python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
+  python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2
+  python -m benchmarks.run --methods ./mine.py,snug,simulation --metrics ./my_metric.py
+  python -m benchmarks.run --motions clips/ --test-motions 01_01
+  python -m benchmarks.run --suite garments --methods 'simulation,skinning,snug,snug-without-*' \\
+      --split validation                                        what each choice of the recipe does
+  python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
+  python -m benchmarks.run --motions library --motions mine.amc
+  python -m benchmarks.run --motions mocap.bvh --motion-up z --repair
+  python -m benchmarks.run --body mine.npz --suite garments
+  python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
+  python -m benchmarks.run --seeds 0,1,2 --scheduler tcp://10.0.0.1:8786
+  python -m benchmarks.run --garment shirt.obj --garment-units cm --body mine.npz --suite garments
+
+motions: without --motions the embedded library, whose motions train, validate or test (docs/protocol.md).
+  With --motions the files replace the library; "library" among the paths keeps it. --test-motions and
+  --validation-motions name those of these roles, all others train, but for the library's own validation
+  and test motions, which never do. Without them the library's roles hold; of files alone the first by
+  name tests and the others train; where no file is left to train on, the library trains. Files are
+  brought to 30 frames per second, placed on the floor, arms spread clear of the torso, and cut to the
+  preset's length.
+
+a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
+  as it is, the rest is done. A run that was killed is so taken up again. --only failed does again what
+  failed, --fresh everything.
+
+exit status: 0 when every cell ended as ok or as an explained skip (in extremes a failure reported with
+  its reason is an accepted outcome); 1 when a cell, a training or a simulation failed: a line says why
+  and the rest went on; 2 when the request cannot be met, also where another run is going on in the
+  folder: one line says why and nothing is left behind; 130 when it was interrupted: what had ended is
+  in the folder, whole, and the same command goes on from there."""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    parser = Parser(
+        prog=f"python -m {PROGRAM}",
+        description="Dress a body, simulate the ground truth, train the networks, compare all of them "
+        "and write tables, figures and a PDF.",
+        epilog=EXAMPLES,
+    )
+    add_scene_options(parser)
+    add = parser.add_argument
+    add("--suite", action="append", default=[], metavar="NAME",
+        help="garments, speed, validation, extremes, shapes, performance or all, in full; repeat or separate "
+        "by commas (default: the quick subset of each but shapes and performance)")  # fmt: skip
+    own = "; a file (mine.py) or an entry point of a package means all that it declares"
+    add(
+        "--scenes", action="append", default=[], metavar="NAME,...", help=f"only these; patterns allowed{own}"
+    )
+    add("--methods", action="append", default=[], metavar="NAME,...", help="only these; the same words")
+    add("--metrics", action="append", default=[], metavar="FILE,...",
+        help="metrics of your own, measured besides all others: files or entry points")  # fmt: skip
+    add("--rollout", action="append", default=[], metavar="NAME=FILE", help=ROLL_OUT_HELP)
+    add("--split", choices=("test", "validation"), default="test",
+        help="motions that the suites measure: test (default), or validation, to choose recipes")  # fmt: skip
+    add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
+    add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
+    add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
+    add("--only", action="append", default=[], metavar="STATE,...",
+        help="of what the folder holds already, do again what is failed, stale or missing (default "
+        "stale,missing; the finished is reused)")  # fmt: skip
+    add("--fresh", action="store_true", help="reuse nothing from the folder")
+    add("--workers", type=int, metavar="N",
+        help="processes side by side for ground truth, training, metrics and cases (default 2, or the "
+        "cores there are); cells that are timed run alone")  # fmt: skip
+    add("--scheduler", metavar="ADDRESS",
+        help="a cluster of dask.distributed, as tcp://HOST:8786, for all that is not timed; timed cells run "
+        "here (docs/scale.md)")  # fmt: skip
+    add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
+    add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
+    return parser
+
+
+def add_scene_options(parser: argparse.ArgumentParser) -> None:
+    """What a scene is made of; benchmarks.score and benchmarks.export take the same."""
+    add = parser.add_argument
+    names = ", ".join(preset.name for preset in PRESETS)
+    add("--preset", default="quick", metavar="NAME", help=f"how much of everything: {names} (default quick)")
+    add("--motions", action="append", default=[], metavar="PATH",
+        help="motion file (.npz, .bvh, .amc with .asf), folder, or the word library; repeatable")  # fmt: skip
+    add_motion_options(add)
+    add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
+    add("--validation-motions", action="append", default=[], metavar="NAME,...",
+        help="motions to choose recipes by; neither these nor those to test on train")  # fmt: skip
+    add(
+        "--body",
+        metavar="FILE",
+        help="an own body of SMPL's family, .npz or .pkl, in place of the package's; garments are made for "
+        "it (extreme cases of single steps keep the package's)",
+    )
+    add("--garment", metavar="FILE",
+        help="an own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; its scenes are "
+        "<name of the file>/<motion>. What will work says python -m snug.check FILE")  # fmt: skip
+    add_garment_options(parser)

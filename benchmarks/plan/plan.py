@@ -1,0 +1,238 @@
+"""What a run will do, decided and checked before anything is created. See benchmarks.plan.selection."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.presets import Preset
+from benchmarks.results.run_folder import LONGEST
+from benchmarks.scene import Scene
+from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
+from benchmarks.tasks.cell_task import Cell
+from snug.recipes.named import TRAININGS, Training
+
+if TYPE_CHECKING:
+    from benchmarks.performance.microbenchmark import Microbenchmark
+    from benchmarks.validation.case import Case
+    from snug.garments.options import GarmentFile
+    from snug.motion.motion import Motion
+
+
+class PlanError(ValueError):
+    """A request that cannot be met; the message names the word and what there is instead."""
+
+
+@dataclass(frozen=True)
+class Network:
+    """A network that some cell needs: its name, its seed, the garment it is for.
+
+    own: how it is trained, where snug.recipes.named.TRAININGS does not have it; declared_in: where that is said.
+    """
+
+    name: str
+    seed: int
+    garment: str
+    own: Training | None = None
+    declared_in: str = ""
+
+    @property
+    def label(self) -> str:
+        return f"{self.name} seed {self.seed} ({self.garment})"
+
+    @property
+    def training(self) -> Training | None:
+        """How it is trained; None: not at all."""
+        return self.own or TRAININGS.get(self.name)
+
+    @property
+    def learns_from_simulation(self) -> bool:
+        """Whether it needs simulated motions to be trained."""
+        return self.training is not None and self.training.simulated is not None
+
+
+@dataclass(frozen=True)
+class OwnBody:
+    """A user's body: its file, and a digest of what it held when the run was planned."""
+
+    path: Path
+    digest: str
+
+
+@dataclass(frozen=True)
+class OwnGarment:
+    """A user's garment: its file, how to take it, and digests of all that it is read from when the run was
+    planned.
+    """
+
+    file: GarmentFile
+    digests: tuple[str, ...]
+
+    @property
+    def scenes(self) -> GarmentScenes:
+        """What takes the place of the T-shirt's."""
+        return GarmentScenes(self.file.name, f"a garment of {self.file.path.name}")
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """What decides it: contents and options, and not where the files lie."""
+        file = self.file
+        how = [file.units, file.up, list(file.shift), file.rest, file.uv_scale]
+        return {"files": list(self.digests), "how": how}
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Names of the motions of a run, by their roles, and those that came from files.
+
+    dynamic_*: the same for garments that swing. worn: the garments that do them; the first is that of a run
+    where none is named. split: the role whose motions stand in the suites' scenes, "test" or "validation";
+    chosen: whether the user has named those.
+    """
+
+    train: tuple[str, ...] = ()
+    test: tuple[str, ...] = ()
+    files: dict[str, Motion] = field(default_factory=dict)
+    dynamic_train: tuple[str, ...] = ()
+    dynamic_test: tuple[str, ...] = ()
+    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
+    validation: tuple[str, ...] = ()
+    dynamic_validation: tuple[str, ...] = ()
+    split: str = "test"
+    chosen: bool = False
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Those of the split."""
+        return self.test if self.split == "test" else self.validation
+
+    @property
+    def dynamic_measured(self) -> tuple[str, ...]:
+        """The same for garments that swing."""
+        return self.dynamic_test if self.split == "test" else self.dynamic_validation
+
+    def role_of(self, motion: str) -> str:
+        """Its role: "training", "validation", "test", or empty where it has none in this run."""
+        roles = {
+            "test": (*self.test, *self.dynamic_test),
+            "validation": (*self.validation, *self.dynamic_validation),
+            "training": (*self.train, *self.dynamic_train),
+        }
+        return next((role for role, names in roles.items() if motion in names), "")
+
+    @property
+    def first_garment(self) -> str:
+        """The name of the first one."""
+        return self.worn[0].garment
+
+    def train_of(self, garment: str) -> tuple[str, ...]:
+        """Names of the motions that networks of a garment train on."""
+        return self.dynamic_train if of_garment(garment, self.worn).dynamic else self.train
+
+    def validation_of(self, garment: str) -> tuple[str, ...]:
+        """Names of a garment's validation motions."""
+        return self.dynamic_validation if of_garment(garment, self.worn).dynamic else self.validation
+
+    def test_of(self, garment: str) -> tuple[str, ...]:
+        """Names of a garment's test motions."""
+        return self.dynamic_test if of_garment(garment, self.worn).dynamic else self.test
+
+    def measured_of(self, garment: str) -> tuple[str, ...]:
+        """Names of a garment's motions of the split."""
+        return self.test_of(garment) if self.split == "test" else self.validation_of(garment)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Everything to be done.
+
+    body, garment: own ones; None: the package's. only: states of what the folder holds in which a task is
+    done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
+    metrics: modules of metrics that are not the project's, see benchmarks.plan.plug_ins. scheduler: address
+    of a cluster that does what is not timed; empty: this machine does. Raises PlanError, see check_names.
+    """
+
+    preset: Preset
+    suites: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    cases: tuple[Case, ...]
+    microbenchmarks: tuple[Microbenchmark, ...] = ()
+    metrics: tuple[str, ...] = ()
+    motions: Motions = Motions()
+    body: OwnBody | None = None
+    garment: OwnGarment | None = None
+    seeds: tuple[int, ...]
+    device: str
+    folder: Path
+    command: str
+    only: frozenset[str] = frozenset(("stale", "missing"))
+    fresh: bool = False
+    workers: int = 1
+    scheduler: str = ""
+
+    def __post_init__(self) -> None:
+        check_names(self.cells)
+
+    @property
+    def scenes(self) -> tuple[Scene, ...]:
+        """The scenes of all cells, each once."""
+        return tuple({cell.scene.name: cell.scene for cell in self.cells}.values())
+
+    @property
+    def networks(self) -> tuple[Network, ...]:
+        """Every network that some cell needs."""
+        return tuple(dict.fromkeys(filter(None, map(network_of, self.cells))))
+
+    @property
+    def garments(self) -> tuple[str, ...]:
+        """What bodies wear in the scenes of the plan."""
+        return tuple(dict.fromkeys(cell.scene.garment for cell in self.cells if cell.scene.dressed))
+
+    def motions_of(self, garment: str) -> tuple[str, ...]:
+        """Names of a garment's motions of the split, and of what it does besides in the plan's scenes."""
+        done = (scene.motion for scene in self.scenes if scene.garment == garment)
+        return tuple(dict.fromkeys((*self.motions.measured_of(garment), *done)))
+
+    @property
+    def simulated(self) -> tuple[str, ...]:
+        """Garments whose training motions have to be simulated."""
+        learning = (network for network in self.networks if network.learns_from_simulation)
+        return tuple(dict.fromkeys(network.garment for network in learning))
+
+    @property
+    def body_file(self) -> Path | None:
+        """The file of an own body."""
+        return self.body.path if self.body else None
+
+
+def check_names(cells: Sequence[Cell]) -> None:
+    """Raises PlanError where a name makes no file, or the files of another: slashes become hyphens, and a
+    seed stands behind a hyphen.
+    """
+    there: dict[str, Cell] = {}
+    for cell in cells:
+        for what, name in (("scene", cell.scene.name), ("method", cell.method)):
+            if len(name.encode()) > LONGEST:
+                raise PlanError(
+                    f"{what} '{name[:40]}...': its name has more than {LONGEST} bytes: shorten it"
+                )
+        if cell.method == "body" or cell.method.endswith("quasi-static"):
+            raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")
+        if (other := there.setdefault(cell.name, cell)) is not cell:
+            raise PlanError(f"{cell.label} and {other.label} would have the same files: rename one")
+
+
+def runs(cell: Cell) -> bool:
+    """Whether the cell is computed at all."""
+    return cell.entry.skip(cell.scene) is None
+
+
+def network_of(cell: Cell) -> Network | None:
+    """The network that a cell needs, where it is computed at all."""
+    entry = cell.entry
+    if not entry.trained or not runs(cell):
+        return None
+    home = entry.declared_in if entry.training else ""
+    return Network(entry.trained, cell.seed, cell.scene.garment, entry.training, home)

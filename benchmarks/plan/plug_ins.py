@@ -1,0 +1,206 @@
+"""Methods, scenes and metrics from outside the project: from a user's files and from installed packages.
+
+A file is named by its path, a package by the name of its entry point. Either means all that its tuple
+METHODS, SCENES or METRICS declares. Entries carry where they come from, so that every process can load it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import traceback
+from collections.abc import Container, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from benchmarks.method import MethodEntry
+from benchmarks.registry import DeclarationError, by_name, demand_that_it_is, load
+from benchmarks.runner.source import code_of, digest, find_module, place_of
+from benchmarks.scene import Scene
+from snug.recipes.named import TRAININGS, Training
+
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]*")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What may be declared: the word of the command line, the tuple, and the function that stands beside."""
+
+    word: str
+    tuple_name: str
+    function: str
+
+    @property
+    def entry(self) -> type:
+        if self.word == "metrics":  # loads numpy: only for whoever has one
+            from benchmarks.metric import Metric
+
+            return Metric
+        return MethodEntry if self.word == "methods" else Scene
+
+    @property
+    def group(self) -> str:
+        """Of entry points."""
+        return f"snug_benchmark.{self.word}"
+
+
+METHODS = Kind("methods", "METHODS", "make")
+SCENES = Kind("scenes", "SCENES", "build")
+METRICS = Kind("metrics", "METRICS", "measure")
+KINDS = (METHODS, SCENES, METRICS)
+
+
+def resolved(kind: Kind, words: Sequence[str], known: Container[str]) -> tuple[list[str], list[Any]]:
+    """The words of an option, with the names that a file or an entry point declares in the place of either;
+    and its entries. known: names inside. Raises DeclarationError.
+    """
+    names: list[str] = []
+    found: dict[str, list[Any]] = {}
+    for word in words:
+        home = home_of(kind, word)
+        if home is None:
+            names.append(word)
+            continue
+        if word in known:
+            raise DeclarationError(
+                f"--{kind.word} {word}: is a name of the project, and the entry point of {home}: rename that"
+            )
+        found[home] = entries_of(kind, home)
+        names += [entry.name for entry in found[home]]
+    entries = [entry for entries in found.values() for entry in entries]
+    if kind is METHODS:
+        _check_networks(entries)
+    return names, entries
+
+
+def _check_networks(entries: Sequence[MethodEntry]) -> None:
+    """Raises DeclarationError where two trainings have one name, whose network would be the other's."""
+    trainings: dict[str, Training | None] = {**TRAININGS, "untrained": None}
+    for entry in entries:
+        if entry.trained is None:
+            continue
+        what = f"{entry.declared_in}: method '{entry.name}'"
+        if entry.training is None and entry.trained not in trainings:
+            raise DeclarationError(
+                f"{what}: no training is called '{entry.trained}': say training=Training(...)"
+            )
+        if entry.training and trainings.setdefault(entry.trained, entry.training) != entry.training:
+            raise DeclarationError(
+                f"{what}: another training is called '{entry.trained}': give trained=another"
+            )
+
+
+def home_of(kind: Kind, word: str) -> str | None:
+    """The file, or the module of an installed package, that a word means; None where it means neither.
+
+    Nothing is loaded. Raises DeclarationError.
+    """
+    if word.endswith(".py"):
+        return file_of(word)
+    found = list(metadata.entry_points(group=kind.group, name=word))
+    if not found:
+        return None
+    if len({point.value for point in found}) > 1:
+        who = " and by ".join(sorted(_who(point) for point in found))
+        raise DeclarationError(f"entry point {word} of {kind.group} is declared by {who}: rename one")
+    if ":" in found[0].value:
+        raise DeclarationError(
+            f"entry point {word} of {_who(found[0])} is {found[0].value}: name the module that has "
+            f"{kind.tuple_name}, without a colon"
+        )
+    return found[0].value
+
+
+def _who(point: metadata.EntryPoint) -> str:
+    return f"package {point.dist.name} {point.dist.version}" if point.dist else point.value
+
+
+def described(kind: Kind) -> list[tuple[str, str]]:
+    """(name, words) of each entry point, for a list; none is loaded."""
+    found = metadata.entry_points(group=kind.group)
+    return sorted((point.name, f"{_who(point)}, module {point.value}") for point in found)
+
+
+def file_of(word: str) -> str:
+    """The absolute path of a file that is there. Raises DeclarationError."""
+    path = Path(word)
+    if not path.is_file():
+        raise DeclarationError(f"{word}: no such file")
+    return str(path.resolve())
+
+
+def entries_of(kind: Kind, home: str) -> list[Any]:
+    """What a module, or a file named by its path, declares of that kind. Raises DeclarationError."""
+    module = imported(home)
+    declared = getattr(module, kind.tuple_name, None)
+    if not isinstance(declared, tuple | list) or not all(isinstance(entry, kind.entry) for entry in declared):
+        raise DeclarationError(f"{home}: declares no {kind.tuple_name}, a tuple of {kind.entry.__name__}")
+    if not declared:
+        raise DeclarationError(f"{home}: {kind.tuple_name} is empty")
+    by_name(kind.word[:-1], declared)
+    return [_placed(kind, entry, module, home) for entry in declared]
+
+
+def _placed(kind: Kind, entry: Any, module: ModuleType, home: str) -> Any:
+    """The entry, with where it was declared and all paths made absolute."""
+    what = f"{home}: {kind.word[:-1]} '{entry.name}'"
+    if kind is METRICS:
+        _demand(callable(getattr(module, kind.function, None)), f"{home}: has no function {kind.function}")
+        return dataclasses.replace(entry, declared_in=home)
+    if not NAME.fullmatch(entry.name):
+        raise DeclarationError(f"{what}: use letters, digits and _ + - . / @ : in its name")
+    folder = Path(find_module(home)).parent
+    for field in ("files", "sizes", "metrics"):
+        words = getattr(entry, field, None) or ()
+        listed = isinstance(words, tuple | list) and all(isinstance(word, str) for word in words)
+        _demand(listed, f"{what}: {field}={words!r}: give a tuple of strings")
+    if measured := set(getattr(entry, "metrics", None) or ()):
+        from benchmarks.metrics import MODULES, WHERE_NAMED  # loads numpy
+
+        known = (*MODULES, *WHERE_NAMED)
+        wrong = f"{what}: metrics={entry.metrics!r}: choose from {', '.join(known)}"
+        _demand(measured <= {*known}, wrong)
+    try:
+        digest(dict(entry.options))
+    except (TypeError, ValueError) as error:
+        raise DeclarationError(
+            f"{what}: options: {error}: give numbers, strings, and lists of them"
+        ) from None
+    files = tuple(str((folder / name).resolve()) for name in entry.files)
+    for file in files:
+        _demand(Path(file).is_file(), f"{what}: {file}: no such file")
+    own = entry.module or home
+    if own.endswith(".py"):
+        own = str((folder / own).resolve())
+    try:
+        find_module(own)
+    except DeclarationError as error:
+        raise DeclarationError(f"{what}: {error}") from None
+    if own == home:
+        _demand(callable(getattr(module, kind.function, None)), f"{home}: has no function {kind.function}")
+    return dataclasses.replace(entry, module=own, declared_in=home, files=files)
+
+
+def _demand(fine: bool, otherwise: str) -> None:
+    if not fine:
+        raise DeclarationError(otherwise)
+
+
+def imported(home: str) -> ModuleType:
+    """The module, loaded. Raises DeclarationError, one line with the line of the file at fault."""
+    code = code_of(home)  # of syntax errors the line
+    try:
+        module = load(home)
+    except DeclarationError:
+        raise
+    except (Exception, SystemExit) as error:
+        own = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in code]
+        where = f"{own[-1].filename}: line {own[-1].lineno}" if own else home
+        raise DeclarationError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from None
+    for path in code:  # two folders may have a utils.py each
+        if Path(path).is_absolute() and not path.endswith("/__init__.py"):
+            demand_that_it_is(".".join([*place_of(path)[1], Path(path).stem]), Path(path))
+    return module

@@ -1,0 +1,289 @@
+"""What a request asks for: scenes and methods, cases, microbenchmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from benchmarks.method import MethodEntry
+from benchmarks.methods import METHODS
+from benchmarks.performance.microbenchmark import SUITE, Microbenchmark
+from benchmarks.performance.registry import MICROBENCHMARKS
+from benchmarks.plan.motion_roles import nearest
+from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.suites import SUITE_NAMES, SUITES, Extent, Suite
+from benchmarks.presets import PRESETS, Preset
+from benchmarks.registry import DeclarationError, by_name
+from benchmarks.scene import Scene
+from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes, further_scenes
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.validation.case import METHOD
+from benchmarks.validation.registry import CASES
+
+if TYPE_CHECKING:
+    from benchmarks.external.roll_out_option import RollOutOption
+    from benchmarks.validation.case import Case
+
+MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
+UNTRAINED = "networks are trained for a second garment where its scenes are named"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """The words of a request. full: whether suites are named; scenes and methods: names or patterns; empty
+    means all that the suites list. own_scenes, own_methods: entries that are not the project's, named among
+    these. roll_outs: stored ones, which meet each scene that is asked for.
+    """
+
+    suites: tuple[str, ...]
+    preset: Preset
+    motions: Motions
+    full: bool = False
+    scenes: tuple[str, ...] = ()
+    methods: tuple[str, ...] = ()
+    seeds: tuple[int, ...] = (0,)
+    own_scenes: tuple[Scene, ...] = ()
+    own_methods: tuple[MethodEntry, ...] = ()
+    roll_outs: tuple[RollOutOption, ...] = ()
+
+    @cached_property
+    def declared_scenes(self) -> dict[str, Scene]:
+        """Name -> scene, of all that could be asked for. Raises DeclarationError where two have one name."""
+        of = self.motions
+        motions = dict.fromkeys((*of.measured, *of.test, *of.validation))
+        dynamic = dict.fromkeys((*of.dynamic_measured, *of.dynamic_test, *of.dynamic_validation))
+        declared = all_scenes(motions, dynamic, of.worn)
+        taken = {entry.name for entry in MEASURED}
+        for scene in self.own_scenes:
+            if scene.name in taken:
+                raise DeclarationError(
+                    f"{scene.declared_in}: scene '{scene.name}': a case of the project has this name: "
+                    "give it another"
+                )
+        return by_name("scene", (*declared.values(), *self.own_scenes))
+
+    @cached_property
+    def declared_methods(self) -> dict[str, MethodEntry]:
+        """The same of methods."""
+        return by_name("method", (*METHODS, *self.own_methods))
+
+    @property
+    def extent(self) -> Extent:
+        """Naming scenes reaches all of each suite, and so does preset paper."""
+        further = bool(self.scenes) or self.preset.further
+        return Extent(self.preset, self.motions, self.full or further, further)
+
+
+def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Microbenchmark, ...]]:
+    """What the request names. Raises PlanError for a word that names nothing."""
+    declared, methods = request.declared_scenes, request.declared_methods
+    _check_words("scene", request.scenes, [*declared, *(entry.name for entry in MEASURED)])
+    _check_words("method", request.methods, list(methods))
+    found: dict[tuple[str, str, int], Cell] = {}
+    for suite, scene, entry in _pairs(request):
+        method = entry.name
+        for seed in request.seeds if entry.seeded else (0,):
+            key = (scene, method, seed)
+            before = found[key].suites if key in found else ()
+            found[key] = Cell(declared[scene].at(request.preset), entry, seed, (*before, suite))
+    stored = stored_cells(request.roll_outs, tuple(found.values()))
+    cases, microbenchmarks = tuple(_cases(request)), tuple(_microbenchmarks(request))
+    if not (found or cases or microbenchmarks):
+        raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
+    # The reference first: an error against it can be said as soon as another cell is done.
+    order = {name: place for place, name in enumerate(methods)}
+    places = {name: place for place, name in enumerate(declared)}
+    last = len(order)
+    cells = sorted(
+        (*found.values(), *stored),
+        key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
+    )
+    scenes = {cell.scene.name: cell.scene for cell in cells}
+    settled = (*SCENES, *further_scenes(request.motions.first_garment))  # those that any run may start from
+    known = {scene.name: scene for scene in settled} | scenes
+    for own in (scene for scene in scenes.values() if scene.declared_in):
+        _check_words_of(own, known, request.motions)
+    return tuple(cells), cases, microbenchmarks
+
+
+def _check_words_of(scene: Scene, known: Mapping[str, Scene], motions: Motions) -> None:
+    """Raises PlanError for what a user's scene names and nobody knows."""
+    chain, last = {scene.name}, scene
+    while last.start_of:
+        before = known.get(last.start_of)
+        if before is None or not before.simulated or before.name in chain:
+            others = [name for name, other in known.items() if other.simulated and name not in chain]
+            raise PlanError(
+                f"{last.declared_in}: scene '{last.name}': start_of='{last.start_of}': name another scene "
+                f"whose garment settles, of the run or without a motion; {nearest(last.start_of, others)}"
+            )
+        chain.add(before.name)
+        last = before
+    if scene.dressed:
+        from snug.motion.library import LIBRARY
+
+        if scene.motion not in (names := [*motions.files, *LIBRARY]):
+            raise PlanError(
+                f"{scene.declared_in}: scene '{scene.name}': no motion is called '{scene.motion}'; "
+                f"{nearest(scene.motion, names)}"
+            )
+
+
+def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:
+    """The stored roll-outs in the scenes of these cells, and in their suites. Raises PlanError, and
+    RollOutError for a file that cannot be read.
+    """
+    if not roll_outs:
+        return []
+    from benchmarks.methods.outside.stored_roll_out import entry_of
+
+    scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
+    suites = {name: tuple(dict.fromkeys(s for c in cells if c.scene.name == name for s in c.suites))
+              for name in scenes}  # fmt: skip
+    taken = {entry.name for entry in METHODS} | {cell.method for cell in cells}
+    found: list[Cell] = []
+    for option in roll_outs:
+        if option.name in taken:
+            raise PlanError(f"--rollout {option.name}: a method has that name; give another")
+        taken.add(option.name)
+        if len(scenes) != 1 and not option.places:
+            raise PlanError(
+                f"--rollout {option.name}={option.path}: is of one scene, and {len(scenes)} are asked for: "
+                "name it with --scenes, or put {scene} into the path"
+            )
+        own = [(scene, entry) for scene in scenes.values() if (entry := entry_of(option, scene.name))]
+        if not own:
+            raise PlanError(f"--rollout {option.name}={option.path}: no file for {', '.join(scenes)}")
+        found += [Cell(scene, entry, 0, suites[scene.name]) for scene, entry in own]
+    return found
+
+
+def _pairs(request: Request) -> Iterator[tuple[str, str, MethodEntry]]:
+    """(suite, scene, method), suite by suite; a method that is left out of a scene says why.
+
+    A scene that no suite lists is met where it is named: a body in a whole motion in garments, all else in
+    speed. A method that no suite lists takes part in each suite where its whole name is given.
+    """
+    extent, declared = request.extent, request.declared_scenes
+    unlisted = _unlisted_scenes(request)
+    own_methods = set(request.methods) & set(request.declared_methods) - _listed_methods()
+    for suite in SUITES:
+        listed = suite.scenes(extent)
+        if suite.name not in request.suites or not suite.methods(extent):
+            continue
+        more = suite.more_methods if request.methods or request.preset.further else ()
+        further = suite.named_methods if request.methods else ()
+        asked = replace(extent, full=extent.full or bool(request.methods))
+        methods = dict.fromkeys((*suite.methods(asked), *more, *further, *sorted(own_methods)))
+        for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
+            # Networks for a second garment double the training: only for whoever names its scenes.
+            plain = not extent.further and declared[scene].garment not in ("", extent.motions.first_garment)
+            for method in methods:
+                if not (named(scene, request.scenes) and named(method, request.methods)):
+                    continue
+                entry = request.declared_methods[method]
+                if entry.meant_for(declared[scene]):
+                    if plain and entry.trained:
+                        entry = replace(entry, left_out=UNTRAINED)
+                    yield suite.name, scene, entry
+
+
+def _cases(request: Request) -> Iterator[Case]:
+    """Those of the suites; the smallest preset runs those marked, unless they are named, and a run that names
+    no suite those that are not long.
+
+    Naming methods without the simulation leaves them out.
+    """
+    if named(METHOD, request.methods):
+        for case in CASES:
+            small = case.smoke or request.scenes or not request.preset.smallest
+            short = request.extent.full or not case.long
+            if small and short and case.suite in request.suites and named(case.name, request.scenes):
+                yield case
+
+
+def _microbenchmarks(request: Request) -> Iterator[Microbenchmark]:
+    """Those of the scenes and methods named; the smallest preset runs those marked, unless they are named."""
+    for benchmark in MICROBENCHMARKS if SUITE in request.suites else ():
+        small = benchmark.smoke or request.scenes or not request.preset.smallest
+        wanted = small and named(benchmark.name, request.scenes) and named(benchmark.method, request.methods)
+        if wanted and (not benchmark.long or benchmark.name in request.scenes):
+            yield benchmark
+
+
+def named(name: str, patterns: Sequence[str]) -> bool:
+    """Whether some pattern means that name; without patterns all are meant."""
+    return not patterns or name in patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def default_suites(method: str, preset: Preset) -> list[str]:
+    """The suites in which a method takes part at that preset without being named."""
+    return [suite.name for suite in SUITES if method in suite.methods(Extent(preset, Motions()))]
+
+
+def _unlisted_scenes(request: Request) -> dict[str, str]:
+    """Scenes that no suite lists -> the suite that takes them: those called by their whole names, and by a
+    pattern that no listed scene has, as 'trousers/*', the motions of the split.
+    """
+    motions = request.motions
+    everything = Extent(request.preset, motions, full=True, further=True)
+    listed = {name for suite in SUITES for name in suite.scenes(everything)}
+    patterns = [p for p in request.scenes if not any(named(name, [p]) for name in listed)]
+
+    def asked(scene: Scene) -> bool:
+        return scene.name in request.scenes or (
+            any(named(scene.name, [p]) for p in patterns)
+            and scene.dressed
+            and scene.motion in motions.measured_of(scene.garment)
+        )
+
+    return {
+        name: "garments" if scene.part == "whole" else "speed"
+        for name, scene in request.declared_scenes.items()
+        if name not in listed and asked(scene)
+    }
+
+
+def _listed_methods() -> set[str]:
+    """Every method that some suite lists at some preset."""
+    extents = [Extent(preset, Motions(), full=True) for preset in PRESETS]
+
+    def of_suite(suite: Suite) -> set[str]:
+        return {
+            *suite.more_methods,
+            *suite.named_methods,
+            *(name for extent in extents for name in suite.methods(extent)),
+        }
+
+    return set().union(*map(of_suite, SUITES))
+
+
+def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
+    """The suites named, "all" meaning each; without words those of a default run. Raises PlanError."""
+    words = list(words)
+    for word in words:
+        if word not in (*SUITE_NAMES, "all"):
+            known = ", ".join((*SUITE_NAMES, "all"))
+            raise PlanError(f"--suite: unknown suite '{word}'; choose from {known}")
+    chosen = words or [suite.name for suite in SUITES if suite.default]
+    return tuple(name for name in SUITE_NAMES if "all" in chosen or name in chosen)
+
+
+def names_no_motion(scenes: Sequence[str], own: Sequence[Scene] = ()) -> bool:
+    """Whether a choice of scenes, some of them a user's own, names scenes without a body, cases and
+    microbenchmarks alone; no motion is looked at then."""
+    known = {scene.name for scene in (*all_scenes((), ()).values(), *own) if not scene.dressed}
+    known |= {entry.name for entry in MEASURED}
+    return bool(scenes) and known.issuperset(scenes)
+
+
+def _check_words(what: str, patterns: Sequence[str], names: Sequence[str]) -> None:
+    for pattern in patterns:
+        if not any(named(name, [pattern]) for name in names):
+            hint = ""
+            if what == "scene" and pattern.partition("/")[0] in {g.garment for g in GARMENT_SCENES}:
+                hint = " (scenes of a dressed body are the validation and test motions: see --test-motions)"
+            raise PlanError(f"unknown {what} '{pattern}'; {nearest(pattern, names)}{hint}")

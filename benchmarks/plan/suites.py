@@ -1,0 +1,213 @@
+"""The visible tuple of suites: which scenes meet which methods, and what is only in a full run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from benchmarks.methods import METHODS
+from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
+from benchmarks.methods.catalogue.learned import LEARNED, RECIPE_DEVIATIONS
+from benchmarks.plan.plan import Motions
+from benchmarks.presets import Preset
+from benchmarks.scenes import GARMENT_SCENES
+from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
+from benchmarks.scenes.variations import FEW as FEW_OUT_OF_DISTRIBUTION
+from benchmarks.scenes.variations import FEWEST as FEWEST_OUT_OF_DISTRIBUTION
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much of a suite is asked for. full: more than its quick subset; further: what doubles the work,
+    and all of the suite.
+    """
+
+    preset: Preset
+    motions: Motions
+    full: bool = False
+    further: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suite:
+    """A question put to many cells, or to cases of benchmarks.validation.
+
+    scenes, methods: names of those that meet. more_methods: those that take part only where methods are
+    named, or at a preset that holds all; named_methods: those that have to be named. default: whether it
+    takes part where no suite is named.
+    """
+
+    name: str
+    description: str
+    scenes: Callable[[Extent], list[str]] = lambda extent: []
+    methods: Callable[[Extent], list[str]] = lambda extent: []
+    more_methods: tuple[str, ...] = ()
+    named_methods: tuple[str, ...] = ()
+    default: bool = True
+
+
+# --- garments ----------------------------------------------------------------------------------------------
+
+FEW_MOTIONS = 3
+
+
+def _whole_motions(extent: Extent) -> list[str]:
+    """The first garment in each motion of the split, in the quick subset in FEW_MOTIONS of those that nobody
+    has named; at preset paper also what swings; others where named.
+    """
+    first, *others = extent.motions.worn
+    count = None if extent.full or extent.motions.chosen else FEW_MOTIONS
+    names = [first.scene(name).name for name in extent.motions.measured[:count]]
+    names += [there_and_back(name, first.garment).name for name in extent.motions.measured[:1]]
+    if extent.further:
+        names += [o.scene(name).name for o in others if o.dynamic for name in extent.motions.dynamic_measured]
+    return names
+
+
+# --- speed -------------------------------------------------------------------------------------------------
+
+SMALL = ("hanging_sheet", "sheet_on_sphere", "flag", "twisted_strip")
+EXACT = ("free_fall",)  # every method has no error there but round-off: only for whoever names it
+
+# The reference from coarse to fine in tolerance and in time; and again, as right as it, from moved starts and
+# with its contact planes searched twice: how far those lie apart is the uncertainty of whatever is compared.
+PERTURBED = tuple(entry.name for entry in METHODS if entry.family == "simulation-perturbed")
+AGAIN = (*PERTURBED, "simulation-refrozen")
+FEW_AGAIN = (PERTURBED[-1], "simulation-refrozen")
+FEW_REFERENCES = ("simulation", "simulation-1e-2", "simulation-dt/2", *FEW_AGAIN)
+REFERENCES = (*FEW_REFERENCES, "simulation-1e-8", "simulation-dt/4", "simulation-dt/8", *AGAIN)
+# Iterations per unit of a preset's budgets. The quick subset has every second budget of what takes longer.
+FAMILIES = (("fast-lbfgs", 5), ("snug+fast-lbfgs", 1))
+SLOWER_FAMILIES = (("newton", 1), ("lbfgs", 5))
+FEW_SOLVERS = ("vbd-20", "xpbd-40")
+SOLVERS = (*FEW_SOLVERS, "gradient-descent-10", "skinning+lbfgs-4", "snug+lbfgs-2", "snug+newton-2")
+EXTERNAL = ("newton-vbd", "newton-xpbd")  # skipped where the package is not installed
+FAST = ("skinning", "snug", "supervised", "pbns")
+OTHER_SPRINGS = ("simulation-springs", "simulation-pbns-springs")
+CHEAP = ("snug+fast-lbfgs-1", "fast-lbfgs-10")  # solvers of some milliseconds, where others are not asked
+
+
+def _clips(extent: Extent) -> list[str]:
+    """Small scenes and clips of dressed bodies; the quick subset is one of each.
+
+    Dressed bodies are clips, the liveliest part of a motion: here every solver goes through every frame. They
+    are the first two motions of the split, and the first for garments that swing, also with a skirt.
+    """
+    motions, swinging = extent.motions, extent.motions.dynamic_measured[:1]
+    first = motions.first_garment
+    if not extent.full:
+        return [SMALL[0], *(f"{first}/{name}@clip" for name in motions.measured[:1])]
+    shirts = [f"{first}/{name}@clip" for name in dict.fromkeys((*motions.measured[:2], *swinging))]
+    skirts = [f"skirt/{name}@clip" for name in swinging]
+    return [*SMALL, *(EXACT if extent.further else ()), *shirts, *skirts]
+
+
+def _solvers(extent: Extent) -> list[str]:
+    """The reference, truncated solvers and everything learned; the quick subset has fewer slow ones."""
+    full, budgets = extent.full, extent.preset.iteration_budgets
+    levels = {family: [scale * budget for budget in budgets] for family, scale in FAMILIES}
+    some = budgets if full else budgets[::2]
+    levels |= {family: [scale * budget for budget in some] for family, scale in SLOWER_FAMILIES}
+    truncated = [entry.name for entry in METHODS if entry.level in levels.get(entry.family, ())]
+    references, others = (REFERENCES, SOLVERS) if full else (FEW_REFERENCES, FEW_SOLVERS)
+    return [*dict.fromkeys(references), *truncated, *others, *EXTERNAL, *FAST]
+
+
+# --- validation --------------------------------------------------------------------------------------------
+
+
+def _dependence(extent: Extent) -> list[str]:
+    """Meshes and steps of the preset, of the T-shirt alone, not in the quick subset of preset quick; drapes
+    of up to 16,000 vertices where scenes are named, or at paper.
+    """
+    tailored = extent.motions.first_garment == GARMENT_SCENES[0].garment
+    wanted = extent.full or extent.preset.smallest
+    meshes = meshes_and_steps(extent.preset.dependence) if tailored and wanted else []
+    return [scene.name for scene in (*meshes, *(DRAPES if extent.further else ()))]
+
+
+# --- out of distribution ------------------------------------------------------------------------------------
+
+
+def _out_of_distribution(extent: Extent) -> list[str]:
+    """All; the quick subset is some of them, fewer at the smallest preset."""
+    if extent.preset.smallest and not extent.further:
+        return list(FEWEST_OUT_OF_DISTRIBUTION)
+    if extent.full:
+        return [scene.name for scene in OUT_OF_DISTRIBUTION]
+    return list(FEW_OUT_OF_DISTRIBUTION)
+
+
+# --- body shapes --------------------------------------------------------------------------------------------
+
+SHAPED = "snug-shapes"
+
+
+def _shapes(extent: Extent) -> list[str]:
+    """One motion on other bodies: where the suite or scenes are named, or at paper."""
+    motions = extent.motions.measured[:1] if extent.full else ()
+    return [scene.name for motion in motions for scene in shapes(motion, extent.motions.first_garment)]
+
+
+SUITES = (
+    Suite(
+        name="garments",
+        description="all methods on unseen motions: energies, curvature, cost",
+        scenes=_whole_motions,
+        methods=lambda extent: [
+            "simulation", *FEW_AGAIN, "skinning", "untrained", "snug", "supervised", "pbns", *CHEAP,
+        ],
+        more_methods=(
+            *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
+            "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
+        ),
+        named_methods=(
+            *OTHER_SPRINGS, *(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
+        ),
+    ),
+    Suite(
+        name="speed",
+        description="error against run time: truncated solvers beside networks",
+        scenes=_clips,
+        methods=_solvers,
+        # Learned ones, and solvers that start from `snug-dynamic`, as in suite garments.
+        more_methods=(
+            "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4",
+            *(entry.name for entry in METHODS if entry.role in ("solver", "warm-started")
+              and entry.base != "snug-dynamic"),
+        ),
+    ),
+    Suite(
+        name="validation",
+        description="physics with an exact answer: measured, expected, tolerance; other meshes and steps",
+        scenes=_dependence,
+        methods=lambda extent: ["simulation", "skinning", "newton-1"],
+        more_methods=("simulation-printed-bending",),
+        named_methods=OTHER_SPRINGS,
+    ),
+    Suite(
+        name="extremes",
+        description="stiff, huge and degenerate input; methods on a walk made hard: converged, or a "
+        "reported failure",
+        scenes=_out_of_distribution,
+        methods=lambda extent: ["simulation", *FAST, *CHEAP],
+        more_methods=tuple(entry.name for entry in LEARNED if entry.batched),
+    ),
+    Suite(
+        name="shapes",
+        description="a motion on body shapes that no training has drawn: energies against the shape; only "
+        "where it is named, or at preset paper",
+        scenes=_shapes,
+        methods=lambda extent: ["simulation", "skinning", "snug", SHAPED, "pbns", *CHEAP],
+        more_methods=(
+            *(entry.name for entry in LEARNED if entry.batched and entry.name != SHAPED), *AGAIN,
+        ),
+    ),
+    Suite(
+        name="performance",
+        description="microbenchmarks of simulator, trainings and networks; only where it is named",
+        default=False,
+    ),
+)  # fmt: skip
+
+SUITE_NAMES = tuple(suite.name for suite in SUITES)

@@ -1,0 +1,191 @@
+"""Work that may hang or crash: done in a process of its own, which is ended at a deadline.
+
+A solver's own timeout is looked at between its iterations; a loop that never ends, or compiled code that
+takes the interpreter down with it, has to be stopped from outside. The process leads a group of its own, so
+that what it has started ends with it; and it ends by itself when the parent does, however that went.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import wait
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from multiprocessing.context import ForkServerContext, SpawnContext
+
+PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
+# What every worker loads. Nothing that a scene may do without: not torch, not what a body is asked with.
+LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.tasks.cell_task")
+
+
+class WorkerDied(RuntimeError):
+    """The work did not come back; the message says why.
+
+    status: the word of a result row, "timeout", "out-of-memory" or "failed".
+    """
+
+    def __init__(self, message: str, status: str = "failed") -> None:
+        super().__init__(message)
+        self.status = status
+
+
+def new_processes() -> SpawnContext | ForkServerContext:
+    """Where worker processes come from: none of them has anything of this one.
+
+    On Linux a server forks them that has loaded LOADED_BY_ALL, and nothing more, once: a process is there in
+    a quarter of the time. Elsewhere libraries may not outlive a fork, and each process loads its own.
+    """
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(LOADED_BY_ALL))
+    return context
+
+
+class IsolatedProcess:
+    """One worker process, started when first needed, and again after it had to be ended.
+
+    begin(*arguments) is called first in each new process. Use it in a `with` block, or call `close`.
+    """
+
+    def __init__(self, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
+        self._begin = (begin, arguments)
+        self._context = new_processes()
+        self._process: Any = None
+        self._pipe: Any = None
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process that was last asked is there still."""
+        return self._process is not None
+
+    def call(self, function: Callable[..., Any], *arguments: Any, seconds: float | None) -> Any:
+        """function(*arguments) in the worker; both sides must be picklable.
+
+        Raises what the function raises, and WorkerDied after `seconds` (None: no deadline) or where the
+        process ended.
+        """
+        if self._process is None:
+            self._start()
+        try:
+            self._pipe.send((function, arguments))
+            if not self._pipe.poll(seconds):
+                raise WorkerDied(f"no answer within {seconds:g} s", "timeout")
+            fine, answer = self._pipe.recv()
+        except (EOFError, ConnectionError):
+            self._process.join()
+            code = self._process.exitcode
+            self._kill()
+            raise WorkerDied(*how_it_ended(code)) from None
+        except BaseException:
+            self._kill()
+            raise
+        if fine:
+            return answer
+        raise answer
+
+    def _start(self) -> None:
+        near, far = self._context.Pipe()
+        process = self._context.Process(target=_serve, args=(far, *self._begin), daemon=True)
+        try:
+            process.start()
+        except BaseException:  # there is no process then, and no other side to wait for
+            near.close()
+            raise
+        finally:
+            far.close()
+        self._pipe, self._process = near, process
+
+    def close(self) -> None:
+        """Let the worker end by itself, for it has nothing to do; then end all that it has started."""
+        if self._process is not None:
+            self._pipe.close()
+            self._process.join(PATIENCE)
+            self._kill()
+
+    def stop(self) -> None:
+        """Kill it and what it has started, from another thread: a call under way raises WorkerDied."""
+        process = self._process
+        if process is not None and process.pid is not None:
+            end_group(process.pid)
+            process.kill()
+
+    def _kill(self) -> None:
+        if self._process is not None:
+            end_group(self._process.pid)
+            self._process.kill()
+            self._process.join()
+            self._pipe.close()
+            self._process = None
+
+    def __enter__(self) -> IsolatedProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def how_it_ended(code: int) -> tuple[str, str]:
+    """Reason and status of a process that ended by itself with this exit code.
+
+    Nobody here kills a process that answers in time: a SIGKILL comes from a system that is out of memory.
+    """
+    if code >= 0:
+        return f"the process ended with status {code}", "failed"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    if name == "SIGKILL":
+        return "the process was killed by SIGKILL: the system was out of memory", "out-of-memory"
+    return f"the process was ended by {name}", "failed"
+
+
+def end_group(pid: int) -> None:
+    """Kill the process group that `pid` led or leads, where the system has groups and this one exists."""
+    if hasattr(os, "killpg"):
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(pid, signal.SIGKILL)
+
+
+def lead_a_group() -> None:
+    """Make this process the leader of its group, and end both when the parent is gone.
+
+    The parent alone answers an interrupt; it ends its workers.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "setpgrp"):
+        os.setpgrp()
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_follow, args=(parent.sentinel,), name="follow-parent", daemon=True).start()
+
+
+def _follow(parent: int) -> None:
+    wait([parent])
+    end_group(os.getpid())
+    os._exit(1)
+
+
+def _serve(pipe: Any, begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
+    lead_a_group()
+    if begin is not None:
+        begin(*arguments)
+    while True:
+        try:
+            function, arguments = pipe.recv()
+        except EOFError:
+            return
+        try:
+            answer = (True, function(*arguments))
+        except Exception as error:
+            answer = (False, error)
+        sys.stderr.flush()
+        pipe.send(answer)

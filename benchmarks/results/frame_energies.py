@@ -1,0 +1,109 @@
+"""frame_energies.csv of a run: the energy of each judged frame by term, of garments in whole motions.
+
+A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their sum. A
+term that a scene does not have is left empty. It holds what the paper draws over time: the reference,
+baselines and networks. Curves of all else lie beside their trajectories; they are too large to be published.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import Row, RunFolder, replacing
+
+if TYPE_CHECKING:
+    import numpy as np
+
+ROLES = ("reference", "baseline", "network")
+CELL = ("scene", "method", "seed", "seconds")
+SECONDS = "judged/seconds"  # among the curves of a cell: of each frame, nan where it is not judged
+ENERGY = "energy/"
+
+
+def write(folder: RunFolder, rows: Iterable[Row]) -> None:
+    """The file, whole or not at all, of all cells among the rows that take part; none where none does."""
+    cells = dict.fromkeys(
+        (row.scene, row.method, row.seed)
+        for row in rows
+        if row.suite == "garments" and row.part == "whole" and row.role in ROLES
+        if row.metric == "energy/total" and row.value is not None
+    )
+    curves = {cell: _curves(folder.curves_path(*cell)) for cell in cells}
+    terms = list(dict.fromkeys(name for found in curves.values() for name in found if name != SECONDS))
+    if not terms:
+        folder.frame_energies_path.unlink(missing_ok=True)
+        return
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow([*CELL, *terms])
+    for cell, found in curves.items():
+        for frame, seconds in enumerate(found.get(SECONDS, ())):
+            if math.isfinite(seconds):
+                values = [found[term][frame] if term in found else math.nan for term in terms]
+                said = [f"{value:.5g}" if math.isfinite(value) else "" for value in values]
+                lines.writerow([*cell, f"{seconds:.4f}", *said])
+    with replacing(folder.frame_energies_path) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+
+
+def join(paths: Iterable[Path], out: Path) -> None:
+    """One file of several, those that are there: every term, and each frame once. Raises ResultsError."""
+    terms, joined = dict[str, None](), dict[tuple[str, ...], dict[str, str]]()
+    for path in filter(Path.is_file, paths):
+        read(path)  # refuses what is none
+        with path.open(newline="", encoding="utf-8") as stream:
+            for line in csv.DictReader(stream):
+                terms |= dict.fromkeys(name for name in line if name not in CELL)
+                joined.setdefault(tuple(line[name] for name in CELL), line)
+    if joined:
+        with replacing(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+            lines = csv.DictWriter(stream, [*CELL, *terms], restval="", lineterminator="\n")
+            lines.writeheader()
+            lines.writerows(joined.values())
+
+
+def _curves(path: Path) -> dict[str, np.ndarray]:
+    """Seconds, and energies by term, of a cell; empty where somebody removed its file."""
+    from reference_sim.files.array_file import read_arrays
+
+    if not path.is_file():
+        return {}
+    found = read_arrays(path)
+    kept = [name for name in found if name == SECONDS or name.startswith(ENERGY)]
+    return {name.removeprefix(ENERGY): found[name] for name in kept}
+
+
+def read(path: Path) -> tuple[list[str], list[list[str | int | float]]]:
+    """Columns and lines; nan where a cell is empty. Raises ResultsError naming file, line and column."""
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            reader = csv.reader(stream)
+            columns = next(reader, [])
+            own = tuple(columns[: len(CELL)]) == CELL and len(set(columns)) == len(columns)
+            if not own or len(columns) == len(CELL):
+                due = ",".join(CELL)
+                raise ResultsError(f"{path}: line 1: the columns should be {due} and energies, each once")
+            return columns, [_line(f"{path}: line {reader.line_num}", columns, cells) for cells in reader]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({error})") from None
+
+
+def _line(where: str, columns: list[str], cells: list[str]) -> list[str | int | float]:
+    if len(cells) != len(columns):
+        raise ResultsError(f"{where}: {len(columns)} cells are due")
+    line: list[str | int | float] = [*cells[:2]]
+    for name, cell in list(zip(columns, cells))[2:]:
+        try:
+            number = int(cell) if name == "seed" else float(cell or "nan")
+            if (cell and not math.isfinite(number)) or (name == "seed" and abs(number) >= 1 << 63):
+                raise ValueError
+            line.append(number)
+        except ValueError:
+            raise ResultsError(f"{where}: column {name}: '{cell[:40]}' is no number") from None
+    return line

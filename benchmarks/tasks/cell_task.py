@@ -1,0 +1,318 @@
+"""One cell, in a process of its own: prepare off the clock, run on it, write the raw trajectory.
+
+Metrics come later, from the files. The process loads what its scene and method need and nothing else; the
+modules of ours and the heavy ones that it has loaded are in the result.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.method import Method, MethodEntry
+from benchmarks.process.memory import peak_memory
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.scene import BuiltScene, Scene
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId, failure
+from benchmarks.timing import Reading, clocked
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from benchmarks.assets.assets import Assets
+    from reference_sim import Trajectory
+
+# What a trajectory says of itself, in the words of a result row. A solver stopped on purpose is ok.
+WORDS = {"converged": "ok", "ok": "ok", "stalled": "stalled", "diverged": "diverged", "timeout": "timeout"}
+OURS = ("reference_sim", "snug", "benchmarks")
+HEAVY = ("torch", "igl", "numba", "scipy", "h5py")  # what a scene may do without
+BATCH = 16  # bodies at once, where a method can
+INPUTS = 0.1  # of the time measured of a run, for its inputs: a few equal milliseconds a frame
+UNBELIEVABLE = "its time cannot be believed: "
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One scene met by one method with one seed; `suites` are those that report it."""
+
+    scene: Scene
+    entry: MethodEntry
+    seed: int
+    suites: tuple[str, ...]
+
+    @property
+    def method(self) -> str:
+        return self.entry.name
+
+    @property
+    def label(self) -> str:
+        return f"{self.scene.name} x {self.method}" + (f" (seed {self.seed})" if self.seed else "")
+
+    @property
+    def name(self) -> str:
+        """<scene>/<method>, and the seed where it is not 0: as part of a path."""
+        return f"{flat(self.scene.name)}/{flat(self.method)}" + (f"-seed{self.seed}" if self.seed else "")
+
+    @property
+    def timed(self) -> bool:
+        """Whether its costs are measured; others run side by side."""
+        return self.scene.timed and self.entry.timed
+
+    def trajectory(self, folder: RunFolder) -> Path:
+        return folder.trajectory_path(self.scene.name, self.method, self.seed)
+
+    def curves(self, folder: RunFolder) -> Path:
+        return folder.curves_path(self.scene.name, self.method, self.seed)
+
+    def quasi_static(self, folder: RunFolder) -> Path:
+        return folder.quasi_static_path(self.scene.name, self.method, self.seed)
+
+
+def flat(name: str) -> str:
+    """A name as part of a path."""
+    return name.replace("/", "-")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CellTask(Task):
+    """What the run of a cell, its repeats and its batch have in common: a process with scene and method.
+
+    least: [s] to be measured.
+    """
+
+    stage = "cells"
+    unit_seconds = 2.0
+    cell: Cell
+    least: float = 0.0
+
+    def assets(self, assets: Assets | None) -> Assets | None:
+        return assets.only(self.cell.scene.motion) if assets is not None and self.cell.scene.dressed else None
+
+    def scene(self, context: Context) -> BuiltScene:
+        """The built scene of this process."""
+        if "scene" not in context.memo:
+            context.memo["scene"] = built(self.cell.scene, context)
+        return context.memo["scene"]
+
+    def begin(self, context: Context) -> None:
+        """The scene, and the method prepared: one of the project's own, which is still until it is run. What
+        others leave at work would count against whoever is timed meanwhile.
+        """
+        if not self.cell.entry.declared_in:
+            context.memo["ready"] = self.ready(context)
+
+    def ready(self, context: Context) -> Method:
+        """A fresh method, prepared."""
+        if "ready" in context.memo:
+            return context.memo.pop("ready")
+        cell = self.cell
+        method = cell.entry.make(models=context.folder.models_of(cell.scene.garment), seed=cell.seed)
+        method.prepare(self.scene(context))
+        return method
+
+    def timed(self, method: Method, least: float) -> tuple[Trajectory, Reading, list[np.ndarray]]:
+        """What run() gives, by the clock; and the times (T,) [s] that each run says its frames have taken."""
+        frames = []
+
+        def run() -> Trajectory:
+            made = method.run()
+            frames.append(made.frame_seconds)
+            return made
+
+        made, reading = clocked(run, of=lambda made: made.positions, least=least)
+        return made, reading, frames[-len(reading.runs) :]  # a first run that compiled is not among them
+
+    def times(self, reading: Reading, frames: list[np.ndarray]) -> dict[str, float]:
+        """Result of these runs [s]: of the median one, and of its middle, late and slowest frame."""
+        import numpy as np
+
+        result = {"seconds": reading.seconds, "runs": len(reading.runs)}
+        # Each frame by its median run: else the more runs, the slower the slowest frame.
+        frame = np.median(np.stack(frames), axis=0)[not self.cell.entry.gives_first_frame :]
+        if frame.size and not np.isnan(frame).any():
+            p50, p95 = np.percentile(frame, (50, 95))
+            result |= {"frame_p50": float(p50), "frame_p95": float(p95), "frame_worst": float(frame.max())}
+        return result
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunCell(CellTask):
+    """The trajectory of a method in a scene, timed, and the time of its inputs."""
+
+    kind = "cell"
+
+    def skip(self, needed: Mapping[TaskId, Outcome]) -> str:
+        return self.cell.entry.skip(self.cell.scene) or ""
+
+    def clear(self, folder: RunFolder) -> None:
+        self.cell.trajectory(folder).unlink(missing_ok=True)
+        self.cell.curves(folder).unlink(missing_ok=True)
+        self.cell.quasi_static(folder).unlink(missing_ok=True)
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Prepare off the clock, run on it, write. Memory is that until the run has ended."""
+        try:
+            outcome = self._run(context)
+        except Exception as error:
+            self.clear(context.folder)  # nobody is to look at the frames of a cell that failed
+            outcome = replace(failure(error), result={"peak": peak_memory()})
+        context.tell(self.units)
+        return replace(outcome, result={**outcome.result, "modules": loaded()})
+
+    def _run(self, context: Context) -> Outcome:
+        cell, folder = self.cell, context.folder
+        scene, method = self.scene(context), self.ready(context)
+        if cell.timed:
+            trajectory, reading, frames = self.timed(method, 0.0)
+        else:
+            trajectory, reading = method.run(), Reading((math.nan,))
+        peak = peak_memory()  # what follows, as many bodies at once, is not what others are compared by
+        result: dict[str, Any] = {
+            "seconds": reading.seconds,
+            "frames": max(trajectory.frames - (not cell.entry.gives_first_frame), 1),
+            "peak": peak,
+            "terms": "+".join(scene.terms),
+        }
+        if "declared_ms" in trajectory.provenance:
+            result["declared_ms"] = trajectory.provenance["declared_ms"]
+        if cell.timed and not reading.complaint:
+            if reading.seconds < self.least:
+                _, again, further = self.timed(method, self.least - reading.seconds)
+                reading, frames = Reading(reading.runs + again.runs, again.complaint), frames + further
+            inputs = clocked_inputs(method, scene, least=INPUTS * self.least)
+            result |= self.times(reading, frames) | {"inputs": inputs.seconds}
+            reading = replace(reading, complaint=reading.complaint or inputs.complaint)
+        status, reason = judge(trajectory, reading, scene, truncated=cell.entry.truncated)
+        if status == "failed":
+            return Outcome(status, reason, failed=True, result={"peak": peak})
+        paths = [cell.trajectory(folder)]
+        paths[0].parent.mkdir(parents=True, exist_ok=True)
+        provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
+        replace(trajectory, provenance=trajectory.provenance | provenance).save(paths[0])
+        quasi_static = method.quasi_static() if cell.scene.dynamic or not cell.scene.dressed else None
+        if quasi_static is not None:
+            if wrong := misshapen(quasi_static.positions, scene):
+                raise ValueError(f"quasi_static() {wrong}")
+            paths.append(cell.quasi_static(folder))
+            quasi_static.save(paths[1])
+        context.memo["method"] = method
+        return Outcome(status, reason, result=result, files=tuple(map(folder.relative, paths)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunUntimedCell(RunCell):
+    """The same beside others, where nobody asks for the time."""
+
+    stage = "cells that are not timed"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BatchCell(CellTask):
+    """The time of many bodies at once, by the method that this process has run."""
+
+    kind = "batch"
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        method = context.memo.get("method") or self.ready(context)
+        positions, reading = clocked(method.batch(BATCH), of=lambda made: made, least=self.least)
+        seconds = reading.seconds / (positions.shape[0] * positions.shape[1])
+        result = {"seconds": seconds, "complaint": reading.complaint}
+        if reading.complaint:
+            return Outcome("failed", UNBELIEVABLE + reading.complaint, result=result)
+        return Outcome(result=result)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RepeatCell(CellTask):
+    """The same once more, for its time alone. longest: [s] of a first run that is repeated."""
+
+    kind = "repeat"
+    longest: float
+
+    def skip(self, needed: Mapping[TaskId, Outcome]) -> str:
+        first = next(iter(needed.values()), Outcome())
+        too_long = first.result.get("seconds", 0.0) > self.longest
+        return "the first run took too long" if too_long else first.remark
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        _, reading, frames = self.timed(self.ready(context), self.least)
+        if reading.complaint:
+            return Outcome("failed", reading.complaint, result={"seconds": reading.seconds})
+        return Outcome(result=self.times(reading, frames))
+
+
+def built(scene: Scene, context: Context) -> BuiltScene:
+    """The scene, a dressed one with the start and the posed body that the run's folder has ready."""
+    run, assets = context.folder, context.assets
+    if assets is None or not run.body_path(scene.name).is_file():
+        return scene.build(assets)
+    from reference_sim.files.array_file import read_array
+
+    bodies = {assets.motion(scene.motion, scene.part).name: read_array(run.body_path(scene.name))}
+    start = read_array(run.start_path(scene.name))
+    dressed = scene.build(replace(assets, bodies=bodies))
+    return replace(dressed, settle=lambda: start)
+
+
+def clocked_inputs(method: Method, scene: BuiltScene, *, least: float) -> Reading:
+    """[s] a frame of what run() takes as ready, made frame after frame, as poses come in."""
+    import numpy as np
+
+    make = method.inputs(scene)
+    if make is None or scene.dressed is None:
+        return Reading((0.0,))
+    frames = scene.dressed.motion.frames
+
+    def all_frames() -> np.ndarray:
+        for frame in range(frames):
+            make(frame)
+        return np.zeros(1)
+
+    make(0)  # whatever is loaded or compiled at first
+    _, reading = clocked(all_frames, of=lambda made: made, least=least)
+    return replace(reading, runs=tuple(seconds / frames for seconds in reading.runs))
+
+
+def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, truncated: bool) -> tuple[str, str]:
+    """Status and reason of a row, from what the trajectory says of itself, what is in it, and the clock."""
+    import numpy as np
+
+    reason = " ".join(trajectory.reason.split())
+    if wrong := misshapen(trajectory.positions, scene):
+        return "failed", f"run() {wrong}"
+    if reading.complaint:
+        return "failed", UNBELIEVABLE + reading.complaint
+    if not np.isfinite(trajectory.positions).all():
+        return "diverged", reason or "a position is not finite"
+    if trajectory.frames < scene.frames:
+        ended = "timeout" if trajectory.status == "timeout" else "diverged"
+        return ended, reason or f"ended after {trajectory.frames} of {scene.frames} frames"
+    if trajectory.status == "max_iterations":
+        return ("ok", "") if truncated else ("stalled", reason)
+    if trajectory.status not in WORDS:
+        return "failed", f"unknown status '{trajectory.status}', use one of {', '.join(WORDS)}; {reason}"
+    status = WORDS[trajectory.status]
+    if status != "ok" and "converged" in trajectory.frame_fields:
+        bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
+        reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
+    return status, reason
+
+
+def misshapen(positions: Any, scene: BuiltScene) -> str:
+    """Why these are no positions (T,V,3) of the scene, or empty. There may be fewer frames, and no more."""
+    import numpy as np
+
+    x, due = np.asarray(positions), (scene.frames, scene.cloth.vertex_count, 3)
+    if x.dtype.kind == "f" and x.shape[1:] == due[1:] and len(x) <= due[0]:
+        return ""
+    return f"gives positions {x.dtype} {x.shape}: floats {due} are due, the start included"
+
+
+def loaded() -> list[str]:
+    """Modules of ours, and the heavy packages, that this process has loaded."""
+    ours = {name for name in sys.modules if name.split(".")[0] in OURS}
+    return sorted(ours | {name for name in HEAVY if name in sys.modules})

@@ -1,0 +1,178 @@
+"""Metrics of finished cells, from their files: a new metric runs no cell again."""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.metrics import find_metric, modules, names_of
+from benchmarks.registry import load
+from benchmarks.results.frame_energies import SECONDS
+from benchmarks.results.run_folder import USABLE, RunFolder, replacing
+from benchmarks.tasks.cell_task import Cell, built
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId, one_line
+
+if TYPE_CHECKING:
+    from benchmarks.tasks.training import TrainNetwork
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasureCell(Task):
+    """What is measured of a cell's trajectory, beside those of the reference and its variants.
+
+    cells: all of the scene, in the order of their roll-outs; those that `reads` names are compared with.
+    quasi_static: the simulator's answer to poses held still; counterpart: the same method in another scene.
+    training: what trained its network. outside: modules of metrics that are not the project's, measured in
+    every scene.
+    """
+
+    kind = "metrics"
+    stage = "metrics"
+    unit_seconds = 2.5
+    cell: Cell
+    cells: tuple[Cell, ...]
+    gap_samples: int
+    quasi_static: TaskId | None = None
+    counterpart: Cell | None = None
+    training: TrainNetwork | None = None
+    outside: tuple[str, ...] = ()
+
+    def clear(self, folder: RunFolder) -> None:
+        self.cell.curves(folder).unlink(missing_ok=True)
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """The energies of each frame, and other curves, are written beside the trajectory."""
+        if "roll-outs" not in context.memo:
+            context.memo["roll-outs"] = self._roll_outs(context, needed)
+        roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
+        if self.counterpart is not None:
+            there = needed.get(("cell", self.counterpart.name))
+            if there is not None and there.status in USABLE:
+                roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
+        if self.training is not None:
+            roll_out.training_poses = _training_poses(self.training, context)
+        metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)
+        path = self.cell.curves(folder)
+        if curves:
+            curves[SECONDS] = np.array(roll_out.trajectory.times[: len(roll_out.positions)], dtype=float)
+            curves[SECONDS][: roll_out.scene.warm_up] = np.nan
+        write_curves(path, curves, roll_out.trajectory.frames)
+        context.tell(self.units)
+        return Outcome(status, reason, result=metrics, files=(folder.relative(path),))
+
+    def _roll_outs(self, context: Context, needed: Mapping[TaskId, Outcome]) -> dict[Cell, RollOut]:
+        """Those of the batch beside each other: they share search trees, and the energies of references."""
+        from reference_sim import Trajectory
+
+        folder = context.folder
+        group = SceneRollOuts(built(self.cell.scene, context), gap_samples=self.gap_samples)
+        if self.quasi_static in needed:
+            group.quasi_static = _positions(folder.quasi_static_path(self.cell.scene.name))
+        found = {}
+        for cell in self.cells:
+            outcome = needed.get(("cell", cell.name))
+            if outcome is not None and outcome.files:
+                found[cell] = RollOut(
+                    group, cell.entry, Trajectory.load(cell.trajectory(folder)), status=outcome.status,
+                    suites=cell.suites,
+                    quasi_static=_positions(cell.quasi_static(folder)) if len(outcome.files) > 1 else None,
+                )  # fmt: skip
+                group.roll_outs.append(found[cell])
+        return found
+
+
+def measured(
+    roll_out: RollOut, chosen: Sequence[str] | None = None, outside: tuple[str, ...] = ()
+) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
+    """Metrics and curves of a roll-out by all modules that apply, or by those chosen, and by those outside;
+    and status and reason where one of them says that it has failed. Empty where no frame is left after the
+    warm-up.
+    """
+    metrics: dict[str, float | Estimate] = {}
+    curves: dict[str, np.ndarray] = {}
+    ended = ("ok", "")
+    judged = len(roll_out.positions) > roll_out.scene.warm_up
+    for name in (*names_of(chosen), *outside) if judged else ():
+        try:
+            module = load(name) if name in outside else modules()[name]
+            suites = getattr(module, "SUITES", roll_out.suites)
+            if any(suite in suites for suite in roll_out.suites):
+                values = module.measure(roll_out) if hasattr(module, "measure") else {}
+                if hasattr(module, "compare"):
+                    values |= compared(roll_out, module.compare)
+                metrics |= {
+                    find_metric(metric, outside).name: number(metric, v) for metric, v in values.items()
+                }
+                curves |= module.series(roll_out) if hasattr(module, "series") else {}
+                ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
+        except Exception as error:
+            if name in outside:
+                raise RuntimeError(f"{name}: {one_line(error)}") from error
+            raise
+    return metrics, curves, ended
+
+
+def number(metric: str, value: Any) -> float | Estimate:
+    """The value as one, which JSON can keep. Raises TypeError."""
+    if isinstance(value, Estimate):
+        return Estimate(float(value.value), float(value.uncertainty), value.moved)
+    if not isinstance(value, numbers.Real):
+        raise TypeError(f"{metric} is {value!r:.60}: give a number or an Estimate, or leave it out")
+    return float(value)
+
+
+def compared(
+    roll_out: RollOut, compare: Callable[[RollOut, RollOut], dict[str, float]]
+) -> dict[str, float | Estimate]:
+    """The numbers against the reference, and what each simulation as right as it would change of them."""
+    if roll_out.reference is None:
+        return {}
+    values = compare(roll_out, roll_out.reference)
+    twins = [other for other in roll_out.group.as_right if other is not roll_out]
+    others = {other.entry.name: compare(roll_out, other) for other in twins}
+    found: dict[str, float | Estimate] = {}
+    for name, value in values.items():
+        moved = tuple((twin, beside[name] - value) for twin, beside in others.items() if name in beside)
+        found[name] = Estimate(value, max(abs(change) for _, change in moved), moved) if moved else value
+    return found
+
+
+def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
+    """An .npz of curves (T,...), nan after the last frame that was measured."""
+    padded: dict[str, Any] = {
+        name: np.pad(curve, [(0, frames - len(curve))] + [(0, 0)] * (curve.ndim - 1), constant_values=np.nan)
+        for name, curve in curves.items()
+    }
+    with replacing(path) as temporary:
+        np.savez(temporary, **padded)
+
+
+def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | None:
+    """(N,24,3) [rad], mixed ones included; None of a network that was not trained. Kept within a batch."""
+    from snug.networks.trained_model import find_kind
+    from snug.training.motion_augmentation import mixed_for, shared_clips
+
+    assets, how = context.assets, training.chosen
+    if how is None or assets is None:
+        return None
+    if training.id not in context.memo:
+        given = assets.named(training.motions)
+        vertices = len(assets.garments[training.garment].rest_positions)
+        drawn = find_kind(how.kind).physics
+        mixed = mixed_for(given, how.recipe, vertices=vertices, seed=training.seed) if drawn else []
+        if said := how.simulated:
+            mixed += shared_clips(given, said.mixed, vertices=vertices, swinging=said.swinging)
+        context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
+    return context.memo[training.id]
+
+
+def _positions(path: Path) -> np.ndarray:
+    from reference_sim import Trajectory
+
+    return Trajectory.load(path).positions

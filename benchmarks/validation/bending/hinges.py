@@ -1,0 +1,65 @@
+"""Hinge bending of folded strips: every inner column turns by the same angle, so the energy is a product."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.validation.meshes import in_space, random_rotation, right_grid
+from reference_sim import Cloth, Material, Potential
+from reference_sim.energies import BendHinge
+
+COLUMNS, ROWS, CELL, DEPTH = 6, 4, 0.1, 0.7
+
+
+def folded(scaling: str, fold: float) -> float:
+    """Energy of a strip folded by `fold` [rad] at each column, over its closed form.
+
+    Each of (COLUMNS - 1) ROWS upright edges holds k/2 fold^2, times l^2/(4 (A1 + A2)) where scaled.
+    """
+    cloth, x = _folded(fold)
+    edges = (COLUMNS - 1) * ROWS
+    scale = _scale() if scaling == "length_area" else 1.0
+    exact = edges * scale * cloth.material.bending_stiffness / 2 * fold**2
+    return BendHinge(cloth, scaling=scaling).value_and_gradient(x)[0] / exact
+
+
+def past_half_a_turn() -> float:
+    """The same with rest angles of 3 rad and a fold of -3 rad: the short way round is 2 pi - 6."""
+    cloth, x = _folded(-3.0)
+    upright = np.ptp(cloth.rest_positions[cloth.hinges[:, :2], 0], axis=1) < 1e-9
+    # The sign of a hinge's angle follows from its numbering; a fold of -3 is -3 or 3 there.
+    angles = np.where(upright, -_signs(cloth) * 3.0, 0.0)
+    bend = BendHinge(cloth, rest_angles=angles)
+    exact = upright.sum() * _scale() * cloth.material.bending_stiffness / 2 * (2 * np.pi - 6) ** 2
+    return bend.value_and_gradient(x)[0] / exact
+
+
+def rest_shape_force() -> float:
+    """Largest force [N] in a strip whose rest angles are those of its folded shape, turned in space."""
+    cloth, x = _folded(0.8)
+    curved = Cloth(x, cloth.faces, cloth.material)
+    bend = BendHinge(curved, rest_angles="rest")
+    return float(np.abs(Potential([bend]).gradient(x @ random_rotation(5).T)).max())
+
+
+def _scale() -> float:
+    """l^2 / (4 (A1 + A2)) of an upright edge."""
+    length = DEPTH / ROWS
+    return length**2 / (4 * CELL * length)
+
+
+def _folded(fold: float) -> tuple[Cloth, np.ndarray]:
+    points, faces = right_grid(ROWS, COLUMNS, DEPTH, COLUMNS * CELL)
+    heading = fold * np.arange(COLUMNS)
+    steps = CELL * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    profile = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)])
+    column = np.rint(points[:, 0] / CELL).astype(int)
+    x = np.stack([profile[column, 0], points[:, 1], profile[column, 1]], axis=1)
+    return Cloth(in_space(points), faces, Material()), x @ random_rotation(4).T
+
+
+def _signs(cloth: Cloth) -> np.ndarray:
+    """(H,) sign of each hinge's angle where the strip is folded by a small negative angle."""
+    from reference_sim.energies.bend_hinge import dihedral_angles
+
+    return np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))

@@ -1,0 +1,63 @@
+"""Lateral buckling: a strip on edge, clamped at one end and loaded at the other, gives way sideways.
+
+P = 4.0126 (EI GJ)^0.5 / L^2 (Michell 1899, Prandtl 1899). On equilateral triangles the hinges are an
+isotropic plate (see plates.py) with D = k/4 and nu = -1/3, so for a narrow strip of width b
+EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from benchmarks.validation.converged import converged
+from benchmarks.validation.loads import DeadLoad
+from benchmarks.validation.meshes import ROW, in_space, rectangle
+from reference_sim import Cloth, Material, Potential, minimise
+from reference_sim.energies import BendHinge, StretchStVK
+
+K = 1e-5  # [J] hinge stiffness: so small that the strip hardly sags in its own plane before it buckles
+MATERIAL = Material(poisson_ratio=0.3, bending_stiffness=K)
+MICHELL = 4.0126
+SLENDER = 0.04  # width over length
+ROWS = (4, 8)
+
+
+def critical_load() -> float:
+    """Load at which the tangent stiffness becomes singular, over the closed form.
+
+    The free edges lack half a hinge, an error of first order in the cell: two meshes are extrapolated.
+    """
+    coarse, fine = (_ratio(rows) for rows in ROWS)
+    return 2 * fine - coarse
+
+
+def _ratio(rows: int) -> float:
+    columns = round(rows * ROW / SLENDER)
+    h = 1 / (columns - 0.5)  # the clamp lies half-way between the two pinned columns
+    width = rows * h * ROW
+    points, faces = rectangle("equilateral", columns, rows, columns * h, width)
+    points -= [h / 2, width / 2]
+    cloth = Cloth(in_space(points), faces, MATERIAL, pins=np.flatnonzero(points[:, 0] < 0.51 * h))
+    D, nu = K / 4, -1 / 3
+    exact = MICHELL * width * D * np.sqrt((1 - nu**2) * 2 * (1 - nu))
+    tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
+    forces = np.zeros((len(points), 3))
+    share = 1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2  # shear of a beam: least at the free edges
+    forces[tip, 1] = -exact * share / share.sum()
+    strain, stiff = StretchStVK(cloth), BendHinge(cloth)
+    stiff.stiffness = 1e5 * stiff.stiffness  # keeps the loaded strip in its plane, where hinges do no work
+    in_plane = Potential([strain, stiff, DeadLoad(cloth, forces)])
+    flat = converged(minimise(in_plane, cloth.rest_positions, tolerance=1e-9), "the strip in its plane")
+    free = np.setdiff1d(np.arange(len(points)), cloth.pins)
+
+    def out_of_plane(potential: Potential, x: np.ndarray) -> sp.csc_matrix:
+        return sp.csc_matrix(potential.hessian(x)[2::3][:, 2::3][free][:, free])
+
+    bending = out_of_plane(Potential([BendHinge(cloth)]), cloth.rest_positions)
+    stress = out_of_plane(Potential([strain]), flat.positions)
+    # (bending + factor stress) w = 0: 1/factor is the largest eigenvalue of -stress against bending.
+    start = np.ones(len(free))
+    values = spla.eigsh(-stress, k=1, M=bending, which="LA", v0=start, return_eigenvectors=False)
+    return 1 / float(values[0])

@@ -1,0 +1,109 @@
+"""Hinges as a plate: what stiffness they stand for on each family of triangles.
+
+Kirchhoff's plate has the energy D/2 [(w_xx + w_yy)^2 - 2 (1 - nu) (w_xx w_yy - w_xy^2)]. Hinges are no such
+plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles, and on
+equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn - w_tt/3) at the edges of
+direction t, summed over the three directions of an equilateral mesh of spacing l:
+C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and with l^2/(4 (A1 + A2)), there
+1/(2 3^0.5), C11 = k/4.
+
+Squares with both diagonals, w = x^2/2 at the corners and d above that at the centres: per cell the hinges
+of the sides turn by 4 d +- 1/2 and those of the four half diagonals by 8^0.5 (1/8 - d), so the energy over
+k/2 is 1 - 8 d + 64 d^2, at least 3/4; scaled by l^2/(4 (A1 + A2)) it is 3/8 - 2 d + 24 d^2, at least 1/3.
+Alternating diagonals are the same tiling turned by 45 degrees: 3/4 again, and 5/24.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from benchmarks.validation.meshes import ROW, in_space, rectangle
+from reference_sim import Cloth, Material, Potential
+from reference_sim.energies import BendHinge
+
+STIFFNESS = 1.0  # [J] k; every result is divided by it
+
+
+def plate_stiffness(family: str, scaling: str) -> float:
+    """C11/k: a patch bent to a cylinder at its border, everything else at rest.
+
+    Energy of an n x n patch = a n^2 + b n + c with the border in b and c; three sizes give a. The
+    unstructured family has no cell that repeats, so there one larger patch is divided by its area.
+    """
+    height = ROW if family == "equilateral" else 1.0
+    if family == "delaunay":
+        energy, area = _bent(family, scaling, 48, 1.0)
+        return 2 * energy / area
+    small, middle, large = (_bent(family, scaling, n, height)[0] for n in (16, 24, 32))
+    return 2 * (small - 2 * middle + large) / 128 / height
+
+
+def _bent(family: str, scaling: str, cells: int, height: float) -> tuple[float, float]:
+    """Energy over k of a patch with w = x^2/2 on its two outer rings, and the area of its hinges."""
+    size = np.array([cells, cells * height])
+    points, faces = rectangle(family, cells, cells, *size)
+    bend, K = _stiffness(points, faces, scaling)
+    ring = ((points < 1.01) | (points > size - 1.01)).any(axis=1)
+    w = 0.5 * points[:, 0] ** 2
+    inside = np.flatnonzero(~ring)
+    w[inside] = spla.spsolve(K[inside][:, inside], -(K[inside][:, ring] @ w[ring]))
+    return 0.5 * float(w @ (K @ w)) / STIFFNESS, float(bend.cloth.hinge_areas.sum() / 3)
+
+
+def supported_plate(family: str, scaling: str) -> float:
+    """D/k of the Kirchhoff plate that sags as much, on the mean, as hinges on the unit square.
+
+    Simply supported along straight sides, uniform load: there the deflection does not depend on nu, so this
+    is the isotropic part of the plate. The reference is solved with Morley's element in scikit-fem.
+    """
+    columns = 24
+    rows = round(columns / ROW) if family == "equilateral" else columns
+    width = rows * ROW / columns if family == "equilateral" else 1.0
+    points, faces = rectangle(family, columns, rows, 1.0, width)
+    bend, K = _stiffness(points, faces, scaling)
+    border = (points < 1e-9).any(axis=1) | (points > np.array([1.0, width]) - 1e-9).any(axis=1)
+    inside = np.flatnonzero(~border)
+    areas = bend.cloth.vertex_areas
+    w = np.zeros(len(points))
+    w[inside] = spla.spsolve(K[inside][:, inside], areas[inside])
+    return morley_deflection(width) / (float(areas @ w) / width) / STIFFNESS
+
+
+def morley_deflection(width: float) -> float:
+    """Mean deflection of a simply supported plate 1 x width [m] with D = 1 under unit load.
+
+    Morley's element is of second order here; two meshes are extrapolated.
+    """
+    coarse, fine = (_morley(width, cells) for cells in (24, 48))
+    return (4 * fine - coarse) / 3
+
+
+def _morley(width: float, cells: int) -> float:
+    import skfem
+
+    line = np.linspace(0, 1, cells + 1)
+    mesh = skfem.MeshTri.init_tensor(line, line * width)
+    basis = skfem.Basis(mesh, skfem.ElementTriMorley(), intorder=4)
+
+    @skfem.BilinearForm
+    def bending(u, v, _):
+        return np.einsum("ij...,ij...->...", u.hess, v.hess)  # nu = 0: any nu sags the same
+
+    @skfem.LinearForm
+    def load(v, _):
+        return v
+
+    K, f = bending.assemble(basis), load.assemble(basis)
+    supported = basis.nodal_dofs[0, mesh.boundary_nodes()]
+    w = skfem.solve(*skfem.condense(K, f, D=supported))
+    return float(f @ w) / width
+
+
+def _stiffness(points: np.ndarray, faces: np.ndarray, scaling: str) -> tuple[BendHinge, sp.csr_matrix]:
+    """The bending term of a flat mesh (V,2) and its Hessian for displacements out of the plane (V,V)."""
+    cloth = Cloth(in_space(points), faces, Material(bending_stiffness=STIFFNESS))
+    bend = BendHinge(cloth, scaling=scaling)
+    hessian = Potential([bend]).hessian(cloth.rest_positions).tocsr()
+    return bend, hessian[2::3][:, 2::3]

@@ -1,0 +1,59 @@
+"""A sheet at rest on a plane: the depth and the force of the penalty are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.validation.converged import converged
+from benchmarks.validation.meshes import in_space, jittered_patch
+from reference_sim import Cloth, Material, Obstacle, Potential, minimise
+from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
+from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
+from reference_sim.material import GRAVITY
+
+
+def penalty_depth() -> float:
+    """Mean depth into the margin over sqrt(rho_a g / (3 k)), contact on vertices.
+
+    A vertex of area a carries rho_a a g and is pushed by 3 k a depth^2: the area cancels.
+    """
+    contact, x, areal_density = _sheet_at_rest("vertices")
+    exact = np.sqrt(areal_density * GRAVITY / (3 * DEFAULT_STIFFNESS))
+    return float(((contact.margin - x[:, 1]) / exact).mean())
+
+
+def sampled_area() -> float:
+    """Area of all contact samples of a sheet over its own: vertices, edges and faces carry it once each."""
+    points, faces = jittered_patch(8)
+    contact = ContactPenalty(Cloth(in_space(points), faces, Material()))
+    return float(contact.sample_areas.sum())  # the sheet has unit area
+
+
+def contact_force() -> float:
+    """Total upward contact force over the weight of the sheet, all contact samples on."""
+    contact, x, areal_density = _sheet_at_rest("all")
+    upward = -contact.value_and_gradient(x)[1][:, 1].sum()
+    return float(upward / (areal_density * GRAVITY))  # the sheet has unit area
+
+
+def _sheet_at_rest(samples: str) -> tuple[ContactPenalty, np.ndarray, float]:
+    points, faces = jittered_patch(8)
+    material = Material()
+    rest = in_space(points)[:, [0, 2, 1]] - [0.5, 0.0, 0.5]
+    cloth = Cloth(rest, faces[:, ::-1], material)
+    floor = Obstacle(*box(half=2.0, height=1.0))
+    contact = ContactPenalty(cloth, samples=samples)
+    start = rest + np.array([0.0, 0.002, 0.0])
+    still = np.zeros_like(start)
+    contact.prepare(Step(previous=start, velocity=still, guess=start, dt=1 / 30, obstacle=floor))
+    potential = Potential([StretchStVK(cloth), Gravity(cloth), contact])
+    result = converged(minimise(potential, start), "the sheet")
+    return contact, result.positions, material.areal_density
+
+
+def box(*, half: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """A closed box under the plane y = 0, `half` to each side and `height` deep [m]; outward faces."""
+    corners = np.array([[x, y, z] for x in (-half, half) for y in (-height, 0.0) for z in (-half, half)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+    return corners, faces

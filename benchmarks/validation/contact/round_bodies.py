@@ -1,0 +1,170 @@
+"""Contact with round bodies: a point that leaves a sphere, a strip drawn over a cylinder.
+
+The bodies here are exact, not meshes of triangles: they answer what an `Obstacle` answers.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from benchmarks.validation.converged import converged
+from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.meshes import in_space, right_grid
+from reference_sim import Cloth, Material, Potential, minimise, simulate
+from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
+from reference_sim.energies.contact_penalty import DEFAULT_MARGIN, DEFAULT_STIFFNESS
+from reference_sim.material import GRAVITY
+from reference_sim.obstacle import Planes
+
+RADIUS = 1.0  # [m] of the sphere
+START = 0.3  # [rad] from the top
+HARD = 1e11  # [J/m^5] of the sphere, so that the point never lags behind its resting depth
+DRUM = 0.2  # [m] radius of the cylinder
+SLACK = 0.1  # [m] of each end of the strip below the axis
+
+
+class RoundBody:
+    """A sphere about the origin, or (axis=2) a cylinder about the z axis, of `radius` [m]."""
+
+    fingerprint = "round"
+
+    def __init__(self, radius: float, axis: int | None = None) -> None:
+        self.radius = radius
+        self.keep = np.ones(3)
+        if axis is not None:
+            self.keep[axis] = 0.0
+
+    bounded = False
+
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+        """Tangent planes below points (S, 3); faces and places on them do not exist."""
+        radial = points * self.keep
+        normals = radial / np.linalg.norm(radial, axis=1, keepdims=True)
+        count = len(points)
+        nowhere = np.zeros(count, dtype=np.int64), np.zeros((count, 3))
+        return Planes(points - radial + self.radius * normals, normals, *nowhere)
+
+
+def leaving_point() -> float:
+    """cos theta at which a point leaves a sphere, over (2/3) cos theta_0: two time steps, extrapolated."""
+    coarse, fine = _leaving(480), _leaving(960)
+    return (2 * fine - coarse) / (2 / 3 * np.cos(START))
+
+
+def leaving_order() -> float:
+    """Order in dt of the error of cos theta."""
+    rates = (240, 480, 960)
+    exact = 2 / 3 * np.cos(START)
+    return fitted_order([abs(_leaving(rate) - exact) for rate in rates], [1 / rate for rate in rates])
+
+
+@cache
+def _leaving(rate: int) -> float:
+    """cos theta where the contact force reaches zero, with `rate` steps a second.
+
+    The point is a triangle of 4 mm. It starts at rest, as deep in the margin as its weight presses it.
+    """
+    material = Material()
+    corners = 0.004 / 3**0.5 * np.array([[np.cos(a), 0.0, np.sin(a)] for a in 2 * np.pi / 3 * np.arange(3)])
+    cloth = Cloth(corners, np.array([[0, 2, 1]]), material)
+    contact = ContactPenalty(cloth, samples="vertices", stiffness=HARD)
+    density = contact.stiffness[0] / contact.sample_areas[0]
+    depth = np.sqrt(material.areal_density * GRAVITY * np.cos(START) / (3 * density))
+    turn = np.array([[np.cos(START), np.sin(START), 0], [-np.sin(START), np.cos(START), 0], [0, 0, 1.0]])
+    start = (corners + np.array([0.0, RADIUS, 0.0])) @ turn.T
+    start *= (RADIUS + contact.margin - depth) / np.linalg.norm(start, axis=1, keepdims=True)
+    body: Any = RoundBody(RADIUS)
+    trajectory = simulate(
+        cloth,
+        [StretchStVK(cloth), Gravity(cloth), contact],
+        dt=1 / rate,
+        frames=round(1.2 * rate),
+        obstacle=body,
+        start=start,
+        guess="extrapolated",
+    )
+    converged(trajectory, "the slide")
+    middle = trajectory.positions.mean(axis=1)
+    cosine = middle[:, 1] / np.linalg.norm(middle, axis=1)
+    outside = np.linalg.norm(trajectory.positions, axis=2) - RADIUS
+    # The force, but for a factor.
+    press = (np.maximum(contact.margin - outside, 0.0) ** 2).mean(axis=1)
+    # The force falls to zero along a line in cos theta: follow it from where a tenth to a third is left.
+    share = press / press[0]
+    left = np.flatnonzero((share > 0.1) & (share < 0.33))
+    return float(np.polyval(np.polyfit(share[left], cosine[left], 2), 0.0))
+
+
+def drum_tension() -> float:
+    """Worst error of the strip's tension from its end's plus w times the height above it, over the mean."""
+    tension, expected, _, _ = _strip_on_drum()
+    return float(np.abs(tension - expected).max() / expected.mean())
+
+
+def drum_pressure() -> float:
+    """Mean over the arc of contact pressure / (tension/R + w cos phi)."""
+    _, _, pressure, expected = _strip_on_drum()
+    return float((pressure / expected).mean())
+
+
+def _strip_on_drum() -> tuple[np.ndarray, ...]:
+    """Tension and pressure per width [N/m], [N/m^2] along a strip whose two ends are held: ours, exact, each.
+
+    Without friction only weight changes the tension N along the strip: dN/ds = w dy/ds, and an arc of radius
+    R under tension N presses with N/R + w cos phi, where phi is the angle from the top.
+    """
+    # A hundred times stiffer than cotton: the strip keeps its length, the exact formulas need no stretch.
+    material = Material(young_modulus=7e6, poisson_ratio=0.0)
+    weight = material.areal_density * GRAVITY
+    pull, columns = 2.0, 120  # [N/m] at the ends, about, so that the strip never hangs slack
+    contact_depth = np.sqrt(pull / DRUM / (3 * DEFAULT_STIFFNESS))
+    radius = DRUM + DEFAULT_MARGIN - contact_depth
+    length = np.pi * radius + 2 * SLACK
+    width = 2 * length / columns
+    points, faces = right_grid(2, columns, width, length)
+    rest = in_space(points)[:, [0, 2, 1]]
+    ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > length - 1e-9))
+    cloth = Cloth(rest, faces[:, ::-1], material, pins=ends)
+    start = wrapped(rest, radius, length, 1 + pull / material.membrane_modulus)
+    contact = ContactPenalty(cloth, samples="vertices")
+    potential = Potential([StretchStVK(cloth), Gravity(cloth), contact])
+    x, body = start, RoundBody(DRUM, axis=2)
+    for _ in range(6):  # the planes follow the strip until both agree
+        still: Any = Step(previous=x, velocity=np.zeros_like(x), guess=x, dt=1 / 30, obstacle=body)  # type: ignore[arg-type]
+        contact.prepare(still)
+        result = minimise(potential, x, tolerance=1e-9)
+        x = result.positions
+    converged(result, "the strip")
+    return _profiles(cloth, contact, x, points, weight)
+
+
+def wrapped(rest: np.ndarray, radius: float, length: float, stretch: float) -> np.ndarray:
+    """The strip on a circle of `radius` about z, both ends hanging straight down."""
+    s = (rest[:, 0] - length / 2) * stretch
+    angle = np.clip(s / radius, -np.pi / 2, np.pi / 2)
+    below = np.abs(s) - np.pi / 2 * radius
+    x = np.stack([radius * np.sin(angle), radius * np.cos(angle), rest[:, 2]], axis=1)
+    x[:, 1] -= np.maximum(below, 0.0)
+    return x
+
+
+def _profiles(
+    cloth: Cloth, contact: ContactPenalty, x: np.ndarray, points: np.ndarray, weight: float
+) -> tuple[np.ndarray, ...]:
+    columns = len(np.unique(points[:, 0])) - 1
+    grid = x.reshape(3, columns + 1, 3).mean(axis=0)  # the middle line
+    width, cell = np.ptp(points[:, 1]), np.ptp(points[:, 0]) / columns
+    # Force through each cell from the forces on all vertices to its left: equilibrium by free-body cut.
+    strain = StretchStVK(cloth).value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
+    tension = np.linalg.norm(np.cumsum(strain, axis=0)[:-1], axis=1) / width
+    middle = 0.5 * (grid[1:] + grid[:-1])
+    expected = tension[0] + weight * (middle[:, 1] - middle[0, 1])
+    push = -contact.value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
+    upper = grid[:, 1] > 0.15 * DRUM
+    pressure = np.linalg.norm(push, axis=1)[upper] / (width * cell)
+    radius = np.linalg.norm(grid[upper, :2], axis=1)
+    inner = 0.5 * (tension[1:] + tension[:-1])[upper[1:-1]]
+    return tension, expected, pressure, inner / radius + weight * grid[upper, 1] / radius

@@ -1,0 +1,207 @@
+"""Backward Euler's own discrete laws: exact for the scheme, whatever the time step."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from benchmarks.scene import Scene
+from benchmarks.scenes import free_fall as fall
+from benchmarks.scenes import hanging_sheet
+from benchmarks.validation.converged import converged
+from benchmarks.validation.meshes import in_space, jittered_patch, right_grid
+from reference_sim import Cloth, Material, Potential, Trajectory, minimise, simulate
+from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
+
+DT = 1.0 / 30.0
+SPACING = 0.015  # [m] of the sheet that takes one step
+
+FALL = Scene(name="free_fall", description="a thrown sheet", module="benchmarks.scenes.free_fall")
+HANGING = Scene(
+    name="hanging_sheet", description="held at two corners", module="benchmarks.scenes.hanging_sheet"
+)
+
+
+def free_fall() -> float:
+    """Largest distance [m] to x_0 + n dt v_0 + g dt^2 n (n+1)/2."""
+    scene = fall.build(FALL, sheet_cells=14, sheet_frames=45)
+    trajectory = simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, velocity=scene.start_velocity
+    )
+    assert scene.exact is not None
+    return float(np.linalg.norm(trajectory.positions - scene.exact, axis=2).max())
+
+
+def free_fall_in_substeps() -> float:
+    """The same for four steps a frame: backward Euler with a quarter of the time step."""
+    scene, steps = fall.build(FALL, sheet_cells=6, sheet_frames=10), 4
+    trajectory = simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.start, substeps=steps
+    )
+    n = steps * np.arange(scene.frames)
+    drop = 9.81 * (scene.dt / steps) ** 2 * n * (n + 1) / 2
+    exact = scene.start - drop[:, None, None] * np.array([0.0, 1.0, 0.0])
+    return float(np.linalg.norm(trajectory.positions - exact, axis=2).max())
+
+
+def moving_pins_in_substeps() -> float:
+    """Worst distance [m] between four steps a frame and a quarter of the time step, pins moved alike.
+
+    Between frames pins move straight on.
+    """
+    scene, steps, frames = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10), 4, 10
+    places = scene.start[scene.cloth.pins]
+    pulled = np.array([0.01, 0.02, 0.0]) * np.square(np.arange(frames))[:, None, None] / frames
+
+    def between(step: int) -> np.ndarray:
+        frame, part = divmod(step, steps)
+        return places + pulled[frame] + part / steps * (pulled[min(frame + 1, frames - 1)] - pulled[frame])
+
+    def run(**options: Any) -> np.ndarray:
+        trajectory = simulate(scene.cloth, scene.energies, start=scene.start, **options)
+        return converged(trajectory, "the pulled sheet").positions
+
+    coarse = run(dt=scene.dt, frames=frames, substeps=steps, pin_positions=lambda n: places + pulled[n])
+    fine = run(dt=scene.dt / steps, frames=steps * (frames - 1) + 1, pin_positions=between)
+    return float(np.linalg.norm(coarse - fine[::steps], axis=2).max())
+
+
+def stretched_membrane(amplitude: float) -> tuple[Cloth, np.ndarray, np.ndarray, float]:
+    """A square membrane of 1 m held at its border: cloth, start (V,3) [m] with its lowest mode of that
+    amplitude [m], the mode (V,) and omega^2 [1/s^2] of it.
+
+    With stretch s, spacing h and lumped masses: S = (lam + mu)(s^2 - 1), omega^2 = (S/rho_a) (4/h^2)
+    2 sin^2(pi h/2).
+    """
+    cells, s, material = 8, 1.2, Material()
+    points, faces = right_grid(cells, cells, 1.0, 1.0)
+    on_border = (np.abs(points - 0.5) > 0.5 - 1e-9).any(axis=1)
+    cloth = Cloth(in_space(points), faces, material, pins=np.flatnonzero(on_border))
+    mode = np.sin(np.pi * points[:, 0]) * np.sin(np.pi * points[:, 1])
+    start = s * in_space(points)
+    start[:, 2] = amplitude * mode
+    S = (material.lame_lambda + material.lame_mu) * (s**2 - 1)
+    omega2 = S / material.areal_density * 4 * cells**2 * 2 * np.sin(np.pi / (2 * cells)) ** 2
+    return cloth, start, mode, float(omega2)
+
+
+def membrane_vibration() -> float:
+    """Largest error of the lowest mode of a stretched square membrane, as a share of its first amplitude.
+
+    The discrete motion is z_{n+1} = (2 z_n - z_{n-1}) / (1 + omega^2 dt^2).
+    """
+    amplitude, frames = 1e-5, 31
+    cloth, start, mode, omega2 = stretched_membrane(amplitude)
+    trajectory = simulate(cloth, [StretchStVK(cloth)], dt=DT, frames=frames, start=start, tolerance=1e-12)
+    z = [amplitude, amplitude]  # the frame before the start: no velocity
+    for _ in range(frames - 1):
+        z.append((2 * z[-1] - z[-2]) / (1 + omega2 * DT**2))
+    measured = trajectory.positions[:, :, 2] @ mode / (mode @ mode)
+    return float(np.abs(measured - z[1:]).max() / amplitude)
+
+
+def momentum_balance() -> float:
+    """Largest |P' - P - dt weight| over steps of a crumpled sheet thrown freely, over dt times weight.
+
+    Strain and bending are internal: their forces sum to zero.
+    """
+    trajectory, cloth = _thrown_sheet()
+    velocities = np.diff(trajectory.positions, axis=0) / DT
+    momentum = np.einsum("v,tvi->ti", cloth.masses, velocities)
+    weight = Gravity(cloth).weights.sum()
+    errors = np.diff(momentum, axis=0) - [0.0, -DT * weight, 0.0]
+    return float(np.abs(errors).max() / (DT * weight))
+
+
+def angular_momentum_balance() -> float:
+    """Largest error of L' = L - dt sum m v x v' + dt tau(x') over the same steps, over the largest |L|.
+
+    Backward Euler loses angular momentum by the second term; strain and bending have no torque.
+    """
+    trajectory, cloth = _thrown_sheet()
+    x, m = trajectory.positions, cloth.masses
+    v = np.diff(x, axis=0) / DT
+    L = np.einsum("v,tvi->ti", m, np.cross(x[1:], v))
+    lost = np.einsum("v,tvi->ti", m, np.cross(v[:-1], v[1:]))
+    torque = np.cross(x[2:], [0.0, -1.0, 0.0]) * Gravity(cloth).weights[:, None]
+    errors = np.diff(L, axis=0) + DT * lost - DT * torque.sum(axis=1)
+    return float(np.abs(errors).max() / np.abs(L).max())
+
+
+@cache
+def _thrown_sheet() -> tuple[Trajectory, Cloth]:
+    points, faces = jittered_patch(6)
+    cloth = Cloth(0.3 * in_space(points), faces, Material())
+    random = np.random.default_rng(2)
+    start = cloth.rest_positions + random.normal(0, 0.004, cloth.rest_positions.shape)
+    trajectory = simulate(
+        cloth,
+        [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)],
+        dt=DT,
+        frames=12,
+        start=start,
+        velocity=random.normal(0, 0.5, start.shape),
+    )
+    return converged(trajectory, "the simulation"), cloth
+
+
+def unique_step() -> float:
+    """Largest distance [m] between the ends of one step from two random starts, under the convexity bound.
+
+    The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter than
+    h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
+    """
+    first, second = _step_from_random_starts(0.9)
+    return float(np.linalg.norm(first - second, axis=1).max())
+
+
+def ambiguous_step() -> float:
+    """The same distance [m] at 1/30 s, far above the bound: how much two honest solvers may differ."""
+    material = Material()
+    bound = SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
+    first, second = _step_from_random_starts(DT / bound)
+    return float(np.linalg.norm(first - second, axis=1).max())
+
+
+def _step_from_random_starts(share: float) -> list[np.ndarray]:
+    """Ends of one step of `share` times the bound, thrown into disorder, from two guesses far off."""
+    material = Material()
+    cells = 12
+    points, faces = right_grid(cells, cells, cells * SPACING, cells * SPACING)
+    cloth = Cloth(in_space(points), faces, material)
+    dt = share * SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
+    inertia = Inertia(cloth, dt)
+    random = np.random.default_rng(5)
+    inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)
+    potential = Potential([StretchStVK(cloth), inertia])
+    ends = []
+    for _ in range(2):
+        start = random.uniform(-SPACING * cells, SPACING * cells, cloth.rest_positions.shape)
+        ends.append(converged(minimise(potential, start, tolerance=1e-12), "the step").positions)
+    return ends
+
+
+def energy_inequality() -> float:
+    """Largest excess of Phi' + |v' - v|_M^2/2 over Phi + |v|_M^2/2, over the largest kinetic energy.
+
+    Both sides are the step's objective, at its end and at the previous positions: a step that ends above the
+    place it came from is wrong. Measured on the hanging sheet.
+    """
+    scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10)
+    trajectory = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=20, start=scene.start)
+    converged(trajectory, "the simulation")
+    return _largest_rise(trajectory, scene.cloth, scene.energies, scene.dt)
+
+
+def _largest_rise(trajectory: Trajectory, cloth: Cloth, energies: tuple[Energy, ...], dt: float) -> float:
+    potential = Potential(energies)
+    x = trajectory.positions
+    phi = np.array([potential.value(frame) for frame in x])
+    v = np.concatenate([np.zeros_like(x[:1]), np.diff(x, axis=0) / dt])
+    kinetic = 0.5 * np.einsum("v,tvi,tvi->t", cloth.masses, v, v)
+    change = np.diff(v, axis=0)
+    lost = 0.5 * np.einsum("v,tvi,tvi->t", cloth.masses, change, change)
+    rise = phi[1:] + lost - phi[:-1] - kinetic[:-1]
+    return float(np.maximum(rise, 0.0).max() / kinetic.max())

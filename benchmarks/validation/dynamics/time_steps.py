@@ -1,0 +1,159 @@
+"""Order in dt of whole sheets: where backward Euler has its first order, and what it takes to see it.
+
+The membrane is held against its exact motion. Elsewhere there is none, and the order is that of the distance
+between the positions with dt and with dt/2: it is that of the distance to the limit, where there is a limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from benchmarks.scenes import hanging_sheet
+from benchmarks.scenes.sheet import sheet, square_sheet
+from benchmarks.validation.contact.round_bodies import RoundBody
+from benchmarks.validation.converged import converged
+from benchmarks.validation.dynamics.discrete_laws import HANGING, stretched_membrane
+from benchmarks.validation.fitted_order import fitted_order
+from reference_sim import Cloth, Material, Potential, minimise, simulate
+from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Step, StretchStVK
+from reference_sim.obstacle import Planes
+
+VISCOSITY = 0.25  # [N s/m] of an edge: waves faster than about 100 rad/s do not swing
+BALL = 0.1  # [m] radius
+
+
+def membrane_order() -> float:
+    """Order of the lowest mode of a stretched square membrane after a tenth of a second: A cos(omega t)."""
+    amplitude, end = 1e-5, 0.1
+    cloth, start, mode, omega2 = stretched_membrane(amplitude)
+    exact = amplitude * np.cos(np.sqrt(omega2) * end) * mode
+    steps = (96, 192, 384)
+    ends = [_end(cloth, [StretchStVK(cloth)], start, end, n, tolerance=1e-11) for n in steps]
+    return fitted_order([float(np.linalg.norm(x[:, 2] - exact)) for x in ends], [end / n for n in steps])
+
+
+def swing_order() -> float:
+    """Order of a sheet, hanging from its upper edge and let go at 20 degrees, after a quarter of a second."""
+    flat, faces = sheet((8, 6), (0.4, 0.3))
+    upright = np.stack([flat[:, 2], -flat[:, 0], flat[:, 1]], axis=1)
+    cloth = Cloth(upright, faces, Material(), pins=np.arange(7))
+    energies = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
+    hanging = converged(minimise(Potential(energies), upright), "the hanging sheet").positions
+    cosine, sine = np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20))
+    turn = np.array([[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]])
+    edge = upright[0] * [0, 1, 0]
+    start = (hanging - edge) @ turn.T + edge
+    return halving_order(lambda n: _end(cloth, energies, start, 0.25, n), (60, 120, 240, 480))
+
+
+class MovingBall(RoundBody):
+    """A ball whose centre is at `heights` (T,) [m] above the origin, frame by frame."""
+
+    def __init__(self, heights: Sequence[float] | np.ndarray) -> None:
+        super().__init__(BALL)
+        self.heights = heights
+
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+        centre = np.array([0.0, self.heights[min(frame, len(self.heights) - 1)], 0.0])
+        found = super().planes(points - centre, frame)
+        return Planes(found.points + centre, found.normals, found.faces, found.barycentric)
+
+
+def pressed_order() -> float:
+    """Order of a taut sheet that a ball, already in touch, is pressed into smoothly."""
+    return halving_order(_pressed(), (30, 60, 120, 240))
+
+
+def chord_distance() -> float:
+    """Distance [m] of that sheet to one whose ball moves at even speed between frames of 1/30 s.
+
+    Both with 480 steps: what sub-steps of a body known frame by frame converge to is not the smooth motion.
+    """
+    return _distance(_pressed()(480), _pressed(frames=6)(480))
+
+
+def _pressed(frames: int | None = None) -> Callable[[int], np.ndarray]:
+    """Number of steps -> positions after 0.2 s; the ball rises linearly between `frames`, or smoothly."""
+    end = 0.2
+    flat, faces = square_sheet(8, 0.4)
+    border = np.flatnonzero((np.abs(flat[:, [0, 2]]) > 0.2 - 1e-9).any(axis=1))
+    cloth = Cloth(flat, faces, Material(), pins=border)
+    energies = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth)]
+
+    def height(t: np.ndarray) -> np.ndarray:
+        return 0.02 * np.sin(2 * np.pi * t) ** 6 - 0.8 * BALL  # from rest, without a jolt
+
+    def ball(n: int) -> Any:
+        t = np.linspace(0, end, n + 1)
+        if frames is None:
+            return MovingBall(height(t))
+        known = np.linspace(0, end, frames + 1)
+        return MovingBall(np.interp(t, known, height(known)))
+
+    tent = 1.1 * flat
+    tent[:, 1] = 0.12 * np.maximum(0.2 - np.hypot(flat[:, 0], flat[:, 2]), 0.0)
+    still: Any = MovingBall([-0.8 * BALL])
+    # Contact planes follow the sheet until both agree.
+    start = simulate(
+        cloth, energies, dt=1.0, frames=9, quasi_static=True, start=tent, obstacle=still, guess="previous"
+    ).positions[-1]
+    return lambda n: _end(cloth, energies, start, end, n, obstacle=ball(n), guess="extrapolated")
+
+
+class Viscosity(Energy):
+    """E = c/(2 dt) |(x_j - x_i) - (x_j - x_i)_t|^2 [J] of an edge: a force -c times the relative velocity."""
+
+    name = "viscosity"
+
+    def __init__(self, cloth: Cloth) -> None:
+        self.cloth, self.stencils = cloth, cloth.edges
+        self.before, self.factor = np.zeros((len(cloth.edges), 3)), 0.0
+
+    def prepare(self, step: Step) -> None:
+        self.before = step.previous[self.stencils[:, 1]] - step.previous[self.stencils[:, 0]]
+        self.factor = VISCOSITY / step.dt
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        first, second = self.stencils.T
+        change = x[second] - x[first] - self.before
+        gradient = np.zeros_like(x)
+        np.add.at(gradient, second, self.factor * change)
+        np.add.at(gradient, first, -self.factor * change)
+        return 0.5 * self.factor * float((change**2).sum()), gradient
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        _, blocks = self.scalar_stiffness(x)
+        return np.kron(blocks, np.eye(3))
+
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        block = self.factor * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return np.arange(len(self.stencils)), np.broadcast_to(block, (len(self.stencils), 2, 2))
+
+
+def hanging_sheet_order(viscous: bool) -> float:
+    """Order of the sheet held at two corners, wrinkled after 0.7 s, with viscous edges or as it is."""
+    scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=22)
+    energies = [*scene.energies, *([Viscosity(scene.cloth)] if viscous else [])]
+    return halving_order(lambda n: _end(scene.cloth, energies, scene.start, 0.7, n), (42, 84, 168, 336))
+
+
+def halving_order(end: Callable[[int], np.ndarray], steps: Sequence[int]) -> float:
+    """Order of what `end` gives for a number of steps (V,3) [m]; each of `steps` is twice the one before."""
+    ends = [end(n) for n in steps]
+    return fitted_order([_distance(a, b) for a, b in pairwise(ends)], [1 / n for n in steps[:-1]])
+
+
+def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.sqrt(((a - b) ** 2).sum(axis=1).mean()))
+
+
+def _end(
+    cloth: Cloth, energies: Sequence[Energy], start: np.ndarray, end: float, n: int, **options: Any
+) -> np.ndarray:
+    """Positions (V,3) [m] after `end` [s] in n steps, from rest."""
+    trajectory = simulate(cloth, energies, dt=end / n, frames=n + 1, start=start, **options)
+    return converged(trajectory, "the simulation").positions[-1]

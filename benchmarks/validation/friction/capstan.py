@@ -1,0 +1,95 @@
+"""A strip held at both ends over a drum that turns under it: the pulls are to each other as exp(mu phi).
+
+Everything slips one way, and nothing moves any more once the tension has found its profile, so the friction
+of each vertex is mu N on its own tangent. Where the strip turns by b at a vertex whose normal halves the
+turn, forces along and across the tangent balance where
+
+    (T2 - T1) cos(b/2) = mu N,    (T2 + T1) sin(b/2) = N,    T2/T1 = (1 + mu tan(b/2))/(1 - mu tan(b/2))
+
+which over n turns of phi/n is exp(mu phi) (Euler, Eytelwein), but for mu (1 + mu^2) phi b^2/12 in its
+logarithm. On a penalty the strip also sinks into the margin towards the tight end, against its normals.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.validation.contact.round_bodies import DRUM, SLACK, RoundBody, wrapped
+from benchmarks.validation.converged import converged
+from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.meshes import in_space, right_grid
+from reference_sim import Cloth, Material, simulate
+from reference_sim.energies import ContactFriction, ContactPenalty, StretchStVK
+from reference_sim.energies.contact_penalty import DEFAULT_MARGIN
+from reference_sim.obstacle import Planes
+
+HARD = 3.4e10  # [J/m^5]: the strip lies a hundredth as deep in the margin as on a body
+PULL = 2.0  # [N/m], about
+TURN = 0.02  # [rad] of the drum in a step
+
+
+class TurningDrum(RoundBody):
+    """The cylinder about the z axis, turning by `turn` [rad] a step; its skin is known exactly.
+
+    Its one face has the turned unit vectors as corners, so that "barycentric" coordinates on it are the
+    coordinates of a point in the frame that turns.
+    """
+
+    faces = np.array([[0, 1, 2]])
+
+    def __init__(self, radius: float, turn: float) -> None:
+        super().__init__(radius, axis=2)
+        self.turn = turn
+
+    def at(self, frame: int) -> np.ndarray:
+        c, s = np.cos(frame * self.turn), np.sin(frame * self.turn)
+        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+        found = super().planes(points, frame)
+        return Planes(found.points, found.normals, found.faces, found.points @ self.at(frame).T)
+
+
+def ratio(mu: float, stiffness: float = HARD) -> float:
+    """Pull on the tight end over that on the slack one, over exp(mu phi); phi is the angle between both."""
+    return float(np.exp(_excess(mu, stiffness, 60)))
+
+
+def order() -> float:
+    """Order in the length of a cell of the error of the logarithm of that ratio, at mu = .5."""
+    columns = (30, 60, 120)
+    return fitted_order([abs(_excess(0.5, HARD, n)) for n in columns], [1 / n for n in columns])
+
+
+def _excess(mu: float, stiffness: float, columns: int) -> float:
+    """Logarithm of the ratio of the pulls, less mu times the angle between the first and the last cell."""
+    material = Material(young_modulus=7e6, poisson_ratio=0.0)  # stiff: exact formulas need no stretch
+    radius = DRUM + DEFAULT_MARGIN - np.sqrt(PULL / DRUM / (3 * stiffness))
+    length = np.pi * radius + 2 * SLACK
+    points, faces = right_grid(2, columns, 2 * length / columns, length)
+    rest = in_space(points)[:, [0, 2, 1]]
+    left, right = points[:, 0] < 1e-9, points[:, 0] > length - 1e-9
+    cloth = Cloth(rest, faces[:, ::-1], material, pins=np.flatnonzero(left | right))
+    contact = ContactPenalty(cloth, samples="vertices", stiffness=stiffness)
+    friction = ContactFriction(contact, coefficient=mu, speed=1e-3 * DRUM * TURN)
+    body: Any = TurningDrum(DRUM, TURN)
+    trajectory = simulate(
+        cloth,
+        [StretchStVK(cloth), contact, friction],
+        dt=1.0,
+        frames=40,
+        obstacle=body,
+        start=wrapped(rest, radius, length, 1 + PULL / material.membrane_modulus),
+        guess="previous",
+        quasi_static=True,
+        tolerance=1e-9,
+    )
+    x = converged(trajectory, "the strip").positions[-1]
+    strain = StretchStVK(cloth).value_and_gradient(x)[1]
+    pulls = [float(np.linalg.norm(strain[end].sum(axis=0))) for end in (left, right)]
+    line = x.reshape(3, columns + 1, 3).mean(axis=0)
+    first, last = line[1] - line[0], line[-1] - line[-2]
+    wrap = np.arccos(first @ last / np.linalg.norm(first) / np.linalg.norm(last))
+    return float(np.log(max(pulls) / min(pulls)) - mu * wrap)

@@ -1,0 +1,93 @@
+"""A square sheet pulled between two clamps, against quadratic triangles of scikit-fem.
+
+The clamps hold the width, so the sheet necks: no closed form, but a smooth reference. Both are held in their
+plane, here by a large hinge stiffness (flat hinges do no work), there by having two coordinates.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from benchmarks.validation.converged import converged
+from benchmarks.validation.meshes import in_space, jittered_patch
+from reference_sim import Cloth, Material, Potential, minimise
+from reference_sim.energies import BendHinge, StretchStVK
+
+STRETCH = 1.2
+MATERIAL = Material(poisson_ratio=0.3, bending_stiffness=1.0)
+CELLS = 32
+GOLD_CELLS = 24
+
+
+def force() -> tuple[float, float]:
+    """Pull on a clamp [N], ours and theirs."""
+    return _ours()[0], _gold()[0]
+
+
+def neck() -> tuple[float, float]:
+    """Width [m] half-way between the clamps, ours and theirs."""
+    return _ours()[1], _gold()[1]
+
+
+@cache
+def _ours() -> tuple[float, float]:
+    points, faces = jittered_patch(CELLS)
+    clamps = (points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9)
+    cloth = Cloth(in_space(points), faces, MATERIAL, pins=np.flatnonzero(clamps))
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth)])
+    stretched = cloth.rest_positions * [STRETCH, 1.0, 1.0]
+    result = converged(minimise(potential, stretched, tolerance=1e-9), "the sheet")
+    pull = potential.gradient(result.positions)[points[:, 0] > 1 - 1e-9, 0].sum()
+    middle = (np.abs(points[:, 0] - 0.5) < 1e-9) & (np.abs(points[:, 1] - 0.5) > 0.5 - 1e-9)
+    return float(pull), float(np.ptp(result.positions[middle, 1]))
+
+
+@cache
+def _gold() -> tuple[float, float]:
+    import skfem
+
+    lam, mu = MATERIAL.lame_lambda, MATERIAL.lame_mu
+    # Graded towards the corners of the clamps, where the stress is singular.
+    line = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, GOLD_CELLS + 1))
+    mesh = skfem.MeshTri.init_tensor(line, line)
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP2()), intorder=5)
+
+    def stress(F):
+        G = 0.5 * (np.einsum("ia...,ib...->ab...", F, F) - np.eye(2)[:, :, None, None])
+        return lam * (G[0, 0] + G[1, 1]) * np.eye(2)[:, :, None, None] + 2 * mu * G
+
+    @skfem.LinearForm
+    def residual(v, w):
+        F = w["position"].grad
+        return np.einsum("ia...,ab...,ib...->...", F, stress(F), v.grad)
+
+    @skfem.BilinearForm
+    def tangent(u, v, w):
+        F = w["position"].grad
+        half = np.einsum("ia...,ib...->ab...", F, u.grad)
+        change = 0.5 * (half + half.swapaxes(0, 1))
+        rise = lam * (change[0, 0] + change[1, 1]) * np.eye(2)[:, :, None, None] + 2 * mu * change
+        return np.einsum("ia...,ab...,ib...->...", u.grad, stress(F), v.grad) + np.einsum(
+            "ia...,ab...,ib...->...", F, rise, v.grad
+        )
+
+    x = basis.project(lambda X: np.stack([STRETCH * X[0], X[1]]))
+    left = basis.get_dofs(lambda X: np.isclose(X[0], 0)).all()
+    right = basis.get_dofs(lambda X: np.isclose(X[0], 1)).all()
+    held = np.concatenate([left, right])
+    for _ in range(20):
+        field = basis.interpolate(x)
+        r = residual.assemble(basis, position=field)
+        step = skfem.solve(*skfem.condense(tangent.assemble(basis, position=field), -r, D=held))
+        x = x + step
+        if np.abs(step).max() < 1e-12:
+            break
+    else:
+        raise RuntimeError("the reference did not converge")
+    r = residual.assemble(basis, position=basis.interpolate(x))
+    pulled = basis.get_dofs(lambda X: np.isclose(X[0], 1)).all(["u^1"])
+    middle = np.flatnonzero(np.abs(mesh.p[0] - 0.5) < 1e-9)
+    heights = x[basis.nodal_dofs[1, middle]]
+    return float(r[pulled].sum()), float(np.ptp(heights))

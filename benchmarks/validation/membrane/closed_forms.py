@@ -1,0 +1,171 @@
+"""The membrane and its hinges: closed forms, scikit-fem as an independent second opinion, zero modes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.validation.meshes import in_space, jittered_patch, random_rotation
+from reference_sim import Cloth, Material, Potential
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
+
+STRETCH, SHEAR = 1.3, 0.4
+
+
+def closed_form(state: str) -> float:
+    """Energy of a homogeneous state of a rotated, unstructured patch over its closed form.
+
+    With G = (s^2 - 1)/2, per unit area: uniaxial strain (lam/2 + mu) G^2; uniaxial stress E2 G^2/2 at
+    lateral stretch^2 1 - nu2 (s^2 - 1); equibiaxial 2 (lam + mu) G^2; simple shear g
+    lam g^4/8 + mu (g^2/2 + g^4/4); collapse to a point (lam + mu)/2.
+    """
+    cloth, points = _turned_patch()
+    deformation, exact = _states()[state]
+    x = in_space(points @ deformation.T) @ random_rotation(2).T + [0.3, -2.0, 1.0]
+    return StretchStVK(cloth).value_and_gradient(x)[0] / exact  # the patch has unit area
+
+
+def _turned_patch() -> tuple[Cloth, np.ndarray]:
+    points, faces = jittered_patch(8)
+    return Cloth(in_space(points) @ random_rotation(1).T, faces, Material()), points
+
+
+def _states() -> dict[str, tuple[np.ndarray, float]]:
+    """Deformation (2,2) and energy per area [J/m^2], by name."""
+    material = Material()
+    lam, mu = material.lame_lambda, material.lame_mu
+    s, g = STRETCH, SHEAR
+    G = (s**2 - 1) / 2
+    E2, nu2 = 4 * mu * (lam + mu) / (lam + 2 * mu), lam / (lam + 2 * mu)
+    lateral = np.sqrt(1 - nu2 * (s**2 - 1))
+    return {
+        "uniaxial strain": (np.diag([s, 1.0]), (lam / 2 + mu) * G**2),
+        "uniaxial stress": (np.diag([s, lateral]), E2 * G**2 / 2),
+        "equibiaxial": (np.diag([s, s]), 2 * (lam + mu) * G**2),
+        "simple shear": (np.array([[1.0, g], [0.0, 1.0]]), lam * g**4 / 8 + mu * (g**2 / 2 + g**4 / 4)),
+        "collapse": (np.zeros((2, 2)), (lam + mu) / 2),
+    }
+
+
+def uniaxial_pull() -> tuple[float, float]:
+    """Force [N] on an end of unit width in uniaxial stress, s E2 G. Raises if anything pulls across."""
+    cloth, points = _turned_patch()
+    deformation, _ = _states()["uniaxial stress"]
+    turn = random_rotation(2)
+    force = StretchStVK(cloth).value_and_gradient(in_space(points @ deformation.T) @ turn.T)[1] @ turn
+    if np.abs(force[:, 1:]).max() > 1e-11:
+        raise RuntimeError(f"{np.abs(force[:, 1:]).max():.3g} N act across the pull")
+    exact = STRETCH * Material().membrane_modulus * (STRETCH**2 - 1) / 2
+    return float(force[points[:, 0] > 1 - 1e-9, 0].sum()), exact
+
+
+def constant(name: str) -> float:
+    """A number of the default cotton, E = 70 kPa, nu = 0.485, t = 0.47 mm, rho = 426 kg/m^3."""
+    return float(getattr(Material(), name))
+
+
+def weight_of_a_square_metre() -> float:
+    """[N]"""
+    cloth, _ = _turned_patch()
+    return float(Gravity(cloth).value_and_gradient(cloth.rest_positions)[1][:, 1].sum())
+
+
+def scikit_fem_energy() -> float:
+    """Relative difference of the membrane energy to an assembly by scikit-fem, in a random 3D state."""
+    return _scikit_fem_differences()[0]
+
+
+def scikit_fem_gradient() -> float:
+    """Relative difference of the membrane's gradient to scikit-fem's."""
+    return _scikit_fem_differences()[1]
+
+
+def scikit_fem_hessian() -> float:
+    """Relative difference of the membrane's Hessian to scikit-fem's."""
+    return _scikit_fem_differences()[2]
+
+
+def _scikit_fem_differences() -> tuple[float, float, float]:
+    import skfem
+
+    material = Material()
+    lam, mu = material.lame_lambda, material.lame_mu
+    points, faces = jittered_patch(12)
+    x = in_space(points) @ random_rotation(4).T
+    x += np.random.default_rng(5).normal(0, 0.03, x.shape)
+
+    mesh = skfem.MeshTri(points.T.copy(), faces.T.copy())
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP1(), 3), intorder=2)
+    order = basis.nodal_dofs.T.ravel()
+    state = np.zeros(basis.N)
+    state[order] = x.ravel()
+
+    def strain_and_stress(F):
+        strain = 0.5 * (np.einsum("ia...,ib...->ab...", F, F) - np.eye(2)[:, :, None, None])
+        trace = strain[0, 0] + strain[1, 1]
+        return strain, trace, lam * trace * np.eye(2)[:, :, None, None] + 2 * mu * strain
+
+    @skfem.Functional
+    def energy(w):
+        strain, trace, _ = strain_and_stress(w["x"].grad)
+        return 0.5 * lam * trace**2 + mu * np.einsum("ab...,ab...->...", strain, strain)
+
+    @skfem.LinearForm
+    def gradient(v, w):
+        F = w["x"].grad
+        return np.einsum("ia...,ab...,ib...->...", F, strain_and_stress(F)[2], v.grad)
+
+    @skfem.BilinearForm
+    def hessian(u, v, w):
+        F = w["x"].grad
+        du, dv = u.grad, v.grad
+        stress = strain_and_stress(F)[2]
+        half = np.einsum("ia...,ib...->ab...", F, du)
+        change = 0.5 * (half + half.swapaxes(0, 1))
+        trace = change[0, 0] + change[1, 1]
+        change_of_stress = lam * trace * np.eye(2)[:, :, None, None] + 2 * mu * change
+        return np.einsum("ia...,ab...,ib...->...", du, stress, dv) + np.einsum(
+            "ia...,ab...,ib...->...", F, change_of_stress, dv
+        )
+
+    field = basis.interpolate(state)
+    theirs = (
+        float(energy.assemble(basis, x=field)),
+        gradient.assemble(basis, x=field)[order],
+        hessian.assemble(basis, x=field).tocsr()[order][:, order],
+    )
+    ours = Potential([StretchStVK(Cloth(in_space(points), faces, material))])
+    matrix = ours.hessian(x)
+    return (
+        abs(ours.value(x) / theirs[0] - 1),
+        float(np.linalg.norm(ours.gradient(x).ravel() - theirs[1]) / np.linalg.norm(theirs[1])),
+        float(np.sqrt(((matrix - theirs[2]).power(2)).sum() / theirs[2].power(2).sum())),
+    )
+
+
+def rigid_motion() -> float:
+    """Largest force [N] in a flat patch after a rigid motion, hinges on."""
+    potential, x = _moved_patch()
+    return float(np.abs(potential.gradient(x)).max())
+
+
+def rigid_invariance() -> float:
+    """Relative change of the forces on a patch in disorder as it moves and turns, seen from the patch."""
+    potential, x = _moved_patch()
+    x = x + np.random.default_rng(6).normal(0, 0.03, x.shape)
+    turn = random_rotation(9)
+    before, after = potential.gradient(x), potential.gradient(x @ turn.T + [0.5, -1.0, 2.0])
+    return float(np.linalg.norm(after @ turn - before) / np.linalg.norm(before))
+
+
+def zero_modes() -> float:
+    """Number of eigenvalues of the Hessian under 1e-9 of the largest, at rest after a rigid motion."""
+    potential, x = _moved_patch()
+    values = np.linalg.eigvalsh(potential.hessian(x).toarray())
+    return float((np.abs(values) < 1e-9 * values[-1]).sum())
+
+
+def _moved_patch() -> tuple[Potential, np.ndarray]:
+    points, faces = jittered_patch(5)
+    rest = in_space(points)
+    cloth = Cloth(rest, faces, Material())
+    return Potential([StretchStVK(cloth), BendHinge(cloth)]), rest @ random_rotation(7).T + [1.0, 2.0, 3.0]

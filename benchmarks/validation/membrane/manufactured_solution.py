@@ -1,0 +1,91 @@
+"""A membrane under the forces that make a chosen smooth surface its equilibrium.
+
+    x(X, Y) = (1.15 X + .04 sin pi X sin pi Y, 1.1 Y + .05 X Y (1 - Y), .15 sin pi X sin pi Y)
+
+The forces are those of the weak form, f_a = int P(grad x) grad phi_a, by quadrature of order 8 in scikit-fem,
+and the border is held on the surface; what the mesh then makes of it may differ by the error of linear
+triangles alone: h^2 in the mean square, h in the gradient.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from benchmarks.validation.converged import converged
+from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.loads import DeadLoad
+from benchmarks.validation.meshes import in_space, jittered_patch
+from reference_sim import Cloth, Material, Potential, minimise
+from reference_sim.energies import StretchStVK
+
+CELLS = (8, 16, 32)
+
+
+def surface(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """x (3, ...) [m] of material points."""
+    bump = np.sin(np.pi * X) * np.sin(np.pi * Y)
+    return np.stack([1.15 * X + 0.04 * bump, 1.1 * Y + 0.05 * X * Y * (1 - Y), 0.15 * bump])
+
+
+def gradient(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """F = dx/dX (3, 2, ...)."""
+    along = np.pi * np.cos(np.pi * X) * np.sin(np.pi * Y)
+    across = np.pi * np.sin(np.pi * X) * np.cos(np.pi * Y)
+    zero = np.zeros_like(X)
+    return np.stack(
+        [
+            np.stack([1.15 + 0.04 * along, 0.04 * across]),
+            np.stack([zero + 0.05 * Y * (1 - Y), 1.1 + 0.05 * X * (1 - 2 * Y)]),
+            np.stack([0.15 * along, 0.15 * across]),
+        ]
+    )
+
+
+def mean_square_order() -> float:
+    """Order of the error of positions in the mean square."""
+    return fitted_order([_errors(cells)[0] for cells in CELLS], [1 / cells for cells in CELLS])
+
+
+def gradient_order() -> float:
+    """Order of the error of the deformation gradient in the mean square."""
+    return fitted_order([_errors(cells)[1] for cells in CELLS], [1 / cells for cells in CELLS])
+
+
+@cache
+def _errors(cells: int) -> tuple[float, float]:
+    import skfem
+
+    material = Material()
+    lam, mu = material.lame_lambda, material.lame_mu
+    points, faces = jittered_patch(cells)
+    mesh = skfem.MeshTri(points.T.copy(), faces.T.copy())
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP1(), 3), intorder=8)
+    numbers = basis.nodal_dofs.T
+
+    @skfem.LinearForm
+    def forces(v, w):
+        F = gradient(*w.x)
+        G = 0.5 * (np.einsum("ia...,ib...->ab...", F, F) - np.eye(2)[:, :, None, None])
+        S = lam * (G[0, 0] + G[1, 1]) * np.eye(2)[:, :, None, None] + 2 * mu * G
+        return np.einsum("ia...,ab...,ib...->...", F, S, v.grad)
+
+    @skfem.Functional
+    def position_error(w):
+        return ((w["field"] - surface(*w.x)) ** 2).sum(axis=0)
+
+    @skfem.Functional
+    def gradient_error(w):
+        return ((w["field"].grad - gradient(*w.x)) ** 2).sum(axis=(0, 1))
+
+    border = (np.abs(points - 0.5) > 0.5 - 1e-9).any(axis=1)
+    cloth = Cloth(in_space(points), faces, material, pins=np.flatnonzero(border))
+    potential = Potential([StretchStVK(cloth), DeadLoad(cloth, forces.assemble(basis)[numbers])])
+    result = converged(minimise(potential, surface(*points.T).T), "the membrane")
+    state = np.zeros(basis.N)
+    state[numbers.ravel()] = result.positions.ravel()
+    field = basis.interpolate(state)
+    squares = (form.assemble(basis, field=field) for form in (position_error, gradient_error))
+    position, slope = (float(np.sqrt(square)) for square in squares)
+    return position, slope

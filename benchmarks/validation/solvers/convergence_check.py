@@ -1,0 +1,235 @@
+"""What is true of the end of a stress step, found without the solver's kernels.
+
+Energies, gradient and Hessian come from automatic differentiation of each term's torch definition; the
+curvature from all eigenvalues of the dense Hessian. A claim that does not hold is a failure, whatever else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import torch
+
+from benchmarks.validation.case import Measurement
+from reference_sim import Potential, Result, minimise
+from reference_sim.energies import BendHinge, Energy
+
+TOLERANCE = 1e-6  # of the relative residual: largest gradient component over the mean weight of a vertex
+ROUND_OFF = 1e-2  # relative residual that round-off may at most excuse
+RISE_ROUND_OFF = 1e-12  # of the sum of the terms' sizes, within the step
+EVALUATION_ROUND_OFF = 1e-6  # of the same: what two evaluations may differ by before the larger one is a rise
+ANGLE_ROUND_OFF = 32.0  # by how many times that of a coordinate a triangle's angle may be off
+TIMEOUT = 20.0  # [s] that the solver gives itself
+COLLAPSED = 1e-3  # share of its area below which a triangle has collapsed
+STATUS = {"converged": "ok", "max_iterations": "stalled"}
+
+
+@dataclass(frozen=True)
+class StressStep:
+    """A prepared potential, the guess (V, 3) [m] to start from, pins and the mean weight of a vertex [N].
+
+    `weight` is that under Earth's gravity, whatever the step's own.
+    """
+
+    potential: Potential
+    guess: np.ndarray
+    pins: np.ndarray
+    weight: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckedResult(Measurement):
+    """The row of one minimisation: `value` is the relative residual, found independently."""
+
+    iterations: int
+
+    @property
+    def counted(self) -> Measurement:
+        """The same with the number of iterations as its value."""
+        return dataclasses.replace(self, value=float(self.iterations))
+
+
+def solve_and_check(step: StressStep, solve: Callable[..., Result] = minimise) -> CheckedResult:
+    """Minimise, watched, and check what came out."""
+    kept: list[np.ndarray] = []
+    result = solve(step.potential, step.guess, tolerance=TOLERANCE, timeout=TIMEOUT, observe=kept.append)
+    return check_result(step, result, kept)
+
+
+def lbfgs_then_newton(potential: Potential, x0: np.ndarray, **options: Any) -> Result:
+    """The simulator's own way through a step: L-BFGS, finished by Newton's method."""
+    return minimise(potential, x0, method="lbfgs", **options)
+
+
+def check_result(step: StressStep, result: Result, kept: Sequence[np.ndarray] = ()) -> CheckedResult:
+    """The claim of the solver, and the points it kept on the way, held against what is found here."""
+    terms = "+".join(energy.name for energy in step.potential.energies)
+    status = STATUS.get(result.status, result.status)
+
+    def checked(value: float | None, status: str, reason: str) -> CheckedResult:
+        return CheckedResult(
+            value=value, status=status, reason=reason, iterations=result.iterations, terms=terms
+        )
+
+    x = result.positions
+    if not np.isfinite(x).all():
+        return checked(None, "failed", f"positions that are not finite are called {result.status}")
+    if not np.array_equal(x[step.pins], step.guess[step.pins]):
+        return checked(None, "failed", "pinned vertices moved")
+    if status == "diverged" and not np.isfinite(energy_of(step.potential, step.guess)[0]):
+        return checked(None, status, result.reason)
+    found = optimality_of(step, x)
+    if not np.isfinite(found.residual):
+        return checked(None, "failed", f"a gradient that is not finite is called {result.status}")
+    rise = first_rise(step.potential, [step.guess, *kept, x])
+    if rise:
+        return checked(found.residual, "failed", rise)
+    if status != "ok":
+        count = "" if result.status == "max_iterations" else f" ({result.iterations} iterations)"
+        reason = f"{result.reason}{count}{collapse_reason(step.potential, x)}"
+        return checked(found.residual, status, reason)
+    if found.residual > max(TOLERANCE, found.round_off):
+        claim = f"claims convergence at a relative residual of {found.residual:.3g}"
+        return checked(found.residual, "failed", claim)
+    if found.lowest_curvature < -found.zero_curvature:
+        claim = f"claims convergence on a saddle: curvature {found.lowest_curvature:.3g} N/m"
+        return checked(found.residual, "failed", claim)
+    excused = "; tolerance at round-off" if found.residual > TOLERANCE else ""
+    return checked(found.residual, "ok", f"{result.iterations} iterations{excused}")
+
+
+def energy_of(potential: Potential, x: np.ndarray) -> tuple[float, float]:
+    """Energy [J] at x (V, 3), and the sum of its terms' sizes, from the definitions."""
+    with torch.no_grad():
+        parts = [float(energy.energy(torch.as_tensor(x)).sum()) for energy in potential.energies]
+    return sum(parts), sum(map(abs, parts))
+
+
+def first_rise(potential: Potential, points: Sequence[np.ndarray]) -> str:
+    """Where the energy rose from one of the points (V, 3) to the next, in words; "" if it never did.
+
+    Beside a collapsed triangle the angle of a hinge is known to a few digits only, and in the end to none:
+    there the definition and the solver's kernels differ, and a rise within that difference is none that
+    anybody could tell.
+    """
+    found = [
+        (*energy_of(potential, x), potential.value(x), undetermined_energy(potential, x)) for x in points
+    ]
+    for k, ((before, size, value, here), (after, _, next_value, there)) in enumerate(pairwise(found)):
+        difference = abs(before - value) + abs(after - next_value)
+        unsure = min(difference, EVALUATION_ROUND_OFF * size + here + there)
+        if not after <= before + RISE_ROUND_OFF * size + unsure:
+            return f"the energy rose from {before:.17g} to {after:.17g} J at step {k}"
+    return ""
+
+
+def undetermined_energy(potential: Potential, x: np.ndarray) -> float:
+    """Energy [J] that hinges may hold, times the share of half a turn within which round-off of x (V, 3)
+    leaves the angle of each of their triangles: that of a coordinate over the height of the triangle.
+    """
+    corner = x[potential.cloth.faces]
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    area = areas(potential, x)
+    round_off = ANGLE_ROUND_OFF * np.finfo(float).eps * np.abs(x).max()
+    share = np.divide(round_off * longest, 2.0 * area, out=np.ones(len(area)), where=area > 0.0)
+    return float((collapse_energies(potential)[1] * np.minimum(share, 1.0)).sum())
+
+
+def areas(potential: Potential, x: np.ndarray) -> np.ndarray:
+    """(F,) [m^2] of the triangles at x (V, 3)."""
+    corner = x[potential.cloth.faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return 0.5 * np.linalg.norm(normal, axis=1)
+
+
+def collapse_reason(potential: Potential, x: np.ndarray) -> str:
+    """How many triangles collapsed, and whether they may: what a stall of these energies comes from.
+
+    A triangle without area has no normal, so that its hinges turn to any angle at no way at all: the energy
+    jumps there and takes no minimum. What keeps a triangle from it is its membrane alone.
+    """
+    names = [energy.name for energy in potential.energies]
+    if "bending" not in names:
+        return ""
+    lost = int((areas(potential, x) < COLLAPSED * potential.cloth.areas).sum())
+    words = ""
+    if lost:
+        plural = "s have" if lost > 1 else " has"
+        words = (
+            f"; {lost} triangle{plural} collapsed, where a hinge's energy jumps: no minimum need exist, "
+            "and the area barrier prevents it"
+        )
+    cost, gain = collapse_energies(potential)
+    if "area_barrier" not in names and (gain > cost).any():
+        face = int(np.argmax(gain - cost))
+        words += (
+            f"; collapse pays: it costs a triangle at most (lambda + mu)/2 A = {cost[face]:.2g} J and frees "
+            f"its hinges of up to sum k pi^2/2 = {gain[face]:.2g} J"
+        )
+    return words
+
+
+def collapse_energies(potential: Potential) -> tuple[np.ndarray, np.ndarray]:
+    """Of each face (F,) [J]: at most what its membrane pays for collapsing and its hinges hold."""
+    cloth = potential.cloth
+    terms = {energy.name: energy for energy in potential.energies}
+    m = cloth.material
+    cost = 0.5 * (m.lame_lambda + m.lame_mu) * cloth.areas * ("strain" in terms)
+    faces = {tuple(sorted(face)): place for place, face in enumerate(cloth.faces.tolist())}
+    gain = np.zeros(len(cloth.faces))
+    bending = terms.get("bending")
+    if isinstance(bending, BendHinge):
+        for (a, b, c, d), stiffness in zip(bending.stencils.tolist(), bending.stiffness):
+            for corners in ((a, b, c), (a, b, d)):
+                gain[faces[tuple(sorted(corners))]] += 0.5 * stiffness * np.pi**2
+    return cost, gain
+
+
+@dataclass(frozen=True)
+class Optimality:
+    """What holds at a point: relative residual and what round-off does to it [1]; the smallest eigenvalue of
+    the Hessian over free vertices, and the size below which one counts as zero [N/m]."""
+
+    residual: float
+    round_off: float
+    lowest_curvature: float
+    zero_curvature: float
+
+
+def optimality_of(step: StressStep, x: np.ndarray) -> Optimality:
+    """Gradient and curvature at x (V, 3) over the free vertices."""
+    potential = step.potential
+    free = np.setdiff1d(np.arange(len(x)), step.pins)
+    variable = torch.as_tensor(x).clone().requires_grad_(True)
+    total = torch.stack([energy.energy(variable).sum() for energy in potential.energies]).sum()
+    (gradient,) = torch.autograd.grad(total, variable)
+    residual = float(gradient[torch.as_tensor(free)].abs().max()) / step.weight
+    hessian = dense_hessian(potential.energies, x)
+    places = (3 * free[:, None] + np.arange(3)).ravel()
+    hessian = hessian[np.ix_(places, places)]
+    if not np.isfinite(hessian).all():
+        return Optimality(residual, 0.0, float("-inf"), 0.0)
+    values = np.linalg.eigvalsh(hessian)
+    stiffest = float(np.abs(np.diagonal(hessian)).max())
+    round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(x).max()) / step.weight
+    width = float(np.sqrt(potential.cloth.areas.sum()))
+    # Round-off of the eigenvalues, or a curvature that gains less than the tolerance over the sheet's width.
+    zero = max(2e-13 * float(np.abs(values).max()), 2 * TOLERANCE * step.weight / width)
+    return Optimality(residual, min(round_off, ROUND_OFF), float(values[0]), zero)
+
+
+def dense_hessian(energies: Sequence[Energy], x: np.ndarray) -> np.ndarray:
+    """(3V, 3V) [N/m], from the second derivatives of each element's definition."""
+    total = np.zeros((x.size, x.size))
+    for energy in energies:
+        if energy.name == "gravity":  # linear
+            continue
+        places = (3 * energy.stencils[:, :, None] + np.arange(3)).reshape(len(energy.stencils), -1)
+        rows, columns = np.broadcast_arrays(places[:, :, None], places[:, None, :])
+        np.add.at(total, (rows, columns), Energy.hessian_blocks(energy, x))
+    return total

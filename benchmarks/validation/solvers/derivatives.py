@@ -1,0 +1,92 @@
+"""Gradient against energy and Hessian against gradient, term by term, by differences of fourth order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.validation.meshes import in_space, jittered_patch, random_rotation
+from reference_sim import Cloth, Material, Potential
+from reference_sim.energies import (
+    AreaBarrier,
+    BendHinge,
+    ContactPenalty,
+    Energy,
+    Gravity,
+    Inertia,
+    StretchSpring,
+    StretchStVK,
+)
+
+DIRECTIONS = 4
+STEP = 1e-3  # times a random direction of some hundredths of a metre
+WEIGHTS = np.array([1, -8, 8, -1]) / 12  # at -2, -1, 1 and 2 steps
+
+
+def gradient_error(term: str) -> float:
+    """Largest relative error of the slope of the energy along random directions."""
+    energy, x = _in_disorder(term)
+
+    def value(at: np.ndarray) -> np.ndarray:
+        return np.array(energy.value_and_gradient(at)[0])
+
+    gradient = energy.value_and_gradient(x)[1]
+    return max(_error(value, x, d, np.vdot(gradient, d)) for d in _directions(x))
+
+
+def hessian_error(term: str) -> float:
+    """Largest relative error of the change of the gradient along random directions."""
+    energy, x = _in_disorder(term)
+
+    def force(at: np.ndarray) -> np.ndarray:
+        return energy.value_and_gradient(at)[1].ravel()
+
+    hessian = Potential([energy]).hessian(x)
+    return max(_error(force, x, d, hessian @ d.ravel()) for d in _directions(x))
+
+
+def _error(
+    function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, d: np.ndarray, claimed: np.ndarray
+) -> float:
+    at = [function(x + steps * STEP * d) for steps in (-2, -1, 1, 2)]
+    found = sum(weight * value for weight, value in zip(WEIGHTS, at)) / STEP
+    size = float(np.linalg.norm(found))
+    if size < 1e-9:
+        raise RuntimeError("a derivative of nothing proves nothing")
+    return float(np.linalg.norm(claimed - found)) / size
+
+
+def _directions(x: np.ndarray) -> np.ndarray:
+    return np.random.default_rng(1).normal(0, 0.03, (DIRECTIONS, *x.shape))
+
+
+def _in_disorder(term: str) -> tuple[Energy, np.ndarray]:
+    points, faces = jittered_patch(5)
+    cloth = Cloth(in_space(points), faces, Material())
+    random = np.random.default_rng(0)
+    x = cloth.rest_positions @ random_rotation(8).T + random.normal(0, 0.05, cloth.rest_positions.shape)
+    if term == "area_barrier":
+        x = 0.4 * x  # a sixth of the area: the barrier holds
+    if term == "inertia":
+        energy: Energy = Inertia(cloth, 1 / 30)
+    elif term == "collision":
+        energy = _all_in_contact(cloth, x, random)
+    elif term == "bending":
+        energy = BendHinge(cloth, rest_angles=0.3)
+    else:
+        plain = {
+            "strain": StretchStVK, "spring": StretchSpring, "gravity": Gravity, "area_barrier": AreaBarrier,
+        }  # fmt: skip
+        energy = plain[term](cloth)
+    return energy, x
+
+
+def _all_in_contact(cloth: Cloth, x: np.ndarray, random: np.random.Generator) -> ContactPenalty:
+    """Every sample a few centimetres deep in a margin of a metre, against a plane of its own."""
+    contact = ContactPenalty(cloth, margin=1.0, stiffness=1.0)
+    samples = contact.sample_matrix @ x
+    normals = random.normal(size=samples.shape)
+    contact.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    contact.points = samples - random.uniform(0.2, 0.8, (len(samples), 1)) * contact.normals
+    return contact

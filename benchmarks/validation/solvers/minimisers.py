@@ -1,0 +1,138 @@
+"""What a minimiser promises: one step on a quadratic, order two near the end, no rise, no saddle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.validation.converged import converged
+from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.meshes import in_space, jittered_patch, right_grid
+from reference_sim import Cloth, Material, Potential, minimise
+from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
+
+LBFGS_STEPS = 60
+TWO_CYCLE = 1.0886617668
+
+
+def work_on_a_quadratic() -> float:
+    """Factorisations for inertia and weight alone: one for the step, one to confirm the minimum."""
+    cloth = _patch(5)
+    inertia = Inertia(cloth, 1 / 30)
+    inertia.x_hat = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.1, cloth.rest_positions.shape)
+    result = converged(minimise(Potential([inertia, Gravity(cloth)]), cloth.rest_positions), "the minimiser")
+    return float(result.factorisations)
+
+
+def newton_order() -> float:
+    """Slope of log error over log of the error before it, on the last steps of a stretched sheet."""
+    potential, start = _stretched()
+    end = converged(minimise(potential, start, tolerance=1e-13), "the minimiser").positions
+    errors = [
+        float(np.abs(minimise(potential, start, max_iterations=k, tolerance=1e-13).positions - end).max())
+        for k in range(1, 12)
+    ]
+    near = [k for k in range(len(errors) - 1) if errors[k] < 1e-3 and errors[k + 1] > 1e-15]
+    return fitted_order([errors[k + 1] for k in near], [errors[k] for k in near])
+
+
+def largest_rise() -> float:
+    """Largest rise of the energy from one kept point to the next, from random places, over the first energy.
+
+    And from the edge of a two-cycle: for log cosh y, Newton's method goes from y to y - sinh y cosh y, which
+    is -y at TWO_CYCLE. A little further out every full step rises a little.
+    """
+    cloth = _patch(2)
+    start = np.full(cloth.rest_positions.shape, TWO_CYCLE + 1e-6)
+    return max(_rise(*_crumpled(), 25), _rise(Potential([LogCosh(cloth)]), start, 3))
+
+
+def _rise(potential: Potential, start: np.ndarray, steps: int) -> float:
+    energies = [potential.value(start)]
+    for k in range(1, steps):
+        energies.append(minimise(potential, start, max_iterations=k).energy)
+    return float(max(np.diff(energies).max(), 0.0) / abs(energies[0]))
+
+
+class LogCosh(Energy):
+    """log cosh of every coordinate: convex, and too flat outside for full Newton steps."""
+
+    name = "log_cosh"
+
+    def __init__(self, cloth: Cloth) -> None:
+        self.cloth = cloth
+        self.stencils = np.arange(cloth.vertex_count)[:, None]
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        return float(np.log(np.cosh(x)).sum()), np.tanh(x)
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        return np.eye(3) / np.cosh(x)[:, :, None] ** 2
+
+
+def small_gradient() -> float:
+    """How far, in edge lengths, a very soft strip is left from its rest by the default tolerance.
+
+    Its own weight, of a ten millionth of the Earth's gravity, is below that tolerance from the start; but the
+    strip sags by a fifth of an edge.
+    """
+    points, faces = right_grid(2, 20, 0.1, 1.0)
+    flat = in_space(points)[:, [0, 2, 1]]
+    material = Material(bending_stiffness=1e-5)
+    cloth = Cloth(flat, faces[:, ::-1], material, pins=np.flatnonzero(points[:, 0] < 0.06))
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth, acceleration=3e-6)])
+    results = [minimise(potential, flat, tolerance=tolerance) for tolerance in (1e-6, 1e-10)]
+    loose, tight = (converged(result, "the minimiser").positions for result in results)
+    if np.abs(tight - flat).max() < 0.005:
+        raise RuntimeError("the strip hardly sags: nothing is proved")
+    return float(np.linalg.norm(loose - tight, axis=1).max() / cloth.edge_lengths.mean())
+
+
+def negative_curvature() -> float:
+    """Negative eigenvalues of the Hessian where a flat, compressed sheet is said to have come to rest.
+
+    It starts perfectly flat: without a force out of its plane, but not at a minimum.
+    """
+    points, faces = jittered_patch(6)
+    border = (points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9)
+    cloth = Cloth(0.3 * in_space(points), faces, Material(), pins=np.flatnonzero(border))
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth)])
+    result = converged(minimise(potential, cloth.rest_positions * [0.9, 1.0, 1.0]), "the minimiser")
+    free = np.repeat(~border, 3)
+    values = np.linalg.eigvalsh(potential.hessian(result.positions).toarray()[np.ix_(free, free)])
+    return float((values < -1e-9 * values[-1]).sum())
+
+
+def lbfgs_distance() -> float:
+    """Distance [m] of the end of L-BFGS, not finished by Newton, to Newton's; there is one minimiser."""
+    potential, start = _stretched()
+    newton = converged(minimise(potential, start, tolerance=1e-12), "the minimiser").positions
+    result = minimise(potential, start, "lbfgs", finish=False, max_iterations=LBFGS_STEPS, tolerance=1e-12)
+    return float(np.linalg.norm(result.positions - newton, axis=1).max())
+
+
+def _patch(cells: int, pins: np.ndarray | tuple[int, ...] = ()) -> Cloth:
+    points, faces = jittered_patch(cells)
+    return Cloth(0.3 * in_space(points), faces, Material(), pins=pins)
+
+
+def _stretched() -> tuple[Potential, np.ndarray]:
+    """One step of a sheet pulled to 1.2 of its width: tension everywhere, and one minimiser."""
+    points, faces = right_grid(8, 8, 0.3, 0.3)
+    border = (points[:, 0] < 1e-9) | (points[:, 0] > 0.3 - 1e-9)
+    cloth = Cloth(in_space(points), faces, Material(poisson_ratio=0.0), pins=np.flatnonzero(border))
+    inertia = Inertia(cloth, 1 / 30)
+    start = cloth.rest_positions * [1.2, 1.0, 1.0]
+    inertia.x_hat = start
+    noise = np.random.default_rng(3).normal(0, 0.003, start.shape)
+    return Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), inertia]), np.where(
+        border[:, None], start, start + noise
+    )
+
+
+def _crumpled() -> tuple[Potential, np.ndarray]:
+    """One step of a sheet whose vertices start anywhere."""
+    cloth = _patch(6)
+    inertia = Inertia(cloth, 1 / 30)
+    start = np.random.default_rng(4).uniform(-0.15, 0.15, cloth.rest_positions.shape)
+    inertia.x_hat = start
+    return Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), inertia]), start

@@ -1,0 +1,1 @@
+"""Sparse Hessians: their pattern, and their Cholesky factorisation."""

@@ -1,0 +1,255 @@
+"""The fixed sparsity of a Hessian: where each element's block lands in one lower-triangular CSC matrix."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from reference_sim.assembly.cholesky import nested_dissection
+from reference_sim.energies.energy import Energy
+from reference_sim.kernels.block_indices import BlockPlaces
+from reference_sim.kernels.kernel_cache import njit
+
+SPARE = 3  # a wider pattern keeps up to this many times the blocks that dynamic terms need at the moment
+
+
+class HessianPattern:
+    """Pattern of the sum of `energies` over the vertices that `free` marks, built once per scene.
+
+    Dynamic terms have no blocks in it at first: `covering` gives a wider pattern when they couple vertices
+    that no other term couples.
+
+    The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order: what a
+    Cholesky factorisation reads. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that all three
+    coordinates share.
+
+    Attributes:
+        free: (n,) indices of the free vertices, in the order of the matrix.
+        block: 3 or 1.
+        indptr, indices: CSC structure of the (block n, block n) lower matrix.
+        order: fill-reducing order of its rows and columns.
+        diagonal: places of the diagonal entries in the values.
+    """
+
+    def __init__(
+        self, energies: Sequence[Energy], vertex_count: int, free: np.ndarray, *, block: int = 3
+    ) -> None:
+        self.block = block
+        self.energies = tuple(energies)
+        self.free = np.flatnonzero(free)
+        number = np.full(vertex_count, -1, dtype=np.int64)
+        number[self.free] = np.arange(len(self.free))
+        n = len(self.free)
+        keys = [np.arange(n) * (n + 1)]
+        for energy in energies:
+            keys.append(np.unique(_block_keys(number[energy.stencils], n)))
+        key = np.unique(np.concatenate(keys))
+        key = key[key >= 0]  # -1 stands for a pinned vertex or the upper triangle
+        self._number = number
+        self._slots = [
+            np.searchsorted(key, block_key) if len(key) else block_key
+            for block_key in (_block_keys(number[e.stencils], n) for e in energies)
+        ]
+        for slots, energy in zip(self._slots, energies):
+            slots[_block_keys(number[energy.stencils], n) < 0] = -1
+        self._fixed = self
+        self._lay_out(key)
+
+    def _lay_out(self, key: np.ndarray) -> None:
+        """Place the blocks of the sorted keys column * n + row one after the other."""
+        self._key, block, n = key, self.block, len(self.free)
+        column, row = np.divmod(key, n)
+        start = np.searchsorted(column, np.arange(n + 1))
+        height = np.diff(start)
+        within = np.arange(len(key)) - start[column]
+        self._base = block**2 * start[column] + block * within
+        self._stride = block * height[column]
+        self.indptr = np.concatenate([[0], np.cumsum(np.repeat(block * height, block))])
+        self.indices = np.empty(block**2 * len(row), dtype=np.int64)
+        _fill_rows(start, row, block, self.indices)
+        off = row != column
+        ones = np.ones(off.sum())
+        lower = sp.csr_matrix((ones, (row[off], column[off])), shape=(n, n))
+        self._adjacency = (lower + lower.T).tocsr()
+        self.diagonal = self._diagonal_places(start)
+
+    def changing(self, x: np.ndarray, convexity: float = 0.0) -> list[sp.csc_matrix]:
+        """Hessians (3V, 3V) of the dynamic terms at x (V, 3)."""
+        return [energy.sparse_hessian(x, convexity) for energy in self.energies if energy.dynamic]
+
+    def covering(self, changing: Sequence[sp.csc_matrix]) -> HessianPattern:
+        """This pattern, or a wider one if the matrices couple vertices that have no block here.
+
+        A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis each
+        time, until more than SPARE times the needed ones are kept.
+        """
+        if not changing:
+            return self
+        needed = np.unique(np.concatenate([self._keys_of(matrix)[0] for matrix in changing]))
+        needed = np.setdiff1d(needed, self._fixed._key, assume_unique=True)
+        if not len(np.setdiff1d(needed, self._key, assume_unique=True)):
+            return self
+        kept = np.setdiff1d(self._key, self._fixed._key, assume_unique=True)
+        return self._fixed._widened(np.union1d(kept, needed) if len(kept) < SPARE * len(needed) else needed)
+
+    def _widened(self, extra: np.ndarray) -> HessianPattern:
+        wider = copy.copy(self)
+        for cached in ("order", "_constant"):
+            wider.__dict__.pop(cached, None)
+        key = np.union1d(self._key, extra)
+        moved = np.append(np.searchsorted(key, self._key), -1)  # slot -1, not stored, stays -1
+        wider._slots = [moved[slots] for slots in self._slots]
+        wider._lay_out(key)
+        return wider
+
+    def _keys_of(self, hessian: sp.csc_matrix) -> tuple[np.ndarray, np.ndarray]:
+        """Keys (m,) of the stored blocks of a (3V, 3V) matrix, sorted, and their values (m, 3, 3)."""
+        blocks = hessian.tobsr(blocksize=(3, 3))
+        row = self._number[np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))]
+        column = self._number[blocks.indices]
+        stored = np.flatnonzero((row >= column) & (column >= 0))
+        key = (column * len(self.free) + row)[stored]
+        order = np.argsort(key)
+        return key[order], blocks.data[stored[order]]
+
+    @property
+    def size(self) -> int:
+        return self.block * len(self.free)
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        vertices = nested_dissection(self._adjacency)
+        return (self.block * vertices[:, None] + np.arange(self.block)).ravel()
+
+    def _diagonal_places(self, start: np.ndarray) -> np.ndarray:
+        first = start[:-1]  # a diagonal block is the first of its column
+        step = self._stride[first][:, None] + 1
+        return (self._base[first][:, None] + np.arange(self.block) * step).ravel()
+
+    def assemble(
+        self, x: np.ndarray, changing: Sequence[sp.csc_matrix] = (), *, convexity: float = 0.0
+    ) -> np.ndarray:
+        """Values (nnz,) of the lower matrix at x (V, 3) [N/m]: Hessian, or scalar stiffness for block 1.
+
+        changing: Hessians of the dynamic terms at x, which this pattern must cover. convexity: see
+        Energy.active_hessian_blocks.
+        """
+        data = self._constant.copy()
+        for energy, slots in zip(self.energies, self._slots):
+            if not (energy.dynamic or self.block in energy.constant):
+                self._add_term(energy, slots, x, convexity, data)
+        for matrix in changing:
+            self._add(matrix, data)
+        return data
+
+    @cached_property
+    def _constant(self) -> np.ndarray:
+        """Values (nnz,) of the terms that give the same everywhere."""
+        data, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
+        for energy, slots in zip(self.energies, self._slots):
+            if self.block in energy.constant:
+                self._add_term(energy, slots, anywhere, 0.0, data)
+        return data
+
+    def _add_term(
+        self, energy: Energy, slots: np.ndarray, x: np.ndarray, convexity: float, data: np.ndarray
+    ) -> None:
+        places = BlockPlaces(slots, self._base, self._stride, self.block)
+        if self.block == 3:
+            energy.add_hessian(x, convexity, places, data)
+        else:
+            places.add(*energy.scalar_stiffness(x), data)
+
+    def _add(self, hessian: sp.csc_matrix, data: np.ndarray) -> None:
+        key, values = self._keys_of(hessian)
+        slot = np.searchsorted(self._key, key)
+        i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
+        data[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += values
+
+    def product(self, data: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """The whole symmetric (3n, 3n) matrix of these values times p (3n,), of a pattern of blocks of 3."""
+        result = np.zeros_like(p)
+        _multiply(self._key, len(self.free), self._base, self._stride, data, p, result)
+        return result
+
+    def along(self, data: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Values (m,) of `graph`: the matrix where each vertex moves along its own of directions (n, 3)."""
+        values = np.empty(len(self._key))
+        _contract(self._key, len(self.free), self._base, self._stride, data, directions, values)
+        return values
+
+    @property
+    def graph(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """indptr, indices and order of an (n, n) lower matrix with one entry for each block."""
+        column, row = np.divmod(self._key, len(self.free))
+        indptr = np.searchsorted(column, np.arange(len(self.free) + 1))
+        return indptr, row, self.order[:: self.block] // self.block
+
+    def lower(self, data: np.ndarray) -> sp.csc_matrix:
+        """The values as a scipy matrix; the upper halves of its diagonal blocks are stored too."""
+        return sp.csc_matrix((data, self.indices, self.indptr), shape=(self.size, self.size))
+
+    def symmetric(self, data: np.ndarray) -> sp.csc_matrix:
+        """The whole symmetric (3n, 3n) matrix."""
+        lower = sp.tril(self.lower(data), format="csc")
+        return sp.csc_matrix(lower + sp.tril(lower, -1).T)
+
+
+def _block_keys(stencils: np.ndarray, n: int) -> np.ndarray:
+    """(N, k * k) key column * n + row of each block of each element, -1 where it is not stored."""
+    row, column = stencils[:, :, None], stencils[:, None, :]
+    key = column * n + row
+    key = np.where((row < 0) | (column < 0) | (row < column), -1, key)
+    return key.reshape(len(stencils), stencils.shape[1] ** 2)
+
+
+@njit(cache=True)
+def _fill_rows(start, row, block, indices):
+    at = 0
+    for column in range(start.shape[0] - 1):
+        for _ in range(block):
+            for p in range(start[column], start[column + 1]):
+                for r in range(block):
+                    indices[at] = block * row[p] + r
+                    at += 1
+
+
+@njit(cache=True)
+def _multiply(key, n, base, stride, data, p, result):
+    """Each block below the diagonal serves twice: as it is for its row, transposed for its column."""
+    slot = 0
+    while slot < key.shape[0]:
+        column, step = key[slot] // n, stride[slot]
+        j = 3 * column
+        p0, p1, p2 = p[j], p[j + 1], p[j + 2]
+        s0, s1, s2 = 0.0, 0.0, 0.0
+        for k in range(slot, slot + step // 3):
+            i, a = 3 * (key[k] - column * n), base[k]
+            b, c = a + step, a + 2 * step
+            result[i] += data[a] * p0 + data[b] * p1 + data[c] * p2
+            result[i + 1] += data[a + 1] * p0 + data[b + 1] * p1 + data[c + 1] * p2
+            result[i + 2] += data[a + 2] * p0 + data[b + 2] * p1 + data[c + 2] * p2
+            if k > slot:  # the first is the diagonal block
+                s0 += data[a] * p[i] + data[a + 1] * p[i + 1] + data[a + 2] * p[i + 2]
+                s1 += data[b] * p[i] + data[b + 1] * p[i + 1] + data[b + 2] * p[i + 2]
+                s2 += data[c] * p[i] + data[c + 1] * p[i + 1] + data[c + 2] * p[i + 2]
+        result[j] += s0
+        result[j + 1] += s1
+        result[j + 2] += s2
+        slot += step // 3
+
+
+@njit(cache=True)
+def _contract(key, n, base, stride, data, directions, values):
+    for k in range(key.shape[0]):
+        column = key[k] // n
+        row, total = key[k] - column * n, 0.0
+        for j in range(3):
+            at = base[k] + j * stride[k]
+            for i in range(3):
+                total += directions[row, i] * data[at + i] * directions[column, j]
+        values[k] = total

@@ -1,0 +1,84 @@
+"""The terms that the flags of `python -m reference_sim.simulate` declare, and flags that contradict."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from reference_sim.cloth import Cloth
+    from reference_sim.energies.energy import Energy
+
+PENALTY_FLAGS = ("contact_stiffness", "contact_margin", "contact_samples")
+BARRIER_FLAGS = ("barrier_distance", "barrier_stiffness")
+
+
+def contradiction(options: Namespace) -> str:
+    """What flags ask for and cannot have, with the remedy; "" if nothing."""
+    barrier = options.barrier or options.self_contact
+    given = [name for name in PENALTY_FLAGS + BARRIER_FLAGS if getattr(options, name) is not None]
+    penalty_only = [_flag(name) for name in given if name in PENALTY_FLAGS]
+    barrier_only = [_flag(name) for name in given if name in BARRIER_FLAGS]
+    if options.obstacle is None:
+        if options.obstacle_rest or (options.friction and not options.self_contact):
+            return "--obstacle-rest and --friction need an --obstacle, or --friction --self-contact"
+        if options.barrier:
+            return "--barrier needs an --obstacle; without one give --self-contact"
+        if penalty_only:
+            return f"{penalty_only[0]} needs an --obstacle"
+    if barrier and penalty_only:
+        return f"{penalty_only[0]} belongs to the penalty, which a barrier replaces: leave it out"
+    if barrier_only and not barrier:
+        return f"{barrier_only[0]} needs --barrier or --self-contact"
+    return ""
+
+
+def terms(cloth: Cloth, options: Namespace) -> list[Energy]:
+    """The terms of Phi in the order of the tables. Raises ValueError where a barrier's package is missing."""
+    from reference_sim.energies import AreaBarrier, BendHinge, Gravity, StretchStVK
+
+    angles = "rest" if options.rest_angles == "rest" else 0.0
+    declared: list[Energy] = [
+        StretchStVK(cloth),
+        BendHinge(cloth, scaling=options.bending_scaling, rest_angles=angles),
+        Gravity(cloth),
+    ]
+    if options.area_barrier:
+        declared.append(AreaBarrier(cloth, stiffness=options.area_barrier))
+    if options.barrier or options.self_contact:
+        return declared + _barrier(cloth, options)
+    return declared + (_penalty(cloth, options) if options.obstacle else [])
+
+
+def _penalty(cloth: Cloth, options: Namespace) -> list[Energy]:
+    from reference_sim.energies import ContactFriction, ContactPenalty
+
+    values = {
+        name.removeprefix("contact_"): getattr(options, name)
+        for name in PENALTY_FLAGS
+        if getattr(options, name) is not None
+    }
+    contact = ContactPenalty(cloth, **values)
+    friction = [ContactFriction(contact, coefficient=options.friction)] if options.friction else []
+    return [contact, *friction]
+
+
+def _barrier(cloth: Cloth, options: Namespace) -> list[Energy]:
+    from reference_sim.energies import BarrierFriction, ContactBarrier
+
+    values = {
+        name.removeprefix("barrier_"): getattr(options, name)
+        for name in BARRIER_FLAGS
+        if getattr(options, name) is not None
+    }
+    try:
+        contact = ContactBarrier(cloth, self_contact=options.self_contact, **values)
+    except ImportError as error:
+        raise ValueError(str(error)) from None
+    friction = [BarrierFriction(contact, coefficient=options.friction)] if options.friction else []
+    return [contact, *friction]
+
+
+def _flag(name: str) -> str:
+    return "--" + name.replace("_", "-")

@@ -1,0 +1,52 @@
+"""What a simulation came to, in a few lines for the reader of a terminal."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from reference_sim.cloth import Cloth
+from reference_sim.obstacle import Obstacle
+from reference_sim.trajectory.trajectory import Trajectory
+
+
+def predicted_stretch(cloth: Cloth) -> tuple[str, str]:
+    """What its own weight does to a strip as long as this cloth, in words; and the warning, if one is due."""
+    size = np.ptp(cloth.rest_positions, axis=0)
+    length = float(size[1] or size.max())
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        stretch = cloth.material.self_weight_stretch(length)
+    line = f"stretch    {stretch:.2%} predicted at the top of {length:.3g} m of this cloth under its weight"
+    return line, "".join(str(warning.message) for warning in caught)
+
+
+def summary(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int) -> str:
+    """Convergence, energies [J] and depth [mm] at the last frame, time.
+
+    Args:
+        trajectory: of `simulate`.
+        obstacle: what it met.
+        frames: how many were asked for.
+    """
+    fields = trajectory.frame_fields
+    lines = [f"frames     {trajectory.frames} of {frames}"]
+    if trajectory.frames > 1:
+        converged, worst = int(fields["converged"][1:].sum()), np.nanmax(fields["gradient_norm"])
+        lines[0] += f"; {converged} of {frames - 1} steps converged, worst relative residual {worst:.1e}"
+    if (relaxed := int(fields["relaxed"].sum())) and trajectory.status == "converged":
+        lines.append(f"round-off  {relaxed} frames above the tolerance, first {trajectory.reason}")
+    if trajectory.status != "converged":
+        lines.append(f"first not  {trajectory.status}: {trajectory.reason}")
+    if trajectory.frames > 1:
+        energies = [f"{name[7:]} {fields[name][-1]:.3g}" for name in fields if name.startswith("energy/")]
+        lines.append(f"energies   {', '.join(energies)} J at the last frame")
+    if obstacle is not None:
+        distance = obstacle.signed_distance(trajectory.positions[-1], trajectory.frames - 1)
+        share, depth = (distance < 0).mean(), 1e3 * max(-float(distance.min()), 0.0)
+        lines.append(f"obstacle   {share:.2%} of vertices inside, deepest {depth:.1f} mm, at the last frame")
+    if trajectory.frames > 1:
+        seconds = trajectory.frame_seconds[1:]
+        lines.append(f"time       {seconds.sum():.1f} s, {1e3 * np.median(seconds):.0f} ms a frame (median)")
+    return "\n".join(lines)

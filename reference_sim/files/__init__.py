@@ -1,0 +1,1 @@
+"""Files of other programs and files written whole: arrays, meshes, UV charts."""

@@ -1,0 +1,198 @@
+"""Mesh files of other programs: read one, read a sequence, bring both to metres with y up.
+
+The files are meshio's formats (OBJ, PLY, STL, OFF, VTK) and trajectories of this project (VTKHDF).
+"""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from reference_sim.cloth import MeshError
+from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, read_parts
+
+if TYPE_CHECKING:
+    import numpy as np
+
+MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+UP_AXES = ("y", "z")
+FARTHEST = 1e12  # in any unit: squares and cubes of it are still numbers
+# What programs call the texture coordinates of a vertex: two numbers, or one array of both.
+UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+UV_ARRAYS = (UV_OF_VTK, "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """What a file held: positions (V, 3) in the file's own unit and axes, triangles (F, 3).
+
+    quads: how many four-cornered faces were cut in two along the diagonal from their first corner.
+    uv: (F, 3, 2) texture coordinates of the faces' corners, several for a vertex on a seam; NaN where a
+    corner has none, None where no corner has any. vertex_data: name -> (V,) or (V, k), what PLY and VTK files
+    say of vertices besides.
+    """
+
+    positions: np.ndarray
+    faces: np.ndarray
+    quads: int = 0
+    uv: np.ndarray | None = None
+    vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+def read_mesh(path: str | Path) -> Surface:
+    """Read the triangles and quads of one mesh file.
+
+    Raises:
+        MeshError: missing or unreadable file, unknown format, no faces, faces with five corners or more,
+            a vertex that is not finite; the message names the file.
+    """
+    import numpy as np
+
+    path = Path(path)
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file")
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
+    parts = read_parts(path)
+    positions, polygons = np.asarray(parts.points, dtype=np.float64), parts.polygons
+    if not polygons:
+        raise MeshError(f"{path}: no triangles in it: export the surface as triangles")
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise MeshError(f"{path}: vertices have shape {positions.shape}: expected three coordinates each")
+    bad = np.flatnonzero(~(np.abs(positions) < FARTHEST).all(axis=1))
+    if bad.size:
+        where = positions[bad[0]].tolist()
+        raise MeshError(f"{path}: vertex {bad[0]} is not finite, or farther than {FARTHEST:g}: {where}")
+    corners = np.array([len(polygon) for polygon in polygons])
+    if corners.max() > 4 or corners.min() < 3:
+        k = int(np.argmax((corners > 4) | (corners < 3)))
+        raise MeshError(f"{path}: face {k} has {corners[k]} corners: triangulate the mesh")
+    faces = np.array(_halved(polygons), dtype=np.int64)
+    bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
+    if bad.size:
+        raise MeshError(f"{path}: triangle {bad[0]} names a vertex beyond the {len(positions)} there are")
+    return Surface(
+        positions, faces, int((corners == 4).sum()), _corner_uv(path, parts, faces), parts.vertex_data
+    )
+
+
+def _halved(polygons: Any) -> list[Any]:
+    """Triangles of triangles and quads."""
+    return [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
+
+
+def _corner_uv(path: Path, parts: Parts, faces: np.ndarray) -> np.ndarray | None:
+    """Texture coordinates (F, 3, 2) of the faces' corners, NaN where there are none."""
+    import numpy as np
+
+    places = faces
+    if parts.uv_polygons:
+        uv, places = np.asarray(parts.uv, dtype=np.float64), np.array(_halved(parts.uv_polygons), np.int64)
+    else:
+        found = _uv_of_vertices(parts.vertex_data)
+        if found is None:
+            return None
+        uv = found
+    if (places < 0).all():
+        return None
+    bad = np.flatnonzero((places >= len(uv)).any(axis=1) | (places < -1).any(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"{path}: triangle {bad[0]} names a texture coordinate beyond the {len(uv)} there are: export it "
+            "again"
+        )
+    return np.where(places[..., None] < 0, np.nan, uv[places])
+
+
+def _uv_of_vertices(data: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    import numpy as np
+
+    for u, v in UV_NAMES:
+        if u in data and v in data:
+            return np.stack([data[u], data[v]], axis=1).astype(np.float64)
+    for name in UV_ARRAYS:
+        if name in data and data[name].ndim == 2 and data[name].shape[1] >= 2:
+            return data[name][:, :2].astype(np.float64)
+    return None
+
+
+def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
+    """Read a moving mesh: positions (T, B, 3) and, for its faces, the first mesh.
+
+    Args:
+        pattern: one mesh (T = 1), a folder of meshes of one kind, or a glob such as "body_*.obj". Files are
+            taken in the order of the numbers in their names.
+
+    Raises:
+        MeshError: as `read_mesh`; no files; vertices or faces that do not correspond to the first file's.
+    """
+    import numpy as np
+
+    paths = mesh_paths(str(pattern))
+    first = read_mesh(paths[0])
+    frames = [first.positions]
+    for path in paths[1:]:
+        surface = read_mesh(path)
+        _check_corresponds(path, surface, paths[0], first)
+        frames.append(surface.positions)
+    return np.stack(frames), first
+
+
+def mesh_paths(pattern: str) -> list[Path]:
+    """The files that `read_sequence` reads, in its order. Raises MeshError where there are none."""
+    path = Path(pattern)
+    if path.is_dir():
+        found = [p for p in path.iterdir() if p.suffix.lower() in MESH_SUFFIXES]
+        if not found:
+            raise MeshError(f"{path}: no mesh in this folder ({', '.join(MESH_SUFFIXES)})")
+    elif path.exists() or not glob.has_magic(pattern):
+        found = [path]
+    else:
+        found = [Path(name) for name in glob.glob(pattern)]
+        if not found:
+            raise MeshError(f"{pattern}: no file matches (quote the pattern, or the shell expands it)")
+    kinds = sorted({p.suffix.lower() for p in found})
+    if len(kinds) > 1:
+        raise MeshError(
+            f"{pattern}: meshes of several kinds ({', '.join(kinds)}): name one, as in '*{kinds[0]}'"
+        )
+    return sorted(found, key=lambda p: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", str(p))])
+
+
+def _check_corresponds(path: Path, surface: Surface, first_path: Path, first: Surface) -> None:
+    import numpy as np
+
+    remedy = "a sequence needs one numbering: export OBJ or PLY without reordering"
+    for noun, here, there in (
+        ("vertices", surface.positions, first.positions),
+        ("faces", surface.faces, first.faces),
+    ):
+        if len(here) != len(there):
+            raise MeshError(f"{path}: {len(here)} {noun}, but {first_path.name} has {len(there)}: {remedy}")
+    bad = np.flatnonzero((surface.faces != first.faces).any(axis=1))
+    if bad.size:
+        here, there = surface.faces[bad[0]].tolist(), first.faces[bad[0]].tolist()
+        raise MeshError(f"{path}: face {bad[0]} = {here}, but {there} in {first_path.name}: {remedy}")
+
+
+def to_metres_y_up(positions: np.ndarray, *, units: str = "m", up: str = "y") -> np.ndarray:
+    """Positions (..., 3) of a file in metres with y up; z up is turned by a quarter about x.
+
+    Raises:
+        ValueError: unknown unit or axis.
+    """
+    if units not in METRES or up not in UP_AXES:
+        raise ValueError(
+            f"units {units!r}, up {up!r}: choose from {', '.join(METRES)} and {', '.join(UP_AXES)}"
+        )
+    scaled = METRES[units] * positions
+    if up == "y":
+        return scaled
+    turned = scaled[..., [0, 2, 1]]
+    turned[..., 2] *= -1
+    return turned

@@ -1,0 +1,129 @@
+"""What mesh files hold, before polygons become triangles: OBJ by ourselves, others through meshio and VTK."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from reference_sim.cloth import MeshError
+from reference_sim.files.mesh_header import check_header
+
+if TYPE_CHECKING:
+    import numpy as np
+
+UV_OF_VTK = "UV"  # what the texture coordinates of a VTK file are called here
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a file holds. uv_polygons: places in uv (N, 2), parallel to
+    polygons, -1 for a corner without; empty where the UV are those of the vertices.
+    """
+
+    points: Any
+    polygons: list[Any]
+    uv: Any = ()
+    uv_polygons: tuple[Any, ...] | list[Any] = ()
+    vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+def read_parts(path: Path) -> Parts:
+    """Everything of a file that is there. Raises MeshError naming the file."""
+    return _read_obj(path) if path.suffix.lower() == ".obj" else _read_with_meshio(path)
+
+
+def _read_obj(path: Path) -> Parts:
+    """Vertices, polygons and texture coordinates of an OBJ file.
+
+    meshio refuses a file with more texture coordinates than vertices, which every garment with seams has.
+    """
+    points: list[list[float]] = []
+    polygons: list[list[int]] = []
+    uv: list[list[float]] = []
+    uv_polygons: list[list[int]] = []
+    with open(path, encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            words = line.split()
+            try:
+                if words and words[0] == "v":
+                    x, y, z = words[1:4]  # colours may follow
+                    points.append([float(x), float(y), float(z)])
+                elif words and words[0] == "vt":
+                    uv.append([float(words[1]), float(words[2]) if len(words) > 2 else 0.0])
+                elif words and words[0] == "f":
+                    corners = [word.split("/") for word in words[1:]]
+                    polygons.append([_counted(c[0], len(points)) for c in corners])
+                    uv_polygons.append(
+                        [_counted(c[1], len(uv)) if len(c) > 1 and c[1] else -1 for c in corners]
+                    )
+            except (ValueError, IndexError):
+                raise MeshError(f"{path}: line {number} is not understood: {line.strip()[:60]!r}") from None
+    return Parts(points, polygons, uv, uv_polygons)
+
+
+def _counted(text: str, count: int) -> int:
+    """From 0 on: OBJ counts from 1, and from the last by -1. Raises ValueError for what is no number."""
+    number = int(text)
+    if not 0 < abs(number) < 1 << 62:
+        raise ValueError(text)
+    return number - 1 if number > 0 else count + number
+
+
+def _read_with_meshio(path: Path) -> Parts:
+    """Points and polygons through meshio; legacy and XML PolyData, which it cannot read, through VTK."""
+    import meshio
+    import numpy as np
+
+    check_header(path)
+    printed = io.StringIO()
+    try:
+        # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
+        with (
+            contextlib.redirect_stdout(printed),
+            contextlib.redirect_stderr(printed),
+            np.errstate(over="ignore"),
+        ):
+            mesh = meshio.read(path)
+    except (Exception, SystemExit) as error:
+        if path.suffix.lower() in (".vtk", ".vtp") and (parts := _read_with_vtk(path)):
+            return parts
+        message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
+        reason = " ".join(message.split())[:300] or type(error).__name__
+        raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY") from None
+    kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
+    data = {name: np.asarray(values) for name, values in mesh.point_data.items()}
+    return Parts(mesh.points, [polygon for block in kinds for polygon in block.data], vertex_data=data)
+
+
+def _read_with_vtk(path: Path) -> Parts | None:
+    """Points and triangles of a file of PolyData, or None if it holds none."""
+    import numpy as np
+    import pyvista
+
+    try:
+        with (
+            warnings.catch_warnings(),
+            pyvista.vtk_verbosity("off"),
+            pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False),
+        ):
+            warnings.simplefilter("ignore")
+            logging.disable(logging.CRITICAL)  # to which readers of pyvista hand errors on
+            surface = pyvista.read(path)
+    except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
+        return None
+    finally:
+        logging.disable(logging.NOTSET)
+    if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
+        return None
+    if not surface.is_all_triangles:
+        raise MeshError(f"{path}: has faces that are no triangles: triangulate the mesh")
+    data = {name: np.asarray(surface.point_data[name]) for name in surface.point_data}
+    if surface.active_texture_coordinates is not None:
+        data[UV_OF_VTK] = np.asarray(surface.active_texture_coordinates)
+    return Parts(surface.points, list(surface.faces.reshape(-1, 4)[:, 1:]), vertex_data=data)

@@ -1,0 +1,46 @@
+"""Counts that a mesh file declares, compared with its length before a library believes them.
+
+meshio reads a header that does not end for ever; meshio and VTK make room for as many vertices as a file
+claims, and look for all of them.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from reference_sim.cloth import MeshError
+from reference_sim.files.array_file import MOST_PACKED
+
+REMEDY = "export it again, as OBJ or PLY"
+SECTIONS = (
+    b"POINTS|VERTICES|LINES|POLYGONS|TRIANGLE_STRIPS|CELLS|CELL_TYPES|POINT_DATA|CELL_DATA|"
+    rb"DIMENSIONS|[XYZ]_COORDINATES|FIELD\s+\S+|LOOKUP_TABLE\s+\S+|COLOR_SCALARS\s+\S+"
+)
+# Suffix -> where numbers of elements stand, and how many may lie in a byte.
+COUNTS = {
+    ".ply": (rb"^[ \t]*element[ \t]+\w+((?:[ \t]+\d+)+)", 1),
+    ".off": (rb"^[ \t]*(\d+[ \t]+\d+[ \t]+\d+)[ \t]*$", 1),
+    ".vtk": (rb"^[ \t]*(?:" + SECTIONS + rb")((?:[ \t]+\d+)+)", 1),
+    ".vtp": (rb"NumberOf\w+\s*=\s*[\"']\s*(\d+)", MOST_PACKED),
+    ".vtu": (rb"NumberOf\w+\s*=\s*[\"']\s*(\d+)", MOST_PACKED),
+}
+
+
+def check_header(path: Path) -> None:
+    """Refuse a file shorter than its header says, and a PLY or OFF file without one. Raises MeshError."""
+    pattern, dense = COUNTS.get(path.suffix.lower(), (b"", 0))
+    if not pattern:
+        return
+    data = path.read_bytes()
+    most, kind = dense * len(data), path.suffix.lower()
+    head, end, _ = data.partition(b"end_header") if kind == ".ply" else (data, b"", b"")
+    lines = list(re.finditer(pattern, head, re.MULTILINE | re.IGNORECASE))
+    if (kind == ".ply" and not end) or (kind == ".off" and not lines):
+        raise MeshError(f"{path}: cannot be read (its header does not end): {REMEDY}")
+    for found in lines:
+        for count in found[1].split():
+            if len(count) > 20 or int(count) > most:
+                words = found[0].decode(errors="replace").split()
+                line = " ".join(words)[:60]
+                raise MeshError(f"{path}: cannot be read (shorter than '{line}' says): {REMEDY}")

@@ -1,0 +1,114 @@
+"""A flat rest shape from the UV chart of a mesh: the pattern that a garment was sewn from, in metres.
+
+Along a seam a vertex has one place in each piece of the pattern, so a chart is kept by the faces' corners. In
+space the pieces are one mesh: vertices that a program has doubled for the sake of its chart are joined.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from reference_sim.cloth import Cloth, MeshError
+from reference_sim.files.mesh_files import Surface
+
+JOINED = 1e-6  # [m] from which two vertices are one: round-off of six digits
+AREA_FACTOR = 1.5  # a chart whose area is further from the mesh's is in another unit
+STRETCH = 1.5  # from chart to mesh, or its inverse: no cloth is sewn so
+STRETCHED_SHARE = 0.1  # of the area, from which a chart is no pattern
+
+
+def join_seams(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
+    """The surface (in metres) without doubled vertices; of each vertex left its number in the file (V,), and
+    of each vertex in the file its number now.
+
+    Vertices closer than a micrometre are one. A surface that has none stays as it is.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    count = len(surface.positions)
+    pairs = cKDTree(surface.positions).query_pairs(JOINED, output_type="ndarray")
+    if not len(pairs):
+        return surface, np.arange(count), np.arange(count)
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    of_vertex = connected_components(graph, directed=False)[1]
+    _, first = np.unique(of_vertex, return_index=True)
+    kept = np.sort(first)
+    place = np.empty(count, dtype=np.int64)
+    place[of_vertex[kept]] = np.arange(len(kept))
+    data = {name: values[kept] for name, values in surface.vertex_data.items()}
+    joined = replace(
+        surface, positions=surface.positions[kept], faces=place[of_vertex][surface.faces], vertex_data=data
+    )
+    return joined, kept, place[of_vertex]
+
+
+def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndarray:
+    """The chart (F, 3, 2) [m] of a surface in metres, as `Cloth` takes it for `rest_uv`.
+
+    Args:
+        surface: positions in metres.
+        scale: metres per unit of the chart.
+        prefix: of the options that the messages name.
+
+    Raises:
+        MeshError: no chart, a corner or an area missing, a total area further than `AREA_FACTOR` from that of
+            the mesh, or pieces so distorted that they are no pattern.
+    """
+    instead = f"{prefix}rest mesh takes the mesh itself as rest shape"
+    if surface.uv is None:
+        raise MeshError(f"has no UV: {instead}")
+    bad = np.flatnonzero(~np.isfinite(surface.uv).all(axis=(1, 2)))
+    if bad.size:
+        raise MeshError(f"triangle {bad[0]} has a corner without UV: complete the chart, or {instead}")
+    if not (np.isfinite(scale) and scale > 0):
+        raise MeshError(f"{prefix}uv-scale {scale}: give metres per unit of the chart, above 0")
+    chart = scale * surface.uv
+    corners = surface.positions[surface.faces]
+    flat, mesh = areas_of(chart), areas_of(corners)
+    ratio = flat.sum() / mesh.sum()
+    if not 1 / AREA_FACTOR <= ratio <= AREA_FACTOR:
+        equal = f"{prefix}uv-scale {scale / np.sqrt(ratio):.4g} makes them equal, " if ratio > 0 else ""
+        raise MeshError(
+            f"its UV chart measures {flat.sum():.4g} m^2 and the mesh {mesh.sum():.4g} m^2: give metres per "
+            f"unit of the chart, {equal}or {instead}"
+        )
+    small = np.flatnonzero(~(flat > 1e-12 * flat.max()))
+    if small.size:
+        raise MeshError(f"triangle {small[0]} has no area in the UV chart: mend the chart, or {instead}")
+    stretch = stretches(corners, chart)
+    off = (stretch[:, 0] > STRETCH) | (stretch[:, 1] < 1 / STRETCH)
+    share = flat[off].sum() / flat.sum()
+    if share > STRETCHED_SHARE:
+        raise MeshError(
+            f"{share:.0%} of its UV chart is stretched or pressed by more than {STRETCH:g} on the mesh: that "
+            f"is a texture and no pattern; {instead}"
+        )
+    return chart
+
+
+def flattened(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """A chart (F, 3, 2) [m] of a mesh at rest in space: each triangle laid flat by itself, as it is."""
+    frames = Cloth(positions, faces).frames
+    return np.concatenate([np.zeros((len(faces), 1, 2)), frames.transpose(0, 2, 1)], axis=1)
+
+
+def areas_of(corners: np.ndarray) -> np.ndarray:
+    """Areas (F,) of triangles (F, 3, 2) or (F, 3, 3)."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    if corners.shape[2] == 2:
+        return 0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    return 0.5 * np.linalg.norm(np.cross(first, second), axis=1)
+
+
+def stretches(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:
+    """Principal stretches (F, 2), the larger first, from chart (F, 3, 2) to corners (F, 3, 3).
+
+    No triangle of the chart is without area. They are the singular values of F = [x1 - x0, x2 - x0] Dm^-1.
+    """
+    Dm = np.stack([chart[:, 1] - chart[:, 0], chart[:, 2] - chart[:, 0]], axis=-1)
+    Ds = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
+    return np.linalg.svd(Ds @ np.linalg.inv(Dm), compute_uv=False)

@@ -1,0 +1,1 @@
+"""Geometry of triangle meshes: normals, closest points of one triangle, closed surfaces."""

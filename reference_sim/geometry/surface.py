@@ -1,0 +1,139 @@
+"""Normals of a triangle mesh, the contact planes of closest points, and what its faces carry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference_sim.kernels.kernel_cache import njit
+
+ON_SIDE = 1e-6  # weight of a corner below which a place is on a side; weights may be rounded to float32
+BALL = 0.1  # [m] diameter, of a limb: what the surface is taken for beside the faces that a sample may meet
+BEYOND = 1e-3  # cosine to a face, of an offset that leads over it: above the round-off of a foot on a side
+
+
+@njit(cache=True, error_model="numpy")
+def cross_of_face(x, i, j, k):
+    """Twice the area of a triangle times its normal."""
+    a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+    b0, b1, b2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+
+
+@njit(cache=True, error_model="numpy")
+def vertex_normals(positions, faces):
+    """Unit normals (B, 3) of the vertices of a mesh (B, 3) [m], (F, 3): of its faces, weighted by area."""
+    normals = np.zeros_like(positions)
+    for f in range(len(faces)):
+        n = cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
+        for a in range(3):
+            for c in range(3):
+                normals[faces[f, a], c] += n[c]
+    for v in range(len(normals)):
+        _normalise(normals[v])
+    return normals
+
+
+@njit(cache=True, error_model="numpy")
+def _normalise(v):
+    length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 1e-30
+    v[0], v[1], v[2] = v[0] / length, v[1] / length, v[2] / length
+    return length
+
+
+@njit(cache=True, error_model="numpy")
+def _beyond(offset, c, face, weights, vertices, faces):
+    """Whether some face at c, which is on a side or a corner of one, leads nearer along the unit offset.
+
+    Few samples ask: all faces are looked through for those that share the side or corner.
+    """
+    around, own = 0, 0.0
+    for f in range(len(faces)):
+        shared = True
+        for a in range(3):
+            v = face[a]
+            shared &= weights[a] <= ON_SIDE or v == faces[f, 0] or v == faces[f, 1] or v == faces[f, 2]
+        if not shared:
+            continue
+        around += 1
+        for a in range(3):
+            along, squared = 0.0, 0.0
+            for i in range(3):
+                way = vertices[faces[f, a], i] - c[i]
+                along += offset[i] * way
+                squared += way * way
+            if along > BEYOND * np.sqrt(squared):
+                return True
+            own = min(own, along + BEYOND * np.sqrt(squared))
+    return around == 1 and own < 0.0  # over the border of the mesh itself
+
+
+@njit(cache=True, error_model="numpy")
+def plane_normals(points, closest, found, barycentric, vertices, faces, of_vertices, normals):
+    """normals (S, 3): from the closest point to the sample, turned outwards.
+
+    A sample that looks along the surface, or is below it and beyond the border of the faces that it may meet
+    (another face at the closest point c leads nearer), meets a ball that touches the surface in c from below:
+    the normal points to the sample from the ball's point opposite to c. By Thales' theorem n.(x - c) is
+    negative in that ball alone; where the sample is much nearer than the ball is wide, the plane is the
+    tangent.
+    """
+    offset, smooth = np.empty(3), np.empty(3)
+    for s in range(len(points)):
+        i, j, k = faces[found[s], 0], faces[found[s], 1], faces[found[s], 2]
+        u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
+        for c in range(3):
+            smooth[c] = u * of_vertices[i, c] + v * of_vertices[j, c] + w * of_vertices[k, c]
+            offset[c] = points[s, c] - closest[s, c]
+        _normalise(smooth)
+        length = _normalise(offset)
+        cosine = offset[0] * smooth[0] + offset[1] * smooth[1] + offset[2] * smooth[2]
+        # Within a micrometre, or looking along the surface, the offset has no direction to trust.
+        beside = not (length > 1e-6 and np.abs(cosine) > 0.3)
+        if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
+            beside |= _beyond(offset, closest[s], faces[found[s]], barycentric[s], vertices, faces)
+        if beside:
+            ball = max(BALL, 1.5 * length)  # below c is in it, however deep
+            for c in range(3):
+                normals[s, c] = ball * smooth[c] + length * offset[c]
+            _normalise(normals[s])
+            continue
+        if min(u, v, w) > 0.0:  # inside the face its normal is the direction, and has no cancellation
+            n = cross_of_face(vertices, i, j, k)
+            side = np.sign(n[0] * offset[0] + n[1] * offset[1] + n[2] * offset[2])
+            for c in range(3):
+                offset[c] = side * n[c]
+            _normalise(offset)
+        for c in range(3):
+            normals[s, c] = np.sign(cosine) * offset[c]
+
+
+@njit(cache=True, error_model="numpy")
+def _frame_of_face(x, i, j, k, axes):
+    """Orthonormal axes (3, 3) of a triangle, in rows; the last is its normal."""
+    for c in range(3):
+        axes[0, c] = x[j, c] - x[i, c]
+    axes[2, 0], axes[2, 1], axes[2, 2] = cross_of_face(x, i, j, k)
+    _normalise(axes[0])
+    _normalise(axes[2])
+    for c in range(3):
+        d, e = (c + 1) % 3, (c + 2) % 3
+        axes[1, c] = axes[2, d] * axes[0, e] - axes[2, e] * axes[0, d]
+
+
+@njit(cache=True, error_model="numpy")
+def carry(points, closest, found, barycentric, before, after, faces, carried):
+    """carried (N, 3): points beside their closest faces, which go from vertices `before` to `after`."""
+    old, new = np.empty((3, 3)), np.empty((3, 3))
+    for s in range(len(points)):
+        i, j, k = faces[found[s], 0], faces[found[s], 1], faces[found[s], 2]
+        _frame_of_face(before, i, j, k, old)
+        _frame_of_face(after, i, j, k, new)
+        u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
+        for c in range(3):
+            carried[s, c] = u * after[i, c] + v * after[j, c] + w * after[k, c]
+        for a in range(3):
+            local = 0.0
+            for c in range(3):
+                local += old[a, c] * (points[s, c] - closest[s, c])
+            for c in range(3):
+                carried[s, c] += new[a, c] * local

@@ -1,0 +1,1 @@
+"""What all compiled kernels share: their cache on disk, lanes of elements, indices of blocks."""

@@ -1,0 +1,176 @@
+"""LDL^T of a sparse n x n matrix with a fixed pattern, and solves for x, y and z together, all compiled.
+
+The row-by-row algorithm of Davis (2005, "LDL: a concise sparse Cholesky factorization package"): row k of L
+solves a triangular system with the rows above it. A package's factorisation is called from Python and keeps
+its factor to itself; here a compiled function can do both in the middle of a step. n is that of a garment: a
+package wins from some 10,000 on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from reference_sim.assembly.cholesky import nested_dissection
+from reference_sim.kernels.kernel_cache import njit
+
+WIDTH = 4  # numbers a row of right sides: x, y, z and one to fill the lane
+
+
+class ScalarPattern:
+    """Where the entries of a symmetric n x n matrix lie, that elements with these stencils add up to.
+
+    Args:
+        stencils: (E, k) each, of numbers below n; -1 where a vertex is pinned.
+
+    Attributes:
+        order: (n,) row i of the factor is row order[i] of the matrix.
+        diagonal: (n,) places of its diagonal; row_starts (n + 1,), row_columns and row_places: of the entries
+            left of it.
+        factor_rows (n + 1,), factor_columns: where L has entries left of the diagonal, by rows; starts
+            (n + 1,), rows: the same by columns.
+    """
+
+    def __init__(self, count: int, stencils: list[np.ndarray]) -> None:
+        self.count = count
+        pairs = [np.zeros((0, 2), np.int64)]
+        for stencil in stencils:
+            k = stencil.shape[1]
+            both = stencil[:, [(a, b) for a in range(k) for b in range(a)]].reshape(-1, 2)
+            pairs.append(both[(both >= 0).all(axis=1) & (both[:, 0] != both[:, 1])])
+        both = np.sort(np.concatenate(pairs), axis=1)
+        pair = np.stack(np.divmod(np.unique(both[:, 0] * count + both[:, 1]), count), axis=1)
+        ones = np.ones(len(pair))
+        lower = sp.csr_matrix((ones, (pair[:, 1], pair[:, 0])), shape=(count, count))
+        self.order = np.asarray(nested_dissection((lower + lower.T).tocsr()), np.int64)
+        self._place = np.empty(count, np.int64)
+        self._place[self.order] = np.arange(count)
+        moved = np.sort(self._place[pair], axis=1)
+        rows = np.lexsort((moved[:, 0], moved[:, 1]))
+        self._keys = moved[rows, 1] * count + moved[rows, 0]
+        self.row_columns = np.ascontiguousarray(moved[rows, 0])
+        self.row_starts = np.searchsorted(moved[rows, 1], np.arange(count + 1))
+        self.factor_rows, self.factor_columns = _pattern_of_rows(self.row_starts, self.row_columns)
+        self.starts, self.rows = _by_columns(self.factor_rows, self.factor_columns)
+
+    @property
+    def entries(self) -> int:
+        """Of the matrix as it is stored: left of the diagonal, then the diagonal."""
+        return len(self.row_columns) + self.count
+
+    def places(self, stencils: np.ndarray) -> np.ndarray:
+        """(E, k, k) where the entries of an element's matrix are added; -1 for those above the diagonal, of
+        pinned vertices, and of an element that has a vertex twice.
+        """
+        i = np.append(self._place, -1)[stencils]
+        row, column = np.broadcast_arrays(i[:, :, None], i[:, None, :])
+        key = row * self.count + column
+        place = np.searchsorted(self._keys, np.where(row > column, key, 0))
+        place = np.where(row > column, place, len(self._keys) + row)
+        k = np.arange(stencils.shape[1])
+        upper_of_same = (row == column) & (k[:, None] != k[None, :])
+        return np.where((row < column) | (row < 0) | (column < 0) | upper_of_same, -1, place)
+
+
+def _pattern_of_rows(starts: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of L, in two passes: first their lengths."""
+    count = len(starts) - 1
+    lengths = np.zeros(count + 1, np.int64)
+    _row_patterns(starts, columns, lengths, np.empty(0, np.int64))
+    factor_rows = np.cumsum(lengths)
+    factor_columns = np.empty(factor_rows[-1], np.int64)
+    _row_patterns(starts, columns, factor_rows.copy(), factor_columns)
+    # Ascending: a column after those that it depends on.
+    rows = np.repeat(np.arange(count), np.diff(factor_rows))
+    return factor_rows, factor_columns[np.lexsort((factor_columns, rows))]
+
+
+@njit(cache=True)
+def _row_patterns(starts, columns, row, out):
+    """Walk up the elimination tree from each entry: row[k + 1] counts, or out is filled from row[k] on."""
+    count = len(starts) - 1
+    parent, seen = np.full(count, -1), np.full(count, -1)
+    for k in range(count):
+        seen[k], place = k, row[k]
+        for p in range(starts[k], starts[k + 1]):
+            i = columns[p]
+            while seen[i] != k:
+                seen[i] = k
+                if parent[i] < 0:
+                    parent[i] = k
+                if len(out):
+                    out[place] = i
+                    place += 1
+                else:
+                    row[k + 1] += 1
+                i = parent[i]
+
+
+@njit(cache=True)
+def _by_columns(factor_rows, factor_columns):
+    count = len(factor_rows) - 1
+    starts = np.zeros(count + 1, np.int64)
+    for column in factor_columns:
+        starts[column + 1] += 1
+    starts = np.cumsum(starts)
+    place, rows = starts.copy(), np.empty(len(factor_columns), np.int64)
+    for k in range(count):
+        for p in range(factor_rows[k], factor_rows[k + 1]):
+            column = factor_columns[p]
+            rows[place[column]] = k
+            place[column] += 1
+    return starts, rows
+
+
+@njit(cache=True, error_model="numpy")
+def factorise(values, row_starts, row_columns, factor_rows, factor_columns, starts, rows, L, D, y, filled):
+    """L (by columns) and D (n,) of the matrix with these values; False if a pivot is not positive.
+
+    y (n,) zeros and filled (n,): room to work in.
+    """
+    count, off = len(D), len(row_columns)
+    filled[:] = starts[:-1]
+    for k in range(count):
+        for p in range(row_starts[k], row_starts[k + 1]):
+            y[row_columns[p]] = values[p]
+        pivot = values[off + k]
+        for q in range(factor_rows[k], factor_rows[k + 1]):
+            i = factor_columns[q]
+            value = y[i]
+            y[i] = 0.0
+            end = filled[i]
+            for p in range(starts[i], end):
+                y[rows[p]] -= L[p] * value
+            share = value / D[i]
+            pivot -= share * value
+            L[end] = share
+            filled[i] = end + 1
+        if not pivot > 0.0:
+            y[:] = 0.0
+            return False
+        D[k] = pivot
+    return True
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def solve(starts, rows, L, D, b):
+    """b (n, WIDTH), in the factor's order, becomes the solution."""
+    count = len(D)
+    for j in range(count):
+        b0, b1, b2, b3 = b[j, 0], b[j, 1], b[j, 2], b[j, 3]
+        for p in range(starts[j], starts[j + 1]):
+            i, share = rows[p], L[p]
+            b[i, 0] -= share * b0
+            b[i, 1] -= share * b1
+            b[i, 2] -= share * b2
+            b[i, 3] -= share * b3
+    for j in range(count - 1, -1, -1):
+        inverse = 1.0 / D[j]
+        b0, b1, b2, b3 = b[j, 0] * inverse, b[j, 1] * inverse, b[j, 2] * inverse, b[j, 3] * inverse
+        for p in range(starts[j], starts[j + 1]):
+            i, share = rows[p], L[p]
+            b0 -= share * b[i, 0]
+            b1 -= share * b[i, 1]
+            b2 -= share * b[i, 2]
+            b3 -= share * b[i, 3]
+        b[j, 0], b[j, 1], b[j, 2], b[j, 3] = b0, b1, b2, b3

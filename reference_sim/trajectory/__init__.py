@@ -1,0 +1,1 @@
+"""Trajectories: positions over time, their file, and how a run is written, resumed and exported."""

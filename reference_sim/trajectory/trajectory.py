@@ -1,0 +1,149 @@
+"""A trajectory: positions over time, whether and how they converged, and its file.
+
+The file is VTKHDF (temporal PolyData), so ParaView opens it as it is; what VTK has no place for lies in the
+top-level group /benchmark.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reference_sim.files.array_file import MOST_PACKED
+from reference_sim.trajectory.writer import TrajectoryWriter
+
+if TYPE_CHECKING:
+    import h5py
+
+
+SUFFIXES = (".vtkhdf", ".hdf")
+SMALL = 1 << 20  # [bytes] that nobody minds
+# What h5py and numpy raise for a file that is none, or is damaged.
+UNREADABLE = (
+    OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, ArithmeticError,
+    MemoryError,
+)  # fmt: skip
+
+
+class TrajectoryError(ValueError):
+    """A trajectory file that cannot be read; the message names file and remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Positions of one cloth over time.
+
+    Attributes:
+        positions: (T, V, 3) [m].
+        faces: (F, 3).
+        times: (T,) [s].
+        frame_seconds: (T,) time on the clock for each frame [s]; nan where none was taken, as by default.
+        status: "converged", or the first failure among the frames (stalled, max_iterations, diverged,
+            timeout); "ok" for a method that does not minimise.
+        reason: one line in words.
+        provenance: what made it (JSON values).
+        frame_fields: further numbers per frame, each (T,).
+    """
+
+    positions: np.ndarray
+    faces: np.ndarray
+    times: np.ndarray
+    frame_seconds: np.ndarray = field(default_factory=lambda: np.empty(0))
+    status: str = "ok"
+    reason: str = ""
+    provenance: dict[str, Any] = field(default_factory=dict)
+    frame_fields: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not len(self.frame_seconds):
+            object.__setattr__(self, "frame_seconds", np.full(self.frames, np.nan))
+
+    @property
+    def frames(self) -> int:
+        return len(self.positions)
+
+    @property
+    def dt(self) -> float:
+        """Time between frames [s]."""
+        return float(self.times[1] - self.times[0]) if self.frames > 1 else float("nan")
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole file under a temporary name, then put it in place."""
+        count = self.positions.shape[1]
+        with TrajectoryWriter(path, self.faces, self.provenance, vertex_count=count, live=False) as writer:
+            if self.frames:
+                writer.extend(self.positions, self.times, self.frame_seconds, self.frame_fields)
+            writer.finish(self.status, self.reason)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Trajectory:
+        """Read a file of this project; an unfinished one gives its whole frames and status "unfinished".
+
+        Raises:
+            TrajectoryError: missing file, or not a trajectory.
+        """
+        import h5py
+
+        try:
+            with h5py.File(path, "r") as file:
+                return read_trajectory(file)
+        except FileNotFoundError:
+            raise TrajectoryError(f"{path}: no such trajectory file") from None
+        except UNREADABLE as error:
+            reason = " ".join(str(error).split())
+            raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
+
+    def with_status(self, status: str, reason: str) -> Trajectory:
+        """The same frames with another status."""
+        return replace(self, status=status, reason=reason)
+
+    def first(self, count: int) -> Trajectory:
+        """That many of its frames, or all that there are."""
+        return replace(
+            self, positions=self.positions[:count], times=self.times[:count],
+            frame_seconds=self.frame_seconds[:count],
+            frame_fields={name: values[:count] for name, values in self.frame_fields.items()},
+        )  # fmt: skip
+
+    def finite(self) -> Trajectory:
+        """The frames before the first in which a position is not finite."""
+        whole = np.isfinite(self.positions).all(axis=(1, 2))
+        return self if whole.all() else self.first(int(np.argmin(whole)))
+
+
+def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:
+    """The first `frames` frames of an open file, default all that are whole; raises one of UNREADABLE."""
+    own, vtk = file["benchmark"], file["VTKHDF"]
+    provenance = json.loads(own.attrs["provenance"])
+    if not isinstance(provenance, dict):
+        raise ValueError("its provenance is no JSON object")
+    frames = int(own.attrs["frames"]) if frames is None else frames
+    vertex_count = int(_whole(vtk["NumberOfPoints"])[0])
+    return Trajectory(
+        positions=_whole(vtk["Points"], frames * vertex_count).reshape(frames, vertex_count, 3),
+        faces=_whole(vtk["Polygons/Connectivity"]).reshape(-1, 3),
+        times=_whole(vtk["Steps/Values"], frames),
+        frame_seconds=_whole(own["frame_seconds"], frames),
+        status=str(own.attrs["status"]),
+        reason=str(own.attrs["reason"]),
+        provenance=provenance,
+        frame_fields={k.replace(":", "/"): _whole(v, frames) for k, v in own["frame_fields"].items()},
+    )
+
+
+def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
+    """The first rows of a dataset, all of them by default, once their size is that of what is stored.
+
+    Raises ValueError for one that declares more numbers than it holds, or no plain numbers.
+    """
+    rows = len(dataset) if rows is None else rows
+    if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":
+        raise ValueError(f"{dataset.name} has {dataset.shape} of {dataset.dtype}")
+    size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
+    if size > MOST_PACKED * dataset.id.get_storage_size() + SMALL:
+        raise ValueError(f"{dataset.name} declares {size} bytes, more than it holds")
+    return dataset[:rows]

@@ -1,0 +1,193 @@
+"""One look for all plots, and files that come out the same every time they are made."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.results.run_folder import replacing
+from reports.figures.styles import Style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import XAxis, YAxis
+    from matplotlib.figure import Figure
+
+PAGE_WIDTH = 6.7  # inches of text width on the report's page
+LINE_LETTERS = 115  # of a legend that fit on one line of a figure as wide as the page
+MOST_LINES = 13  # of a legend beside a figure
+GRID = "#E3E3E3"
+_LOOK: dict[Any, Any] = {
+    # Each has what those before it lack; the last draws a box that names the script.
+    "font.family": ["STIXGeneral", "DejaVu Sans", "Last Resort High-Efficiency"],
+    "text.parse_math": False,  # a name may hold dollars
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#666666",
+    "axes.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "axes.labelcolor": "#222222",
+    "text.color": "#222222",
+    "lines.linewidth": 1.3,
+    "svg.hashsalt": "report",
+    "svg.fonttype": "path",
+    "figure.dpi": 100,
+}
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [inches] in the look of the report, without pyplot and its global state."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    matplotlib.rcParams.update(_LOOK)
+    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.get_layout_engine().set(h_pad=0.04, w_pad=0.03)  # type: ignore[union-attr,call-arg]
+    return figure
+
+
+def log_axis(axes: Axes, which: str) -> None:
+    """Make the x or y axis logarithmic with plain numbers: 0.01, 0.1, 1; and 2, 5 where it is short.
+
+    Call it when the limits are set.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis: XAxis | YAxis = axes.xaxis if which == "x" else axes.yaxis
+    if which == "x":
+        axes.set_xscale("log")
+    else:
+        axes.set_yscale("log")
+    low, high = axis.get_view_interval()
+    decades = math.log10(high / low)
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,), numticks=7))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: power_text(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def power_text(value: float) -> str:
+    """For matplotlib, whose raised digits are too small to read: "0.25", "2e-7"."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
+    mantissa, _, power = f"{value:.0e}".partition("e")
+    return f"{mantissa}e{int(power)}"
+
+
+def wrapped(name: str, width: int = 44) -> str:
+    """A long name on several lines, broken after a separator where there is one."""
+    lines = [""]
+    for piece in re.findall(rf"[^_/ :-]{{1,{max(width - 1, 1)}}}[_/ :-]?|[_/ :-]", name):
+        if lines[-1] and len(lines[-1]) + len(piece) > width:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(line.strip() for line in lines)
+
+
+def printable(text: str) -> str:
+    """The text with letters that the typesetter's fonts do not have as "U+88FE"."""
+    lacking = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
+    return text.translate({ord(c): f"U+{ord(c):04X}" for c in lacking})
+
+
+@cache
+def _letters() -> frozenset[str]:
+    """What DejaVu Sans Mono has: the widest of the typesetter's fonts, and in matplotlib too."""
+    from matplotlib.font_manager import findfont, get_font
+
+    return frozenset(map(chr, get_font(findfont("DejaVu Sans Mono")).get_charmap()))
+
+
+def grid(axes: Axes, which: str = "both") -> None:
+    axes.grid(True, axis=which, color=GRID, linewidth=0.6)  # type: ignore[arg-type]
+
+
+def file_name(text: str) -> str:
+    """A scene's or method's name as part of a file name, in letters that the report's text keeps."""
+    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in printable(text))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A finished figure: its file for the PDF, caption, kind and share of the page's width."""
+
+    path: Path
+    caption: str
+    kind: str
+    width: float
+
+
+def save(figure: Figure, folder: Path, name: str, *, caption: str, kind: str, vector: bool = True) -> Picture:
+    """Write <name>.png and, unless it is a photograph, <name>.svg, which the PDF then takes."""
+    path = folder / f"{name}.png"
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=200, metadata={"Software": None})
+    if vector:
+        figure.set_layout_engine("none")  # it has done its work, which is half of the time of a figure
+        path = folder / f"{name}.svg"
+        with replacing(path) as temporary:
+            figure.savefig(temporary, metadata={"Date": None})
+    return Picture(path, caption, kind, min(1.0, float(figure.get_figwidth()) / PAGE_WIDTH))
+
+
+def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
+    """One legend for all panels, above them: of lines, or else of markers (of none where that is empty)."""
+    letters = [len(look.label) + 8 for look in entries]
+    columns = _columns(letters, figure.get_figwidth() / PAGE_WIDTH)
+    _legend(figure, entries, lines, loc="outside upper center", ncols=columns)
+
+
+def legend_beside(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
+    """The same in columns to the right."""
+    _legend(figure, entries, lines, loc="outside right center", ncols=-(-len(entries) // MOST_LINES))
+
+
+def _legend(figure: Figure, entries: Sequence[Style], lines: bool, **more: Any) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=look.colour,
+            linestyle=look.line if lines or not look.marker else "none",  # type: ignore[arg-type]
+            marker="" if lines else look.marker,
+            markersize=9 if look.marker == "*" else 6,
+            label=wrapped(look.label, 30),
+        )
+        for look in entries
+    ]
+    figure.legend(
+        handles=handles,
+        frameon=False,
+        handlelength=1.6 if lines else 0.8,
+        handletextpad=0.5,
+        columnspacing=1.4,
+        **more,
+    )
+
+
+def _columns(letters: Sequence[int], width: float = 1.0) -> int:
+    """As many columns of a legend as fit into that share of the page's width: it is filled column by column,
+    each as wide as its longest entry.
+    """
+    count = len(letters)
+    for columns in range(count, 1, -1):
+        parts = np.array_split(np.array(letters), columns)  # the longer ones first, as matplotlib fills them
+        if sum(int(part.max()) for part in parts) <= LINE_LETTERS * width:
+            return columns
+    return 1

@@ -1,0 +1,1 @@
+"""Means, effects with intervals, fronts, claims."""

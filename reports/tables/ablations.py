@@ -1,0 +1,69 @@
+"""Variants of a method beside their base, and how far the variation moves what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from reports.run.rows import Run
+from reports.statistics.means import mean_of, pair
+from reports.statistics.significance import effect_on
+from reports.tables.table import Cell, Column, Table, metric_column, table
+
+SHOWN = (
+    "energy/strain", "energy/bending", "energy/gravity", "energy/inertia", "energy/collision", "energy/total",
+    "curvature/error", "penetration/vertices", "dynamics/amplitude", "dynamics/correlation", "roll_out/drift",
+)  # fmt: skip
+# A term that is left out of the loss is of course larger; the total is the base's own loss, curvature error
+# (the paper's measure) is nobody's.
+COMPARED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
+HEAD = (
+    Column("garment", "Garment", text=True),
+    Column("method", "Method", text=True, method=True),
+)
+
+
+def ablations(run: Run) -> list[Table]:
+    """The numbers of each base and of its ablations that ran, by garment."""
+    metrics = [run.metrics[name] for name in SHOWN if name in run.metrics]
+    lines: list[tuple[Cell, ...]] = [
+        (garment, method, *(mean_of(rows, method, metric.name) for metric in metrics))
+        for garment, base, below, rows in _families(run)
+        for method in (base, *below)
+    ]
+    columns = [metric_column(metric) for metric in metrics]
+    caption = "Ablations: the base first, then its variants."
+    return table("ablations", (*HEAD, *columns), lines, caption, grouped_by=("garment",))
+
+
+def ablation_effects(run: Run) -> list[Table]:
+    """Each ablation over its base, or less its base, with intervals."""
+    metrics = [run.metrics[name] for name in COMPARED if name in run.metrics]
+    lines: list[tuple[Cell, ...]] = []
+    for garment, base, below, rows in _families(run):
+        for method in below:
+            pairs = [pair(rows, method, base, metric.name) for metric in metrics]
+            effects = [
+                effect_on(metric, one, full, run, rows) if one and full else None
+                for metric, (one, full) in zip(metrics, pairs)
+            ]
+            lines.append((garment, method, *effects))
+    caption = (
+        "Each variant beside its base, over the scenes that both have: × the variant over the base, of "
+        "geometric means; where a value is not positive or zero is a choice, the variant less the base."
+    )
+    note = "Differences in the unit above. Below: 95 % intervals over motions and seeds, each for itself."
+    columns = (*HEAD, *map(metric_column, metrics))
+    return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)
+
+
+def _families(run: Run) -> Iterator[tuple[str, str, list[str], pd.DataFrame]]:
+    """Garment, base, the ablations that ran beside it, and the rows of the garment."""
+    for garment in run.garments(run.worn):
+        rows = run.worn[run.worn["garment"] == garment]
+        usable = rows[rows["usable"]]["method"]
+        beside = run.standing_apart(rows)
+        below = [method for method in run.ordered(usable) if method in beside]
+        for base in dict.fromkeys(run.methods[method].base for method in below):
+            yield garment, base, [m for m in below if run.methods[m].base == base], rows

@@ -1,0 +1,96 @@
+"""The paper's tables of a run in LaTeX, the numbers as the PDF prints them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from textwrap import wrap
+
+import pandas as pd
+
+from benchmarks.results.run_folder import replacing
+from reports.document.layout import column_texts, remarks_of
+from reports.run.rows import Run
+from reports.tables import paper
+from reports.tables.table import Table
+
+HEAD = "% Needs \\usepackage{booktabs} and LuaLaTeX or XeLaTeX for names not Latin; as wide as two columns.\n"
+FEW = 9  # columns that fit in the larger letters
+LINE = 11  # letters of a heading's line
+NUMBER = "\n"  # between a heading and the number of its column
+MARKS = {"*": r"\ast", "†": r"\dagger", "‡": r"\ddagger", "§": r"\S"}
+_POWER = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
+_PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
+_NUMBER = re.compile(r"(-?[\d,.]+(?:\\times 10\^\{-?\d+\})?)")
+
+
+def write_latex(run: Run, tables: Mapping[str, Table], folder: Path) -> None:
+    """Write <folder>/<name>.tex of the tables that the paper has, each whole or not at all."""
+    for name in paper.PRINTED:
+        if name in tables:
+            with replacing(folder / f"{name}.tex") as temporary:
+                temporary.write_text(latex(run, tables[name]), encoding="utf-8", newline="\n")
+
+
+def latex(run: Run, table: Table) -> str:
+    """A table environment: names escaped, each number with its spread or uncertainty and its marks."""
+    columns = [
+        column_texts(run, column, [row[place] for row in table.rows], [])
+        for place, column in enumerate(table.columns)
+    ]
+    named = [f"{c.title} [{c.unit_above}]" if c.unit_above else c.title for c in table.columns]
+    heads = [f"{head}{NUMBER}{place}" for place, head in enumerate(named)]  # two metrics may have one heading
+    cells = {
+        head: [cell["text"] if column.text else _cell(cell) for cell in texts]
+        for head, column, texts in zip(heads, table.columns, columns)
+    }
+    words = [head for head, column in zip(heads, table.columns) if column.text]
+    styled = pd.DataFrame(cells).style.hide(axis="index")
+    styled = styled.format(escape="latex", subset=words)
+    styled = styled.format_index(_stacked, escape="latex", axis="columns")
+    # Of rows that stand beside the paper's in the PDF, the remark on those is not for here.
+    lines = [list(line) for line in zip(*columns)]
+    note = remarks_of(Table(table.name, table.columns, table.rows), lines)
+    kinds = "".join("l" if column.text else "r" for column in table.columns)
+    text = styled.to_latex(
+        column_format=kinds, hrules=True, position_float="centering", caption=_plain(table.caption),
+        label=f"tab:{table.name}", environment="table*",
+    )  # fmt: skip
+    size, gap = ("footnotesize", 3) if len(heads) <= FEW else ("scriptsize", 2)
+    text = text.replace("\\centering\n", f"\\centering\n\\{size}\\setlength{{\\tabcolsep}}{{{gap}pt}}\n")
+    return HEAD + (text.replace(r"\end{table*}", f"\\par {_plain(note)}\n\\end{{table*}}") if note else text)
+
+
+def _stacked(head: str) -> str:
+    """A heading of short lines, its unit on the last: columns are as wide as their numbers."""
+    head = head.partition(NUMBER)[0]
+    title, _, unit = head.partition(" [")
+    lines = [*wrap(title, LINE, break_long_words=False), *([f"{{[{unit}}}"] if unit else [])]
+    return r"\shortstack[r]{" + r"\\ ".join(lines) + "}" if len(lines) > 1 else head
+
+
+def _cell(cell: Mapping[str, str]) -> str:
+    text, marks = _math(cell["text"]), "".join(MARKS.get(mark, mark) for mark in cell["mark"])
+    if marks:
+        text = f"{text.removesuffix('$')}{'' if text.endswith('$') else '$'}{{}}^{{{marks}}}$"
+    if cell["spread"]:  # below the number: beside it a table would be too wide for a page
+        text += rf"\\ \tiny $\pm$ {_math(cell['spread'].removeprefix('± '))}"
+        text = rf"\begin{{tabular}}[t]{{@{{}}r@{{}}}}{text}\end{{tabular}}"
+    return text
+
+
+def _math(text: str) -> str:
+    """A number as "2.50×10⁻⁷" or "1,730 s" with its digits in math, its unit not."""
+    plain = _POWER.sub(lambda found: rf"\times 10^{{{found[1]}}}", text.strip())
+    found = _NUMBER.match(plain.translate(_PLAIN))
+    if not found:
+        return "--" if plain == "–" else plain.replace("∞", r"$\infty$")
+    return f"${found[1].replace(',', '{,}')}$" + plain[found.end() :].replace(" ", "~")
+
+
+def _plain(text: str) -> str:
+    """Words of the report itself, with the few of their signs that LaTeX reads otherwise."""
+    for sign, instead in (("%", r"\%"), ("±", r"$\pm$"), *((m, f"$^{{{x}}}$") for m, x in MARKS.items())):
+        text = text.replace(sign, instead)
+    return text

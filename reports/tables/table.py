@@ -1,0 +1,119 @@
+"""A table: columns, rows of numbers and texts, and its CSV file.
+
+It knows nothing of the page it is printed on: the CSV keeps nine digits, the PDF three.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.results.run_folder import replacing
+from reports.run.rows import Metric
+from reports.statistics.means import Mean
+from reports.statistics.significance import Effect
+from reports.tables.numbers import CSV_DASH, csv_number
+
+EFFECT_PARTS = ("kind", "low", "high", "covers")
+Cell = float | int | str | Mean | Effect | None
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
+
+    text: words, set from the left; method: names of methods, printed by their labels. digits: of its numbers;
+    trim: without zeros at their end; mixed: of several units, whose points need not stand in a column.
+    """
+
+    name: str
+    title: str
+    unit: str = ""
+    text: bool = False
+    method: bool = False
+    digits: int = 3
+    trim: bool = False
+    mixed: bool = False
+
+    @property
+    def unit_above(self) -> str:
+        """The unit as the column's heading has it: a duration is printed with a unit of its own."""
+        return "" if self.unit == "s" else self.unit
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns and rows; each row has one cell per column.
+
+    grouped_by: columns that become headings in the PDF. references: label and texts by column of rows that
+    others printed; they are in no CSV.
+    """
+
+    name: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    caption: str = ""
+    grouped_by: tuple[str, ...] = ()
+    references: tuple[tuple[str, dict[str, str]], ...] = ()
+    note: str = ""
+
+    def write_csv(self, folder: Path) -> Path:
+        """Write <folder>/<name>.csv, whole or not at all.
+
+        A mean gets a column for its spread over seeds, and where there is any, one for its uncertainty and
+        one for the roll-outs that it lacks; an effect columns for what it is and its interval.
+        """
+        path = folder / f"{self.name}.csv"
+        texts: dict[str, list[str]] = {}
+        for column, cells in zip(self.columns, zip(*self.rows)):
+            title = f"{column.name} [{column.unit}]" if column.unit else column.name
+            texts[title] = [_csv_text(cell) for cell in cells]
+            if any(isinstance(cell, Mean) for cell in cells):
+                spreads = [cell.spread if isinstance(cell, Mean) else None for cell in cells]
+                texts[f"{column.name}_spread"] = [csv_number(spread) for spread in spreads]
+                moved = [cell.uncertainty if isinstance(cell, Mean) else None for cell in cells]
+                if any(x is not None for x in moved):
+                    texts[f"{column.name}_uncertainty"] = [csv_number(x) for x in moved]
+                lacking = [cell.lacking if isinstance(cell, Mean) else 0 for cell in cells]
+                if any(lacking):
+                    texts[f"{column.name}_lacking"] = [str(count) for count in lacking]
+            if any(isinstance(cell, Effect) for cell in cells):
+                parts = zip(*map(_parts_of_effect, cells))
+                texts |= {f"{column.name}_{part}": list(own) for part, own in zip(EFFECT_PARTS, parts)}
+        with replacing(path) as temporary:
+            pd.DataFrame(texts).to_csv(temporary, index=False, lineterminator="\n")
+        return path
+
+
+def metric_column(metric: Metric) -> Column:
+    return Column(metric.name, metric.title, "" if metric.unit == "1" else metric.unit)
+
+
+def table(
+    name: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], caption: str = "", **more
+) -> list[Table]:
+    """The table in a list; an empty one where it has no rows."""
+    return [Table(name, tuple(columns), tuple(rows), caption, **more)] if rows else []
+
+
+def _csv_text(cell: Cell) -> str:
+    if isinstance(cell, Mean):
+        return csv_number(cell.value)
+    if isinstance(cell, Effect):
+        return csv_number(cell.shown)
+    if isinstance(cell, str):
+        return cell or CSV_DASH
+    return str(cell) if isinstance(cell, int) or cell == math.inf else csv_number(cell)
+
+
+def _parts_of_effect(cell: Cell) -> tuple[str, ...]:
+    """The texts of EFFECT_PARTS."""
+    if not isinstance(cell, Effect):
+        return (CSV_DASH,) * len(EFFECT_PARTS)
+    low, high = cell.interval or (None, None)
+    kind = "ratio" if cell.ratio else "difference"
+    return kind, csv_number(low), csv_number(high), cell.covers or CSV_DASH

@@ -1,1 +1,0 @@
-"""Methods that SNUG is compared with, each with its own network or its own loss."""

@@ -1,0 +1,1 @@
+"""The human body: skeleton, parametric body, skinning, files of SMPL's family."""

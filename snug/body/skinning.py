@@ -1,0 +1,73 @@
+"""Linear blend skinning in torch, batched and differentiable.
+
+Rotations follow the SMPL convention: the rotation of a joint is relative to its parent joint, and all frames
+are parallel to the world in the rest pose. Leading axes `...` broadcast.
+"""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+
+def joint_transforms(
+    rotations: Tensor, joints: Tensor, parents: Sequence[int], translations: Tensor
+) -> Tensor:
+    """Rigid transforms that take points attached to each joint from the rest pose to the posed body.
+
+    With world rotation W_j = W_parent R_j and posed joint q_j = q_parent + W_parent (p_j - p_parent), the
+    transform is x -> W_j (x - p_j) + q_j. The root is at q_0 = p_0 + translation.
+
+    rotations: (..., J, 3, 3), relative to the parent. joints: (..., J, 3) [m], rest positions.
+    parents: J indices, -1 for a root, every parent before its children. translations: (..., 3) [m].
+    Returns (..., J, 3, 4): rotation and translation side by side.
+    """
+    world: list[Tensor] = []
+    posed: list[Tensor] = []
+    for joint, parent in enumerate(int(p) for p in parents):
+        rotation, rest = rotations[..., joint, :, :], joints[..., joint, :]
+        if parent < 0:
+            world.append(rotation)
+            posed.append(rest + translations)
+        else:
+            offset = rest - joints[..., parent, :]
+            world.append(world[parent] @ rotation)
+            posed.append(posed[parent] + (world[parent] @ offset[..., None])[..., 0])
+    turn = torch.stack(world, dim=-3)
+    shift = torch.stack(posed, dim=-2) - (turn @ joints[..., None])[..., 0]
+    return torch.cat([turn, shift[..., None]], dim=-1)
+
+
+def corrected(points: Tensor, directions: Tensor, transforms: Tensor, parents: Sequence[int]) -> Tensor:
+    """Points (..., P, 3) [m] of the rest pose with the pose correctives of these transforms (..., J, 3, 4).
+
+    directions: (P, 3, 9 K) [m], see snug.body.parametric_body.Body; the rotations of joints 1 to K relative to their parents
+    are read back from the transforms.
+    """
+    count = directions.shape[2] // 9
+    world = transforms[..., :3]
+    above = world[..., [int(parents[joint]) for joint in range(1, count + 1)], :, :]
+    relative = above.transpose(-1, -2) @ world[..., 1 : count + 1, :, :]
+    entries = (relative - torch.eye(3, dtype=world.dtype, device=world.device)).flatten(-3)
+    return points + (entries @ directions.flatten(0, 1).T).unflatten(-1, (-1, 3))
+
+
+def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
+    """Linear blend skinning: x_i = sum_j w_ij T_j p_i.
+
+    points: (..., V, 3) [m] in the rest pose. weights: (V, J), rows sum to one. transforms: (..., J, 3, 4).
+    Returns (..., V, 3) [m].
+    """
+    blended = _blended(weights, transforms)
+    return (blended[..., :3] @ points[..., None])[..., 0] + blended[..., 3]
+
+
+def unposed(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
+    """The inverse of `skin`: the points (..., V, 3) [m] in the rest pose that it takes to `posed`."""
+    blended = _blended(weights, transforms)
+    return torch.linalg.solve(blended[..., :3], (posed - blended[..., 3])[..., None])[..., 0]
+
+
+def _blended(weights: Tensor, transforms: Tensor) -> Tensor:
+    """The transform (..., V, 3, 4) of each vertex."""
+    return (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))

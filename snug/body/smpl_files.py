@@ -1,0 +1,282 @@
+"""Read a body of SMPL's family: .npz of plain arrays, or .pkl as the models are given out.
+
+| here | in files | shape |
+| --- | --- | --- |
+| vertices | v_template, vertices, template | (B, 3) [m], y up, facing +z, in T or A pose |
+| faces | f, faces | (F, 3), or (F, 4) |
+| weights | weights, blend_weights, lbs_weights, skinning_weights | (B, J) |
+| tree | kintree_table (2, J), or parents (J,) | SMPL's |
+| joints | J_regressor (J, B), or J_template, joints, joint_template, J | (J, 3) [m] |
+| shapes, may lack | shapedirs, shape_directions | (B, 3, S) |
+| of joints without regressor | J_shapedirs, joint_directions | (J, 3, S) |
+| correctives, may lack | posedirs | (B, 3, 9 (J - 1)) |
+| own axes of bones, must be none | rest_pose | (J, 3) or (J, 4) |
+
+J: 24 of SMPL, 52 of SMPL-H, 55 of SMPL-X. Of the latter two, fingers go into the hand, jaw and eyes into the
+head, in weights and skeleton; the hand's joint is the mean of its knuckles. A rest pose with lowered arms is
+brought to the T pose, since that is what motions are relative to.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from reference_sim.files.array_file import ArrayFileError, read_arrays
+from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
+from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, BodyError
+from snug.body.t_pose import arm_turns, arms_below_horizontal, turned_rest
+from snug.garments.remeshing import boundary_loops
+
+SHAPES = 10  # coefficients kept when a file has more, and read by networks of pose and shape
+JOINTS = len(JOINT_NAMES)
+BODY_JOINTS = JOINT["left_hand"]  # these come first in SMPL, SMPL-H and SMPL-X alike
+FOLDED = {20: JOINT["left_hand"], 21: JOINT["right_hand"], 15: 15}  # what hangs on wrists and head
+MOST_VERTICES = 100_000
+LONGEST_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not
+T_POSE, A_POSE = np.radians(10.0), np.radians(60.0)  # how far arms may hang down
+
+SYNONYMS = {
+    "v_template": ("v_template", "vertices", "template"),
+    "f": ("f", "faces"),
+    "weights": ("weights", "blend_weights", "lbs_weights", "skinning_weights"),
+    "kintree_table": ("kintree_table", "parents"),
+    "J_regressor": ("J_regressor",),
+    "J_template": ("J_template", "joints", "joint_template", "J"),
+    "shapedirs": ("shapedirs", "shape_directions"),
+    "J_shapedirs": ("J_shapedirs", "joint_directions"),
+    "posedirs": ("posedirs",),
+    "rest_pose": ("rest_pose",),
+}
+REQUIRED = ("v_template", "f", "weights", "kintree_table")
+
+
+def read_smpl(path: Path) -> dict[str, Any]:
+    """The arrays of a `Body` in T pose, keyed by its field names. Raises BodyError: file, array, remedy."""
+    stored = _stored_arrays(path)
+    missing = [" or ".join(SYNONYMS[key]) for key in REQUIRED if key not in stored]
+    if missing:
+        raise BodyError(f"{path}: no array {', '.join(missing)}; expected SMPL's layout")
+    template = _float(path, stored, "v_template", (None, 3))
+    count = len(template)
+    if count > MOST_VERTICES:
+        raise BodyError(f"{path}: v_template has {count} vertices; at most {MOST_VERTICES} are read")
+    weights, places, carried = _skeleton(path, stored, count)
+    directions = np.zeros((count, 3, 0))
+    if "shapedirs" in stored:
+        directions = _float(path, stored, "shapedirs", (count, 3, None))[:, :, :SHAPES]
+    joints, joint_directions = _joints(path, stored, template, directions, len(carried))
+    rest = {
+        "template": template,
+        "shape_directions": directions,
+        "skinning_weights": weights @ carried,
+        "joint_template": places @ joints,
+        "joint_directions": np.einsum("ij,jas->ias", places, joint_directions),
+        "faces": _faces(path, stored["f"], template),
+        "parents": np.array(PARENTS),
+        "pose_directions": _correctives(path, stored, count, len(carried)),
+    }
+    _check_place(path, template, rest["joint_template"])
+    return _in_t_pose(path, rest)
+
+
+def _stored_arrays(path: Path) -> dict[str, Any]:
+    """The arrays that are there, by the first of their names."""
+    names = [name for some in SYNONYMS.values() for name in some]
+    try:
+        found = read_plain_pickle(path) if path.suffix in (".pkl", ".pickle") else read_arrays(path, names)
+    except PlainPickleError as error:
+        raise BodyError(str(error)) from error
+    except ArrayFileError as error:
+        raise BodyError(
+            f"{error}; expected an .npz of plain arrays, as numpy.savez writes, or a .pkl"
+        ) from error
+    if not isinstance(found, dict):
+        raise BodyError(f"{path}: holds a {type(found).__name__}; expected a dict of arrays")
+    kept = {key: next((n for n in some if n in found), "") for key, some in SYNONYMS.items()}
+    return {
+        key: found[name] if scipy.sparse.issparse(found[name]) else np.asarray(found[name])
+        for key, name in kept.items()
+        if name
+    }
+
+
+def _float(path: Path, stored: dict[str, Any], key: str, shape: tuple[int | None, ...]) -> np.ndarray:
+    array = stored[key]
+    fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape))
+    if not fits or array.dtype.kind not in "fiu" or 0 in array.shape:
+        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+        raise BodyError(f"{path}: {key} is {array.dtype} {array.shape}; expected numbers of shape {wanted}")
+    dense = array.toarray() if scipy.sparse.issparse(array) else array
+    with np.errstate(over="ignore"):
+        dense = dense.astype(np.float64)
+    if not np.isfinite(dense).all():
+        raise BodyError(f"{path}: {key} holds values that are not finite")
+    return dense
+
+
+def _skeleton(path: Path, stored: dict[str, Any], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Weights (B, J), rows summing to one, and how J joints become 24: places (24, J), weights (J, 24)."""
+    table = stored["kintree_table"]
+    parents = table[0] if table.ndim == 2 else table
+    wanted = "kintree_table (2, J) or parents (J,) of J = 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X) joints"
+    if parents.ndim != 1 or len(parents) not in (24, 52, 55) or table.dtype.kind not in "iuf":
+        raise BodyError(f"{path}: the tree of joints is {table.dtype} {table.shape}; expected {wanted}")
+    joints = len(parents)
+    weights = _float(path, stored, "weights", (count, joints))
+    sums = weights.sum(axis=1, keepdims=True)
+    if weights.min() < -1e-6 or np.abs(sums - 1.0).max() > 1e-3:
+        raise BodyError(f"{path}: weights must be non-negative with rows that sum to one")
+    if "rest_pose" in stored and not _is_identity(stored["rest_pose"]):
+        raise BodyError(
+            f"{path}: rest_pose gives bones axes of their own; give a body without, and its motion too"
+        )
+    own = JOINTS if joints == JOINTS else BODY_JOINTS
+    wrong = [j for j in range(1, own) if parents[j] != PARENTS[j]]
+    if wrong:
+        found = f"joint {wrong[0]} hangs on {parents[wrong[0]]}, expected {PARENTS[wrong[0]]}"
+        raise BodyError(f"{path}: kintree_table is not SMPL's: the parent of each joint; {found}")
+    if joints == JOINTS:
+        return weights / sums, np.eye(JOINTS), np.eye(JOINTS)
+    places, carried = np.zeros((JOINTS, joints)), np.zeros((joints, JOINTS))
+    places[:own, :own] = carried[:own, :own] = np.eye(own)
+    for joint in range(own, joints):
+        parent = int(parents[joint])
+        if not (parent in FOLDED or own <= parent < joint):
+            raise BodyError(
+                f"{path}: kintree_table: joint {joint} hangs on {parent}; expected head, hand, finger"
+            )
+        if parent in FOLDED:
+            carried[joint, FOLDED[parent]] = 1.0
+            places[FOLDED[parent], joint] = parent != FOLDED[parent]  # knuckles; the head stays where it is
+        else:
+            carried[joint] = carried[parent]
+    knuckles = places.sum(axis=1, keepdims=True)
+    if knuckles.min() == 0:
+        raise BodyError(f"{path}: kintree_table: a wrist without a finger")
+    return weights / sums, places / knuckles, carried
+
+
+def _is_identity(turns: np.ndarray) -> bool:
+    """Whether rotation vectors (J, 3), or quaternions (J, 4), real number first or last, turn nothing."""
+    if turns.ndim != 2 or turns.shape[1] not in (3, 4) or turns.dtype.kind not in "fiu":
+        return False
+    none = [np.zeros(3)] if turns.shape[1] == 3 else [np.eye(4)[0], np.eye(4)[3]]
+    return any(np.allclose(np.abs(turns), one, atol=1e-4) for one in none)
+
+
+def _joints(
+    path: Path, stored: dict[str, Any], template: np.ndarray, directions: np.ndarray, joints: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joints (J, 3) and what a unit of each shape coefficient adds to them (J, 3, S)."""
+    if "J_regressor" in stored:
+        regressor = _float(path, stored, "J_regressor", (joints, len(template)))
+        return regressor @ template, np.einsum("jv,vcs->jcs", regressor, directions)
+    if "J_template" not in stored or ("J_shapedirs" not in stored and directions.shape[2]):
+        raise BodyError(
+            f"{path}: no joints; expected the array J_regressor, or joints, with shapedirs also J_shapedirs"
+        )
+    moved = np.zeros((joints, 3, 0))
+    if directions.shape[2]:
+        moved = _float(path, stored, "J_shapedirs", (joints, 3, None))[:, :, :SHAPES]
+    if moved.shape[2] != directions.shape[2]:
+        raise BodyError(f"{path}: J_shapedirs has {moved.shape[2]} shapes, shapedirs {directions.shape[2]}")
+    return _float(path, stored, "J_template", (joints, 3)), moved
+
+
+def _correctives(path: Path, stored: dict[str, Any], count: int, joints: int) -> np.ndarray | None:
+    """Those of the joints that are kept; folded fingers, jaw and eyes stay straight and need none."""
+    if "posedirs" not in stored:
+        return None
+    own = JOINTS if joints == JOINTS else BODY_JOINTS
+    return _float(path, stored, "posedirs", (count, 3, 9 * (joints - 1)))[:, :, : 9 * (own - 1)].copy()
+
+
+def _check_place(path: Path, template: np.ndarray, joints: np.ndarray) -> None:
+    """Refuse what is not a person in metres, y up, facing +z, at x = 0."""
+    low, high = template.min(axis=0), template.max(axis=0)
+    size = high - low
+    if not 0.5 < size[1] < 3.0 or max(size) > 3.0:
+        raise BodyError(
+            f"{path}: v_template is {size[1]:.3g} high along y, {size[0]:.3g} wide and {size[2]:.3g} deep; "
+            "expected a standing body in metres, y up"
+        )
+    out = np.flatnonzero((joints < low - 0.02).any(axis=1) | (joints > high + 0.02).any(axis=1))
+    if len(out):
+        place = ", ".join(f"{x:.3g}" for x in joints[out[0]])
+        raise BodyError(
+            f"{path}: joint {JOINT_NAMES[out[0]]} at ({place}) is outside of the body; "
+            "give joints in metres and in SMPL's order"
+        )
+    at = {name: joints[JOINT[name]] for name in JOINT}
+    if at["left_shoulder"][0] < at["right_shoulder"][0] + 0.05 or at["neck"][1] < at["pelvis"][1] + 0.05:
+        raise BodyError(
+            f"{path}: the left shoulder is not at larger x, or the neck not above; turn it to face +z"
+        )
+    if abs(at["pelvis"][0]) > 0.05:
+        raise BodyError(f"{path}: the pelvis is {at['pelvis'][0]:.3g} m beside x = 0; shift the body")
+
+
+def _in_t_pose(path: Path, rest: dict[str, Any]) -> dict[str, Any]:
+    lowered = arms_below_horizontal(rest["joint_template"])
+    if np.abs(lowered).max() <= T_POSE:
+        return rest
+    degrees = " and ".join(f"{angle:.0f}" for angle in np.degrees(lowered))
+    if np.abs(lowered).max() > A_POSE:
+        raise BodyError(
+            f"{path}: the arms hang by {degrees} degrees; give the body in T pose or A pose (to 60)"
+        )
+    if rest["pose_directions"] is not None:
+        raise BodyError(f"{path}: the arms hang by {degrees} degrees; posedirs need a T pose, leave them out")
+    points, joints = (
+        np.concatenate([rest[f"{what}template"][..., None], rest[directions]], axis=2)
+        for what, directions in (("", "shape_directions"), ("joint_", "joint_directions"))
+    )
+    points, joints = turned_rest(points, joints, rest["skinning_weights"], arm_turns(lowered))
+    return {
+        **rest,
+        "template": points[..., 0],
+        "shape_directions": points[..., 1:],
+        "joint_template": joints[..., 0],
+        "joint_directions": joints[..., 1:],
+        "arms_lowered": lowered,
+    }
+
+
+def _faces(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
+    """Triangles (F, 3) of a closed surface, outward."""
+    if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu" or faces.size == 0:
+        raise BodyError(
+            f"{path}: f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)"
+        )
+    faces = faces.astype(np.int64)
+    if faces.min() < 0 or faces.max() >= len(template):
+        raise BodyError(f"{path}: f names vertex {faces.max()}; the body has {len(template)}")
+    if faces.shape[1] == 4:
+        faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    if len(np.unique(edges, axis=0)) != len(edges) or (edges[:, 0] == edges[:, 1]).any():
+        raise BodyError(f"{path}: f is not a closed surface with one winding; inside and outside need one")
+    faces = _filled(path, faces, template)
+    a, b, c = (template[faces[:, k]] for k in range(3))
+    if np.einsum("ij,ij->", a, np.cross(b, c)) < 0:
+        raise BodyError(f"{path}: f winds inwards; reverse the order of each triangle's vertices")
+    return faces
+
+
+def _filled(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
+    """Small holes, as the eyes of SMPL-X, closed by fans of triangles."""
+    try:
+        loops = boundary_loops(faces)
+    except ValueError as error:
+        raise BodyError(f"{path}: f is not a closed surface: {error}") from error
+    for loop in loops:
+        around = np.linalg.norm(template[loop] - template[np.roll(loop, 1)], axis=1).sum()
+        if around > LONGEST_HOLE:
+            raise BodyError(
+                f"{path}: f is not a closed surface: a hole at vertex {loop[0]} is {around:.2g} m around"
+            )
+        fan = np.stack([np.full(len(loop) - 2, loop[0]), loop[2:], loop[1:-1]], axis=1)
+        faces = np.concatenate([faces, fan])
+    return faces

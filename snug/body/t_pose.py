@@ -1,0 +1,45 @@
+"""Bring a body whose arms hang down in its file, an A pose, to the T pose that every motion starts from."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snug.body.skeleton import JOINT, PARENTS
+
+Array = NDArray[np.float64]
+
+ARM = ("shoulder", "elbow", "wrist", "hand")
+SIDES = (("left", 1.0), ("right", -1.0))
+
+
+def arms_below_horizontal(joints: Array) -> Array:
+    """Angle (2,) [rad] by which the left and the right arm, shoulder to wrist, hang down; joints (24, 3)."""
+    arms = [joints[JOINT[f"{side}_wrist"]] - joints[JOINT[f"{side}_shoulder"]] for side, _ in SIDES]
+    return np.array([np.arctan2(-arm[1], sign * arm[0]) for arm, (_, sign) in zip(arms, SIDES, strict=True)])
+
+
+def arm_turns(angles: Array) -> Array:
+    """World rotation of each joint (24, 3, 3) that lifts each arm, as one piece, by angles (2,) [rad]."""
+    turns = np.broadcast_to(np.eye(3), (len(JOINT), 3, 3)).copy()
+    for (side, sign), angle in zip(SIDES, angles, strict=True):
+        c, s = np.cos(angle), sign * np.sin(angle)
+        turns[[JOINT[f"{side}_{part}"] for part in ARM]] = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+    return turns
+
+
+def turned_rest(points: Array, joints: Array, weights: Array, turns: Array) -> tuple[Array, Array]:
+    """Vertices (B, 3, K) and joints (24, 3, K) of a body whose joints turn by (24, 3, 3) in the world.
+
+    The new rest pose is the one that linear blend skinning takes back to the old one exactly: each vertex is
+    moved by the inverse of the blended transform. Blending forwards would lose volume at the shoulder here,
+    and once more whenever the arm comes down. All is linear in points and joints together, so each of the K
+    columns may be a body or a shape direction.
+    """
+    moved = joints.copy()
+    for joint, parent in enumerate(PARENTS):
+        if parent >= 0:
+            moved[joint] = moved[parent] + turns[parent] @ (joints[joint] - joints[parent])
+    back = turns.transpose(0, 2, 1)
+    offsets = joints - back @ moved
+    blended = np.einsum("vj,jab->vab", weights, back)
+    shift = np.einsum("vj,jak->vak", weights, offsets)
+    return np.linalg.solve(blended, points - shift), moved

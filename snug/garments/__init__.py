@@ -1,0 +1,1 @@
+"""Garments: tailored by code to any body, or read from mesh files."""

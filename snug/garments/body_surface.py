@@ -1,0 +1,267 @@
+"""The implicit surface a garment is cut from: a smooth solid around the body, as a signed field on a grid.
+
+A shirt that followed the skin would be pressed into the waist and between the legs, where cloth never goes.
+So the solid is a union of three solids, each grown by its own distance:
+
+- the body itself, by `clearance` (this shapes shoulders and neck);
+- the torso, one convex section per height, which below the armpits never narrows again on the way down:
+  cloth hangs from its widest support; a flare widens it further, from the waist to the hem;
+- the upper arm, one convex section per distance from the shoulder.
+
+A skirt is the same without sleeves, hanging from its waistband and widening from the hips on. Of trousers the
+torso ends at the crotch and a leg begins, one convex section per height.
+
+Convex sections grown by d have 2 pi d more girth (Steiner's formula), so ease of girth e is a growth of
+e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. Only the half x >= 0 is built;
+the other half is its mirror image, so the garment is exactly symmetric.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from snug.body.parametric_body import Body
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
+DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
+ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
+CROTCH_FILLET = 0.03  # [m] the same between torso and leg
+TAPER = 0.4  # how steeply trousers may narrow from the seat to the thighs
+MOST_CELLS = 4e6  # of the grid: a person takes a tenth
+TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
+# What a shirt may borrow weights from: never hands, head or shins, even where they come near.
+SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
+ARM_BONES = ("left_shoulder", "left_elbow")
+LEG_BONES = ("left_hip", "left_knee")
+CROTCH_BONES = ("pelvis", "left_hip", "right_hip")
+
+
+def dominated_by(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
+    """Which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
+    wanted = [body.joint_names.index(name) for name in names]
+    return np.isin(np.argmax(body.skinning_weights, axis=1), wanted)
+
+
+def joint(body: Body, name: str) -> Array:
+    """Rest position (3,) [m] of the joint called `name`."""
+    return np.asarray(body.joint_template, dtype=np.float64)[body.joint_names.index(name)]
+
+
+@dataclass(frozen=True)
+class ImplicitSurface:
+    """Signed field, negative inside, on a grid over x >= 0 (three more planes beyond, mirrored).
+
+    origin: (3,) [m] of the first node; spacing [m]; values: (nx, ny, nz) [m], close to a distance near zero.
+    """
+
+    origin: Array
+    spacing: float
+    values: Array
+    coefficients: Array  # cubic spline coefficients of `values`
+
+    def field(self, points: Array) -> Array:
+        """Field (N,) [m] at points (N,3) [m], cubic in between the nodes."""
+        nodes = ((points - self.origin) / self.spacing).T
+        return ndimage.map_coordinates(self.coefficients, nodes, order=3, prefilter=False, mode="nearest")
+
+    def gradient(self, points: Array) -> Array:
+        """Gradient (N,3) of the field at points (N,3), by central differences of half a cell."""
+        step = 0.5 * self.spacing
+        shifts = step * np.eye(3)
+        columns = [self.field(points + s) - self.field(points - s) for s in shifts]
+        return np.stack(columns, axis=1) / (2 * step)
+
+    def project(self, points: Array, steps: int = 2) -> Array:
+        """Points (N,3) moved onto the zero level along the gradient."""
+        for _ in range(steps):
+            slope = self.gradient(points)
+            length2 = np.maximum(np.sum(slope * slope, axis=1), 0.05)
+            points = points - (self.field(points) / length2)[:, None] * slope
+        return points
+
+
+def _smooth_minimum(a: Array, b: Array, reach: float) -> Array:
+    """Minimum with a polynomial blend where |a - b| < reach; never above the sharp minimum."""
+    overlap = np.maximum(reach - np.abs(a - b), 0.0)
+    return np.minimum(a, b) - overlap * overlap / (4.0 * reach)
+
+
+def _section_support(points: Array, edges: Index, levels: Array, axis: int, normals: Array) -> Array:
+    """Support function (L,K) of the body's sections at `levels` along `axis`; -inf where there is none."""
+    others = [i for i in range(3) if i != axis]
+    start, end = points[edges[:, 0]], points[edges[:, 1]]
+    support = np.full((len(levels), len(normals)), -np.inf)
+    for row, level in enumerate(levels):
+        crossing = (start[:, axis] - level) * (end[:, axis] - level) <= 0
+        a, b = start[crossing], end[crossing]
+        rise = b[:, axis] - a[:, axis]
+        share = np.where(rise == 0, 0.0, (level - a[:, axis]) / np.where(rise == 0, 1.0, rise))
+        cut = (a + share[:, None] * (b - a))[:, others]
+        if len(cut):
+            support[row] = (cut @ normals.T).max(axis=0)
+    return support
+
+
+def _filled(support: Array) -> Array:
+    """Levels without a section take the nearest level's that has one."""
+    known = np.flatnonzero(np.isfinite(support[:, 0]))
+    nearest = known[np.abs(np.arange(len(support))[:, None] - known).argmin(axis=1)]
+    return support[nearest]
+
+
+def _ramp(value: Array, start: float, end: float) -> Array:
+    """0 at `start`, 1 at `end`, smooth in between (smoothstep)."""
+    t = np.clip((value - start) / (end - start), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
+    """Distance (L,P) to convex sections `support` (L,K) grown by `growth` (L,), at in-plane points (P,2)."""
+    height = plane @ normals.T  # (P,K)
+    return np.stack([(height - row).max(axis=1) - grown for row, grown in zip(support, growth, strict=True)])
+
+
+def _torso(
+    body: Body, edges: Index, points: Array, nodes: Sequence[Array], levels: tuple[float, float, float],
+    ease: float, flare: float, clearance: float, normals: Array, narrowing: float,
+) -> Array:  # fmt: skip
+    """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m].
+
+    narrowing: how much [m/m] they may come nearer again on the way down.
+    """
+    x, y, z = nodes
+    support = _filled(_section_support(points, edges, y, 1, normals))
+    mirrored = (DIRECTIONS // 2 - np.arange(DIRECTIONS)) % DIRECTIONS
+    support = np.maximum(
+        support, support[:, mirrored]
+    )  # a body that is not quite symmetric: both of its sides
+    hang, waist, hem = levels
+    below = np.flatnonzero(y <= hang)
+    fall = narrowing * y[below, None]
+    support[below] = np.maximum.accumulate((support[below] - fall)[::-1], axis=0)[::-1] + fall
+    smooth = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
+    support[below] = np.maximum(smooth, support)[below]
+    growth = clearance + ease / (2 * np.pi) * _ramp(y, hang, waist)
+    growth += flare * np.clip((waist - y) / (waist - hem), 0.0, None)  # a cone: its sides are straight
+    plane = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    field = _tube(support, growth, plane, normals).reshape(len(y), len(x), len(z)).transpose(1, 0, 2)
+    return np.maximum(field, (y - joint(body, "left_shoulder")[1])[None, :, None])
+
+
+def _sleeve(
+    body: Body, edges: Index, points: Array, nodes: Sequence[Array], cuff: float, ease: float,
+    clearance: float, normals: Array,
+) -> Array:  # fmt: skip
+    """Field (nx,ny,nz) of the left sleeve."""
+    x, y, z = nodes
+    shoulder = joint(body, "left_shoulder")[0]
+    support = _filled(_section_support(points, edges, x, 0, normals))
+    support = ndimage.gaussian_filter1d(support, 0.02 / SPACING, axis=0, mode="nearest")
+    growth = clearance + ease / (2 * np.pi) * _ramp(x, shoulder, cuff)
+    plane = np.stack(np.meshgrid(y, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    field = _tube(support, growth, plane, normals).reshape(len(x), len(y), len(z))
+    return np.maximum(field, (shoulder - x)[:, None, None])
+
+
+def _leg(
+    body: Body, edges: Index, points: Array, nodes: Sequence[Array], crotch: float, ease: float,
+    clearance: float, normals: Array,
+) -> Array:  # fmt: skip
+    """Field (nx,ny,nz) of the left leg of trousers."""
+    x, y, z = nodes
+    hip, knee = joint(body, "left_hip")[1], joint(body, "left_knee")[1]
+    support = _filled(_section_support(points, edges, y, 1, normals))
+    support = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
+    # Legs that part once do not meet again above: up from the knee the inner side only comes nearer.
+    above, inner = np.flatnonzero(y >= knee), normals[:, 0] < 0
+    support[np.ix_(above, inner)] = np.maximum.accumulate(support[np.ix_(above, inner)], axis=0)
+    growth = clearance + ease / (2 * np.pi) * _ramp(-y, -crotch, -knee)
+    plane = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    field = _tube(support, growth, plane, normals).reshape(len(y), len(x), len(z)).transpose(1, 0, 2)
+    return np.maximum(field, (y - hip)[None, :, None])
+
+
+def legs_part(body: Body, room: float) -> float:
+    """Height [m] below which trousers have two legs: `room` [m] between the left thigh's skin and x = 0."""
+    points = np.asarray(body.template, dtype=np.float64)
+    edges = _edges(body, LEG_BONES)
+    levels = np.arange(joint(body, "left_knee")[1], joint(body, "left_hip")[1], 0.5 * SPACING)
+    inner = _filled(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
+    near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
+    middle = dominated_by(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, SPACING))
+    crotch = points[middle, 1].min(initial=levels[-1]) - room  # of legs that are apart all the way up
+    return float(min(levels[near[0]], crotch) if len(near) else crotch)
+
+
+def _edges(body: Body, bones: Sequence[str]) -> Index:
+    """Edges (E,2) of the body between vertices that follow `bones`. Errors: ValueError for none."""
+    faces = np.asarray(body.faces, dtype=np.int64)
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    found = edges[dominated_by(body, bones)[edges].all(axis=1)]
+    if not len(found):
+        raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")
+    return found
+
+
+def build_surface(
+    body: Body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
+    flare: float = 0.0, waistband: bool = False, legs: bool = False,
+) -> ImplicitSurface:  # fmt: skip
+    """The surface between heights `hem` and `top`, of a garment with sleeves out to x = `cuff` (all [m]).
+
+    `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin, or
+    to hips and legs of what hangs from a `waistband`; `flare` [m] is how much further the hem stands off than
+    that place, all around. legs: as trousers. Raises ValueError for a body too large for the grid.
+    """
+    import igl
+
+    points = np.asarray(body.template, dtype=np.float64)
+    faces = np.asarray(body.faces, dtype=np.int64)
+    torso_edges, arm_edges, leg_edges = (_edges(body, b) for b in (TORSO_BONES, ARM_BONES, LEG_BONES))
+    torso, arm, leg = (dominated_by(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
+    hang = top if waistband else points[dominated_by(body, ARM_BONES[:1]), 1].min()
+    levels = hang, joint(body, "pelvis" if waistband else "spine1")[1], hem
+    margin = 0.04
+    depth = points[torso | (leg if legs else arm), 2]
+    reach = clearance + ease + flare + 2 * margin
+    side = points[torso | leg if legs else torso, 0].max() + reach if cuff is None else cuff + margin
+    low = np.array([0.0, hem - margin, depth.min() - reach])
+    high = np.array([side, top + margin, depth.max() + reach])
+    counts = np.ceil((high - low) / SPACING).astype(int) + 1
+    if not 0 < np.prod(counts.astype(float)) <= MOST_CELLS:
+        size = " x ".join(f"{length:.3g}" for length in high - low)
+        raise ValueError(f"half of it would be {size} m: give a body in metres, with its joints inside")
+    nodes = [low[i] + SPACING * np.arange(counts[i]) for i in range(3)]
+    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+    # The fast sign is a quarter of the time; it moves the distance by under a millimetre, and what is
+    # promised about clearance is enforced on the finished mesh.
+    sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
+    distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
+    hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals, TAPER * legs)
+    if cuff is not None:
+        sleeve = _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals)
+        hanging = _smooth_minimum(hanging, sleeve, ARMPIT_FILLET)
+    if legs:
+        crotch = legs_part(body, clearance + ease / (2 * np.pi))
+        tube = _leg(body, leg_edges, points, nodes, crotch, ease, clearance, normals)
+        hanging = _smooth_minimum(
+            np.maximum(hanging, (crotch - nodes[1])[None, :, None]), tube, CROTCH_FILLET
+        )
+    values = np.minimum(hanging, distance - clearance)  # a blend would add girth wherever both agree
+    ghost = 3
+    values = np.pad(values, ((ghost, 0), (0, 0), (0, 0)), mode="reflect")
+    # Rounds the creases where one solid meets another. Once alone would move a surface of radius r inward by
+    # sigma^2/(2 r); twice minus twice over cancels that.
+    soft = ndimage.gaussian_filter(values, 1.0)
+    values = 2 * soft - ndimage.gaussian_filter(soft, 1.0)
+    origin = low - [ghost * SPACING, 0, 0]
+    return ImplicitSurface(origin, SPACING, values, ndimage.spline_filter(values, order=3))

@@ -1,0 +1,170 @@
+"""Cuts through a garment's surface: where it ends, and the dense sheet with named outlines in between."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snug.body.parametric_body import Body
+from snug.garments.body_surface import SHIRT_BONES, TORSO_BONES, ImplicitSurface, dominated_by, joint
+from snug.garments.remeshing import boundary_loops
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SEAM = "seam"  # the cut at x = 0, where the half is mirrored
+# [m] in z: a bent cut is a parabola so far and level from twice as far, or it would reach a heavy chest.
+BEND_SPAN = 0.1
+NECK_ROOM = 0.01  # [m] between a neck's cut and what it must not take
+ARMPIT_ROOM = 0.02  # [m] of an armhole, below the arm, and along the shoulder
+FLANK_ROOM = 0.005  # [m] between an armhole's cut and the flanks below it
+
+
+@dataclass(frozen=True)
+class CutPlane:
+    """A plane through `point` (3,) [m]: on the side of its `normal` (3,), what has |x| < reach [m] is cut.
+
+    bend [1/m] curves it in z: bend (z - z0)^2 [m] beyond the plane, up to BEND_SPAN.
+    twin: what the mirrored opening is called, of an opening that the seam does not meet.
+    """
+
+    name: str
+    normal: tuple[float, float, float]
+    point: tuple[float, float, float]
+    reach: float = np.inf
+    bend: float = 0.0
+    twin: str = ""
+
+    def height(self, points: Array) -> Array:
+        """How far (N,) [m] points (N,3) are beyond the bent plane along its normal, whatever their x."""
+        offset = points - self.point
+        return offset @ np.asarray(self.normal) + self.bend * _saturated_square(offset[:, 2])
+
+    def beyond(self, points: Array) -> Array:
+        """How far (N,) [m] points (N,3) are on the side that is cut away; a distance to first order."""
+        return np.minimum(
+            self.height(points) / np.linalg.norm(self._slope(points), axis=1),
+            self.reach - np.abs(points[:, 0]),
+        )
+
+    def normals(self, points: Array) -> Array:
+        """Unit normals (N,3) at points (N,3) of the cut."""
+        slope = self._slope(points)
+        return slope / np.linalg.norm(slope, axis=1, keepdims=True)
+
+    def _slope(self, points: Array) -> Array:
+        slope = np.tile(np.asarray(self.normal), (len(points), 1))
+        offset = points[:, 2] - self.point[2]
+        rising = np.minimum(np.abs(offset), np.maximum(2 * BEND_SPAN - np.abs(offset), 0.0))
+        slope[:, 2] += 2 * self.bend * np.copysign(rising, offset)
+        return slope
+
+
+def _saturated_square(x: Array) -> Array:
+    """x^2 up to BEND_SPAN, constant from twice that on, with a continuous slope."""
+    missing = np.maximum(2 * BEND_SPAN - np.abs(x), 0.0)
+    return np.where(np.abs(x) <= BEND_SPAN, x**2, 2 * BEND_SPAN**2 - missing**2)
+
+
+SEAM_CUT = CutPlane(SEAM, (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def level_cut(name: str, height: float, *, down: bool = False) -> CutPlane:
+    """What is above that height [m] is cut, or what is below it."""
+    return CutPlane(name, (0.0, -1.0 if down else 1.0, 0.0), (0.0, height, 0.0))
+
+
+def neck_cut(body: Body, clearance: float) -> CutPlane:
+    """A crew neck: at the neck's joint on the shoulders, bent down in front and a little behind.
+
+    Lifted where shoulders stand so high that the cut would take them with it.
+    """
+    neck, shoulder = joint(body, "neck"), joint(body, "left_shoulder")[0]
+    cut = CutPlane("neck", (0.0, 1.0, 0.3), (0.0, neck[1], neck[2]), reach=0.85 * shoulder, bend=3.0)
+    skin = body.template[dominated_by(body, SHIRT_BONES)]
+    over = skin[np.abs(np.abs(skin[:, 0]) - cut.reach) < 0.1 * shoulder]
+    lift = max(0.0, cut.height(over).max(initial=-np.inf) + clearance + NECK_ROOM)
+    return replace(cut, point=(0.0, neck[1] + lift, neck[2]))
+
+
+def armhole_cut(
+    body: Body, neck: CutPlane, *, strap: float, ease: float, clearance: float, hem: float, flare: float
+) -> CutPlane:
+    """A plane from a strap's width [m] beside the neck to under the arm, leaning outwards so far that the
+    flanks stay, with what build_surface adds to them.
+    """
+    shoulder, skin = joint(body, "left_shoulder"), body.template
+    arm = skin[dominated_by(body, ("left_shoulder",))]
+    under = arm[arm[:, 0] < shoulder[0] + ARMPIT_ROOM, 1].min(initial=shoulder[1]) - ARMPIT_ROOM
+    shirt = skin[dominated_by(body, SHIRT_BONES)]
+    collar = skin[dominated_by(body, (*SHIRT_BONES, "neck"))]
+    edge = strap + clearance + collar[neck.beyond(collar) > -clearance, 0].max(initial=0.0)
+    over = shirt[np.abs(shirt[:, 0] - edge) < ARMPIT_ROOM]
+    top = over[:, 1].max(initial=shoulder[1]) + clearance
+    flank = skin[dominated_by(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
+    flank = flank[np.argsort(-flank[:, 1])]
+    wide = np.append(np.maximum.accumulate(np.abs(flank[:, 0])), np.abs(flank[:, 0]).max(initial=edge))
+    down = top - np.append(flank[:, 1], hem)
+    grown = clearance + ease / (2 * np.pi) + flare * down / down[-1] + FLANK_ROOM
+    lean = ((wide + grown - edge) / down).max()
+    return CutPlane("left_armhole", (1.0, lean, 0.0), (edge, top, 0.0), twin="right_armhole")
+
+
+def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, Index]:
+    """The surface as a dense mesh between the cuts: points (N,3) [m], faces (M,3), wound outward."""
+    import pyvista
+
+    grid = pyvista.ImageData(
+        dimensions=surface.values.shape,
+        spacing=(surface.spacing,) * 3,
+        origin=tuple(map(float, surface.origin)),
+    )
+    grid["field"] = surface.values.ravel(order="F")
+    sheet = grid.contour([0.0], scalars="field")
+    for cut in cuts:
+        sheet["cut"] = cut.beyond(np.asarray(sheet.points, dtype=np.float64))
+        sheet = sheet.clip_scalar(scalars="cut", value=0.0)
+        # Clipping interpolates linearly along edges: onto a bent cut by one Newton step.
+        points = np.asarray(sheet.points, dtype=np.float64)
+        off = cut.beyond(points)
+        near = np.abs(off) < 2e-4
+        points[near] -= off[near, None] * cut.normals(points[near])
+        sheet.points = points
+    sheet = sheet.triangulate().clean(tolerance=1e-6).connectivity("largest")
+    points = np.asarray(sheet.points, dtype=np.float64)
+    faces = np.asarray(sheet.regular_faces, dtype=np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    if np.sum(np.cross(b - a, c - a) * surface.gradient((a + b + c) / 3)) < 0:
+        faces = faces[:, ::-1]
+    return points, faces
+
+
+def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tuple[str, Array]]]:
+    """Per boundary loop of a cut sheet its named curves (P,3) [m], end to end along the winding.
+
+    Errors: ValueError where the surface is open but no cut was made.
+    """
+    found = []
+    for loop in boundary_loops(faces):
+        distance = np.abs(np.stack([cut.beyond(points[loop]) for cut in cuts]))
+        on = distance < 1e-5
+        corners = np.flatnonzero(on.sum(axis=0) > 1)
+        if len(corners) == 0:
+            found.append([(cuts[int(np.argmin(distance.sum(axis=1)))].name, points[loop])])
+            continue
+        loop, on = np.roll(loop, -corners[0]), np.roll(on, -corners[0], axis=1)
+        # Clipping can leave a corner twice, some micrometres apart: the second of the two is dropped.
+        corner = on.sum(axis=0) > 1
+        kept = ~(corner & np.roll(corner, 1) & (on == np.roll(on, 1, axis=1)).all(axis=0))
+        loop, on = loop[kept], on[:, kept]
+        stops = [*np.flatnonzero(on.sum(axis=0) > 1), len(loop)]
+        ring = np.append(loop, loop[0])
+        curves = []
+        for begin, end in pairwise(stops):
+            middle = np.flatnonzero(on[:, begin + 1 : end].all(axis=1))
+            if len(middle) != 1 or end - begin < 2:
+                raise ValueError("the surface has an opening that no cut made")
+            curves.append((cuts[int(middle[0])].name, points[ring[begin : end + 1]]))
+        found.append(curves)
+    return found

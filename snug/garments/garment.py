@@ -1,0 +1,117 @@
+"""Garments on a body: triangles, and per vertex the body vertex and skinning weights it borrows.
+
+The T-pose shape of a garment is its rest shape, unless it has a UV chart: areas, Dm^-1, masses and hinges all
+come from one of the two.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array, csr_array
+
+from reference_sim.cloth import Cloth
+from reference_sim.material import Material
+from snug.body.parametric_body import Body
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SHAPE_SMOOTHING = 10  # rounds over a shape's displacement: nearest vertices jump from leg to leg
+
+
+class GarmentError(ValueError):
+    """A garment that cannot be tailored as asked; the message names the parameter and its range."""
+
+
+@dataclass(frozen=True, eq=False)
+class Garment:
+    """A garment on the unposed body. Arrays are not to be written to.
+
+    rest_positions: (V,3) [m]. faces: (F,3), outward. body_vertices: (V,) nearest body vertex among those it
+    may follow. skinning_weights: (V,24), that vertex's own, smoothed where it hangs between the legs; rows
+    sum to one. authored_weights: whether somebody made those weights for this garment, so that no recipe
+    smooths them. rest_uv: (F,3,2) [m] of the faces' corners, the flat rest state of a garment that has one;
+    else rest_positions is its rest shape too.
+    loops: name ("neck", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "hem", "waist",
+    "left_leg", "right_leg") -> boundary vertices in order along the faces' winding, from the front-most
+    vertex on. pins: (P,), ascending, what the body carries: a waistband, since contact without friction does
+    not hold it. parameters: what it was tailored with.
+    """
+
+    name: str
+    rest_positions: Array
+    faces: Index
+    body_vertices: Index
+    skinning_weights: Array
+    loops: Mapping[str, Index] = field(default_factory=dict)
+    pins: Index = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    material: Material = field(default_factory=Material)
+    rest_uv: Array | None = None
+    authored_weights: bool = False
+
+    def cloth(self, material: Material | None = None) -> Cloth:
+        """The one rest state of simulator, loss and metrics, with the garment's own material or another.
+
+        Raises MeshError for a mesh that cannot be simulated.
+        """
+        return Cloth(
+            self.rest_positions, self.faces, material or self.material, pins=self.pins, rest_uv=self.rest_uv
+        )
+
+    @property
+    def hem(self) -> Index:
+        """Vertices (n,) of the hem, in order; of trousers those of both legs."""
+        if "hem" in self.loops:
+            return self.loops["hem"]
+        return np.concatenate([self.loops["left_leg"], self.loops["right_leg"]])
+
+    def body_transported(
+        self, body: Body, poses: Array, translations: Array, betas: ArrayLike | None = None
+    ) -> Array:
+        """Where the pins are (T,P,3) [m] on the body of that shape in poses (T,24,3) [rad] at translations
+        (T,3) [m].
+        """
+        if not len(self.pins):
+            return np.empty((len(poses), 0, 3))  # and torch, which poses the joints, is not loaded
+        transforms = body.transforms(poses, translations, betas)
+        blended = np.einsum("pj,tjab->tpab", self.skinning_weights[self.pins], transforms)
+        rest = self.rest_for(body, betas)[self.pins]
+        turned = np.einsum("tpab,pb->tpa", blended[..., :3], rest)
+        return turned + blended[..., 3]
+
+    def rest_for(self, body: Body, betas: ArrayLike | None) -> Array:
+        """Rest positions (V,3) [m] on the body of shape `betas`: each vertex moves as the skin below it does.
+
+        The displacement of the nearest body vertex, smoothed over the garment.
+        """
+        if betas is None:
+            return self.rest_positions.copy()
+        displacement = (body.shaped(betas) - body.template)[self.body_vertices]
+        return self.rest_positions + _averaged(displacement, self.faces, SHAPE_SMOOTHING)
+
+
+def smooth_weights(weights: ArrayLike, faces: Index, iterations: int) -> Array:
+    """Skinning weights (V,24) after `iterations` rounds of averaging each vertex with its neighbours' mean.
+
+    Half the vertex, half the mean (uniform Laplacian): rows keep their sum and stay non-negative.
+    """
+    if iterations < 0:
+        raise GarmentError(f"iterations={iterations}: smoothing needs 0 rounds or more")
+    return _averaged(np.asarray(weights, dtype=np.float64), faces, iterations)
+
+
+def _averaged(values: Array, faces: Index, rounds: int) -> Array:
+    neighbours = _adjacency(faces, len(values))
+    degree = np.asarray(neighbours.sum(axis=1)).reshape(-1, 1)
+    for _ in range(rounds):
+        values = 0.5 * values + 0.5 * (neighbours @ values) / degree
+    return values
+
+
+def _adjacency(faces: Index, count: int) -> csr_array:
+    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    both = np.unique(np.concatenate([halves, halves[:, ::-1]]), axis=0)
+    return coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count)).tocsr()

@@ -1,0 +1,71 @@
+"""Names of a garment's openings by their place on the body: neck, sleeves, hem, waist, legs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snug.body.parametric_body import Body
+from snug.garments.body_surface import joint
+from snug.garments.remeshing import boundary_loops
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
+MIDDLE = 0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
+
+
+def named_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
+    """Name -> boundary vertices in order, from the front-most on, of a garment (V,3) [m] on the unposed body.
+
+    An opening beside the middle is a sleeve above the hips, or far out, and a leg else; a sleeve that ends
+    near the shoulder's joint is an armhole. In the middle the highest is the neck, above half the way from
+    pelvis to neck, or else the waist, and the lowest the hem; one that is alone there is the hem, unless
+    there are legs. The lowest of all is called hem too where no other is, but for two legs. Others are
+    opening_1 and so on. Raises ValueError where loops touch.
+    """
+    loops = [np.roll(loop, -int(np.argmax(positions[loop, 2]))) for loop in boundary_loops(faces)]
+    if not loops:
+        return {}
+    centres = [positions[loop].mean(axis=0) for loop in loops]
+    found: dict[str, Index] = {}
+    # The longest loop comes first: of two with one claim it has the name, a slit or a buttonhole has not.
+    middle = []
+    for loop, centre in zip(loops, centres):
+        side = _beside(body, centre)
+        if not side:
+            middle.append((loop, centre))
+        elif side not in found:
+            found[side] = loop
+    found |= _in_the_middle(body, middle, legs="left_leg" in found or "right_leg" in found)
+    if not {"left_leg", "right_leg"} <= found.keys():
+        found.setdefault("hem", loops[int(np.argmin([centre[1] for centre in centres]))])
+    named = {int(loop[0]) for loop in found.values()}
+    rest = (loop for loop in loops if int(loop[0]) not in named)
+    return found | {f"opening_{number}": loop for number, loop in enumerate(rest, start=1)}
+
+
+def _beside(body: Body, centre: Array) -> str:
+    """The sleeve or leg that ends there, or nothing in the middle."""
+    hip, shoulder = joint(body, "left_hip"), joint(body, "left_shoulder")
+    middle = joint(body, "pelvis")[0]
+    out = abs(centre[0] - middle)
+    if out < MIDDLE * (hip[0] - middle):
+        return ""
+    arm = float(np.linalg.norm(joint(body, "left_elbow") - shoulder))
+    beyond = out > shoulder[0] - middle + ARMHOLE * arm
+    limb = "sleeve" if beyond else "armhole" if centre[1] > hip[1] else "leg"
+    return f"{'left' if centre[0] > middle else 'right'}_{limb}"
+
+
+def _in_the_middle(body: Body, loops: list[tuple[Index, Array]], legs: bool) -> dict[str, Index]:
+    if not loops:
+        return {}
+    by_height = sorted(loops, key=lambda pair: -pair[1][1])
+    (top, centre), (bottom, _) = by_height[0], by_height[-1]
+    half_way = 0.5 * (joint(body, "pelvis")[1] + joint(body, "neck")[1])
+    name = "neck" if centre[1] > half_way else "waist"
+    if len(loops) == 1:
+        return {name if legs else "hem": top}
+    return {name: top, "hem": bottom}

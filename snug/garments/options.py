@@ -1,0 +1,102 @@
+"""A garment from a file: a mesh that somebody made for the body, and how to take it.
+
+Light to import; snug.garments.reading reads it.
+"""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, Namespace
+from dataclasses import dataclass
+from pathlib import Path
+
+SUFFIXES = (".obj", ".ply", ".vtk", ".vtp", ".vtu", ".stl", ".off")
+OPTION = "--garment-"
+RESTS = ("mesh", "uv")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GarmentFile:
+    """A mesh file and how to take it.
+
+    units, up: of the file; shift: [m] added then. rest: "mesh" or "uv", what has no strain; uv_scale: metres
+    per unit of the chart, by default the file's unit. material: a file of reference_sim.Material.
+    """
+
+    path: Path
+    units: str = "m"
+    up: str = "y"
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rest: str = "mesh"
+    uv_scale: float | None = None
+    material: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """What scenes and networks call it."""
+        return self.path.stem
+
+    @property
+    def weights(self) -> Path:
+        """Where authored skinning weights are looked for: array "weights" (V, 24) of <name>.weights.npz."""
+        return self.path.with_name(f"{self.name}.weights.npz")
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that it is read from."""
+        found = [self.path, *([self.weights] if self.weights.is_file() else [])]
+        return (*found, self.material) if self.material else tuple(found)
+
+
+def is_file_name(word: str) -> bool:
+    """Whether a garment is named by its file."""
+    return Path(word).suffix.lower() in SUFFIXES
+
+
+def add_garment_options(parser: ArgumentParser) -> None:
+    """How to take a garment that is a file."""
+    add = parser.add_argument_group("a garment that is a file").add_argument
+    add(f"{OPTION}units", default="m", choices=("m", "cm", "mm", "in"), help="of the file (default m)")
+    add(f"{OPTION}up", default="y", choices=("y", "z"), help="up axis of the file (default y)")
+    add(f"{OPTION}shift", default="0,0,0", metavar="DX,DY,DZ",
+        help="metres to add then, where the body stood elsewhere; with '=' if DX is below 0")  # fmt: skip
+    add(f"{OPTION}rest", default="mesh", choices=RESTS,
+        help="what has no strain: the mesh (default), or its UV chart, the sewing pattern")  # fmt: skip
+    add(f"{OPTION}uv-scale", type=float, metavar="M",
+        help="metres per unit of the chart (default: the file's unit)")  # fmt: skip
+    add(f"{OPTION}material", metavar="FILE",
+        help=".toml or .json of young_modulus [Pa], poisson_ratio, thickness [m], density [kg/m^3], "
+        "bending_stiffness [J] (default: the cotton of the paper)")  # fmt: skip
+
+
+def demand_a_file(options: Namespace) -> None:
+    """Raises ValueError for an option of `add_garment_options` where no garment is a file."""
+    plain = ArgumentParser()
+    add_garment_options(plain)
+    for name, default in vars(plain.parse_args([])).items():
+        if getattr(options, name) != default:
+            raise ValueError(
+                f"--{name.replace('_', '-')} is for a garment that is a file: add --garment FILE"
+            )
+
+
+def garment_file(path: str, options: Namespace) -> GarmentFile:
+    """The file with the options of `add_garment_options`. Raises ValueError for one that means nothing."""
+    try:
+        shift = tuple(float(word) for word in options.garment_shift.split(","))
+    except ValueError:
+        shift = ()
+    if len(shift) != 3 or not all(map(math.isfinite, shift)):
+        raise ValueError(f"{OPTION}shift {options.garment_shift!r}: give three numbers [m], as 0,0.1,0")
+    if options.garment_uv_scale is not None and options.garment_rest != "uv":
+        raise ValueError(f"{OPTION}uv-scale is for a rest shape from UV: add {OPTION}rest uv")
+    x, y, z = shift
+    return GarmentFile(
+        path=Path(path),
+        units=options.garment_units,
+        up=options.garment_up,
+        shift=(x, y, z),
+        rest=options.garment_rest,
+        uv_scale=options.garment_uv_scale,
+        material=Path(options.garment_material) if options.garment_material else None,
+    )

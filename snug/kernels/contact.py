@@ -1,0 +1,150 @@
+"""Kernels of the contact cache: normals of the skin, planes at anchors, and the energy of all samples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference_sim.contact.anchor_walk import walk_to_foot
+from reference_sim.geometry.surface import vertex_normals
+from reference_sim.kernels.kernel_cache import njit
+from snug.kernels.lanes import LANES
+from snug.kernels.vector_rows import mixed_rows
+
+PARTS = 255.0  # of a barycentric coordinate
+
+
+@njit(cache=True, error_model="numpy")
+def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Vertex normals of positions (N, P, 3) as int8, 127 times unit length, see Patch.normals."""
+    normals = np.empty(positions.shape, np.int8)
+    for frame in range(len(positions)):
+        normals[frame] = np.rint(np.float32(127.0) * vertex_normals(positions[frame], faces))
+    return normals
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _interpolated(
+    faces: np.ndarray, face: np.integer, parts: np.ndarray, vectors: np.ndarray, c: int
+) -> np.float32:
+    """Component c of what vectors (P, 3) of the body's vertices are at an anchor."""
+    v, w = np.float32(parts[0]) / np.float32(PARTS), np.float32(parts[1]) / np.float32(PARTS)
+    u = np.float32(1.0) - v - w
+    return u * vectors[faces[face, 0], c] + v * vectors[faces[face, 1], c] + w * vectors[faces[face, 2], c]
+
+
+@njit(cache=True, error_model="numpy")
+def interpolated_planes(
+    frames: np.ndarray,
+    rows: np.ndarray,
+    positions: np.ndarray,
+    normals: np.ndarray,
+    faces: np.ndarray,
+    anchor_faces: np.ndarray,
+    barycentric: np.ndarray,
+    out_points: np.ndarray,
+    out_normals: np.ndarray,
+) -> None:
+    """Points and unit normals (N, S, 3) of the anchors of frames (N,), see ContactCache.planes."""
+    for n in range(len(frames)):
+        x, m = positions[rows[n]], normals[rows[n]]
+        anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
+        for s in range(anchors.shape[0]):
+            length = np.float32(0.0)
+            for c in range(3):
+                out_points[n, s, c] = _interpolated(faces, anchors[s], parts[s], x, c)
+                direction = _interpolated(faces, anchors[s], parts[s], m, c)
+                out_normals[n, s, c] = direction
+                length += direction * direction
+            length = np.sqrt(length) + np.float32(1e-30)
+            for c in range(3):
+                out_normals[n, s, c] /= length
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _above(
+    x0: np.float32,
+    x1: np.float32,
+    x2: np.float32,
+    skin: np.ndarray,
+    m: np.ndarray,
+    faces: np.ndarray,
+    face: np.uint32,
+    parts: np.ndarray,
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """Height of a sample above its anchor's plane, times the length of the normal; and that normal.
+
+    skin, m: positions and normals of the body, flat as `mixed_rows` wants them.
+    """
+    i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+    whole = np.float32(1.0) / np.float32(PARTS)
+    v, w = whole * np.float32(parts[0]), whole * np.float32(parts[1])
+    u = np.float32(1.0) - v - w
+    c0, c1, c2 = mixed_rows(skin, i, j, k, u, v, w)
+    n0, n1, n2 = mixed_rows(m, i, j, k, u, v, w)
+    return n0 * (x0 - c0) + n1 * (x1 - c1) + n2 * (x2 - c2), n0, n1, n2
+
+
+# No assumption on NaN or infinity: the guard of training must see them.
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
+def contact_energy(
+    x: np.ndarray, stencils: np.ndarray, weights: np.ndarray, stiffness: np.ndarray, margin: np.float32,
+    power: int, frames: np.ndarray, rows: np.ndarray, positions: np.ndarray, normals: np.ndarray,
+    faces: np.ndarray, adjacency: np.ndarray, centroids: np.ndarray, homes: np.ndarray, region: np.float32,
+    slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
+    gradients: np.ndarray,
+) -> None:  # fmt: skip
+    """k max(margin - d, 0)^power of each sample, summed: values (C, LANES), and added up: gradients like x.
+
+    x (C, V, 3, LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first asked
+    whether it counts from the end. Most samples are out of reach, and for them it is the loads that count:
+    what they read of a frame is first laid together.
+    """
+    # Normals have 127 times unit length, within 0.9 by rounding.
+    reach = np.float32(128.0) * (margin + slack if walk else margin)
+    zero, corners = np.float32(0.0), np.empty((1, 3, 3), np.float32)
+    vertices, size = x.shape[1], 3 * positions.shape[1]
+    garment = np.zeros(3 * vertices + 1, np.float32)
+    skin, m = np.zeros(size + 1, np.float32), np.zeros(size + 1, np.float32)
+    for n in range(frames.size):
+        frame, window = divmod(n, len(frames))
+        block, lane = divmod(n, LANES)
+        for v in range(vertices):
+            for c in range(3):
+                garment[3 * v + c] = x[block, v, c, lane]
+        body = positions[rows[window, frame]]
+        given, given_normals = body.ravel(), normals[rows[window, frame]].ravel()
+        for c in range(len(given)):
+            skin[c], m[c] = given[c], given_normals[c]
+        anchors, parts = anchor_faces[frames[window, frame]], barycentric[frames[window, frame]]
+        total = 0.0
+        for s in range(len(stencils)):
+            face = np.uint32(anchors[s])
+            a, b, c = stencils[s, 0], stencils[s, 1], stencils[s, 2]
+            p, q, r = weights[s, 0], weights[s, 1], weights[s, 2]
+            x0, x1, x2 = mixed_rows(garment, a, b, c, p, q, r)
+            along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, face, parts[s])
+            if along >= reach:
+                continue
+            if walk and along < reach:  # not a sample that is no number
+                face, v, w = walk_to_foot(
+                    x0, x1, x2, face, body, faces, adjacency, centroids, homes, s, region, corners
+                )
+                anchors[s] = face
+                parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))
+                third = np.rint(np.float32(PARTS) * w)
+                parts[s, 1] = np.uint8(min(third, np.float32(PARTS) - np.float32(parts[s, 0])))
+                along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, np.uint32(anchors[s]), parts[s])
+            length = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + np.float32(1e-30)
+            depth = margin - along / length
+            if depth <= zero:
+                continue
+            force = stiffness[s]
+            for _ in range(power - 1):
+                force *= depth
+            total += force * depth
+            force *= -np.float32(power) / length
+            for corner, share in ((a, p), (b, q), (c, r)):
+                gradients[block, corner, 0, lane] += share * force * n0
+                gradients[block, corner, 1, lane] += share * force * n1
+                gradients[block, corner, 2, lane] += share * force * n2
+        values[block, lane] = total

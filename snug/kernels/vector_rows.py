@@ -1,0 +1,76 @@
+"""Rows of numbers that a kernel moves in vector registers where the compiler on its own would not.
+
+numba vectorises long loops. A short loop of known length it writes out number by number, and what was stored
+in single numbers cannot be loaded as a vector before all of it has reached the cache: that costs a kernel
+more than its arithmetic.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from snug.kernels.lanes import LANES
+
+WIDE = ir.IntType(64)
+_intrinsic: Any = intrinsic  # to a caller it has not the arguments of the function that types it
+
+
+@_intrinsic
+def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
+    """Row j of target becomes row i of source: rows of LANES numbers in flat float32 arrays."""
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        numbers = builder.load(_place(context, builder, signature.args[:2], args[:2], LANES, LANES), align=4)
+        builder.store(numbers, _place(context, builder, signature.args[2:], args[2:], LANES, LANES), align=4)
+        return context.get_dummy_value()
+
+    return types.void(source, i, target, j), built
+
+
+@_intrinsic
+def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
+    """Row i of source is added to row j of target, which may also be one of float64."""
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        numbers = builder.load(_place(context, builder, signature.args[:2], args[:2], LANES, LANES), align=4)
+        place = _place(context, builder, signature.args[2:], args[2:], LANES, LANES)
+        if signature.args[2].dtype == types.float64:
+            numbers = builder.fpext(numbers, place.type.pointee)
+        builder.store(builder.fadd(builder.load(place, align=4), numbers), place, align=4)
+        return context.get_dummy_value()
+
+    return types.void(source, i, target, j), built
+
+
+@_intrinsic
+def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
+    """u rows[i] + v rows[j] + w rows[k], three numbers: rows of three in a flat float32 array, and one number
+    more after the last, for a row is loaded as four.
+    """
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        four, total = ir.VectorType(ir.FloatType(), 4), None
+        for row, weight, kind in zip(args[1:4], args[4:], signature.args[1:4]):
+            place = _place(context, builder, (rows, kind), (args[0], row), 3, 4)
+            numbers = builder.load(place, align=4)
+            spread = ir.Constant(four, ir.Undefined)
+            for lane in range(4):
+                spread = builder.insert_element(spread, weight, ir.IntType(32)(lane))
+            term = builder.fmul(spread, numbers, flags=("contract",))
+            total = term if total is None else builder.fadd(total, term, flags=("contract",))
+        parts = [builder.extract_element(total, ir.IntType(32)(n)) for n in range(3)]
+        return context.make_tuple(builder, signature.return_type, parts)
+
+    return types.UniTuple(types.float32, 3)(rows, i, j, k, u, v, w), built
+
+
+def _place(context: Any, builder: Any, kinds: Any, args: Any, size: int, loaded: int) -> Any:
+    """Where a row of `size` numbers begins, as a vector. kinds, args: of array and row number."""
+    array, number = kinds
+    start = context.make_array(array)(context, builder, args[0]).data
+    place = builder.gep(start, [builder.mul(context.cast(builder, args[1], number, types.intp), WIDE(size))])
+    return builder.bitcast(place, ir.VectorType(context.get_value_type(array.dtype), loaded).as_pointer())

@@ -1,0 +1,1 @@
+"""Motions: joint rotations over time, the embedded library, files of motion capture."""

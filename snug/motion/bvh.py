@@ -1,0 +1,182 @@
+"""Biovision motion capture (.bvh): a hierarchy of joints with offsets, and a line of channels per frame.
+
+Format: M. Meredith and S. Maddock, Motion capture file formats explained, University of Sheffield, 2001.
+The channels of a joint are applied to a column vector from the last to the first. With all of them zero the
+joints stand at the sums of their offsets: the zero pose.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from snug.motion.motion import MotionError
+from snug.motion.recording import check_length, open_text
+
+MOST_JOINTS = 1000
+MOST_TURNS = 5_000_000  # joints times frames: 11 minutes of 60 joints at 120 frames per second
+CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
+
+
+@dataclass
+class Joint:
+    """parent: index, -1 for the root; offset: (3,) in the file's unit; channels: "Xposition" and so on, from
+    column `first` of the frames on. An end site is a joint without channels and without a name.
+    """
+
+    name: str
+    parent: int
+    offset: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    channels: tuple[str, ...] = ()
+    first: int = 0
+
+
+@dataclass(frozen=True)
+class Clip:
+    """joints, parents first; frames: (T, C) numbers; fps [1/s], None where the file states none."""
+
+    joints: list[Joint]
+    frames: np.ndarray
+    fps: float | None
+
+    def turns(self, joint: Joint) -> np.ndarray:
+        """Rotation of a joint relative to its parent, (T, 3, 3)."""
+        from scipy.spatial.transform import Rotation
+
+        rotation = Rotation.identity(len(self.frames))
+        for column, channel in enumerate(joint.channels, joint.first):
+            if channel.endswith("rotation"):
+                angles = self.frames[:, column, None]
+                rotation = rotation * Rotation.from_euler(channel[0].lower(), angles, degrees=True)
+        return rotation.as_matrix()
+
+    def shift(self, joint: Joint) -> np.ndarray:
+        """Place of a joint in its parent's axes, (T, 3): its positions where it has any, else its offset."""
+        shift = np.tile(joint.offset, (len(self.frames), 1))
+        for column, channel in enumerate(joint.channels, joint.first):
+            if channel.endswith("position"):
+                shift[:, "XYZ".index(channel[0])] = self.frames[:, column]
+        return shift
+
+
+class _Lines:
+    """The lines of a file that are not empty, as words; the last one read stands for messages."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.number = path, 0
+        self._lines: Iterator[tuple[int, str]] = iter(enumerate(open_text(path), 1))
+
+    def next(self) -> list[str]:
+        """Raises MotionError at the end of the file."""
+        for words in self.rest():
+            return words
+        raise MotionError(f"{self.path}: ends in line {self.number}, before it is whole; export it again")
+
+    def rest(self) -> Iterator[list[str]]:
+        for number, line in self._lines:
+            if words := line.split():
+                self.number = number
+                yield words
+
+    def error(self, problem: str) -> MotionError:
+        return MotionError(f"{self.path}, line {self.number}: {problem}")
+
+    def expect(self, *words: str) -> list[str]:
+        """The rest of a line that begins with these words, in any case. Raises MotionError."""
+        found = self.next()
+        if [word.lower() for word in found[: len(words)]] != [word.lower() for word in words]:
+            raise self.error(
+                f"'{' '.join(found)[:40]}' where '{' '.join(words)}' should be; is it a .bvh file?"
+            )
+        return found[len(words) :]
+
+    def numbers(self, words: list[str], count: int) -> list[float]:
+        """Raises MotionError for another count, and for what is no finite number."""
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = [math.nan]
+        if len(values) != count or not all(map(math.isfinite, values)):
+            raise self.error(f"{count} finite numbers should be here, not '{' '.join(words)[:40]}'")
+        return values
+
+
+def read_clip(path: Path) -> Clip:
+    """Parse a file. Raises MotionError, naming file and line, for what is damaged, cut off or too large."""
+    lines = _Lines(path)
+    lines.expect("HIERARCHY")
+    joints = _hierarchy(lines)
+    columns = joints[-1].first + len(joints[-1].channels)
+    frames, frame_time = _header(lines, len(joints))
+    rows: list[np.ndarray] = []
+    for words in lines.rest():
+        if len(rows) == frames:
+            raise lines.error(f"more than the {frames} frames that 'Frames:' declares; export it again")
+        rows.append(np.array(lines.numbers(words, columns)))
+    if len(rows) < frames:
+        raise MotionError(
+            f"{path}: declares {frames} frames and holds {len(rows)}; it is cut off, export it again"
+        )
+    return Clip(joints, np.stack(rows), 1.0 / frame_time if frame_time else None)
+
+
+def _hierarchy(lines: _Lines) -> list[Joint]:
+    joints: list[Joint] = []
+    open_joints: list[int] = []
+    columns = 0
+    words = lines.next()
+    while True:
+        word = words[0].lower()
+        if word in ("root", "joint", "end"):
+            if (word == "root") != (not joints):
+                raise lines.error("there is one ROOT, and JOINTs and End Sites below it")
+            name = "" if word == "end" else " ".join(words[1:])
+            if word != "end" and (not name or any(joint.name == name for joint in joints)):
+                raise lines.error(f"joint '{name[:40]}' has no name or one that is taken")
+            if len(joints) == MOST_JOINTS:
+                raise lines.error(f"more than {MOST_JOINTS} joints; is it the skeleton of one body?")
+            joints.append(Joint(name, open_joints[-1] if open_joints else -1, first=columns))
+            open_joints.append(len(joints) - 1)
+            lines.expect("{")
+        elif not open_joints:
+            raise lines.error(f"'{words[0][:40]}' where ROOT should be; is it a .bvh file?")
+        elif word == "offset":
+            joints[open_joints[-1]].offset = np.array(lines.numbers(words[1:], 3))
+        elif word == "channels" and open_joints[-1] == len(joints) - 1 and columns == joints[-1].first:
+            joints[-1].channels = _channels(lines, words)
+            columns += len(joints[-1].channels)
+        elif word == "}":
+            open_joints.pop()
+            if not open_joints:
+                return joints
+        else:
+            raise lines.error(f"'{' '.join(words)[:40]}' is not known in a hierarchy, or out of place")
+        words = lines.next()
+
+
+def _channels(lines: _Lines, words: list[str]) -> tuple[str, ...]:
+    known = {channel.lower(): channel for channel in CHANNELS}
+    channels = tuple(known.get(word.lower(), "") for word in words[2:])
+    if words[1:2] != [str(len(channels))] or len(set(channels)) != len(channels) or "" in channels:
+        raise lines.error(f"'{' '.join(words)[:60]}' declares other channels than it names, or unknown ones")
+    return channels
+
+
+def _header(lines: _Lines, joints: int) -> tuple[int, float | None]:
+    """Number of frames, and seconds a frame where it is stated."""
+    lines.expect("MOTION")
+    words = lines.expect("Frames:")
+    if len(words) != 1 or not (words[0].isascii() and words[0].isdigit() and len(words[0]) < 10):
+        raise lines.error(f"'{' '.join(words)[:40]}' is no number of frames")
+    frames = int(words[0])
+    check_length(lines.path, frames)
+    if frames * joints > MOST_TURNS:
+        raise lines.error(f"{frames} frames of {joints} joints are too many; cut the clip")
+    seconds = lines.numbers(lines.expect("Frame", "Time:"), 1)[0]
+    if seconds < 0:
+        raise lines.error("the frame time is negative")
+    return frames, seconds or None

@@ -1,0 +1,128 @@
+"""From a BVH clip to ours: every limb points where theirs does.
+
+As in snug.motion.acclaim_to_smpl: with W our resting axes in their zero pose and B_j = W A_j, our joint j turns by
+G_j = G_b B_j, where A_j turns our resting limb into theirs by the smallest angle. Their zero pose must be a
+T or A pose, since nothing else says how a limb is twisted about itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from snug.body.skeleton import JOINT, JOINT_NAMES, LEG_LENGTH, PARENTS, REST_JOINTS, rotation_matrices
+from snug.motion.acclaim_to_smpl import LIMBS, foot_alignment, relative_poses
+from snug.motion.bvh import Clip, read_clip
+from snug.motion.joint_names import find_joints
+from snug.motion.motion import MotionError
+from snug.motion.options import Reading
+from snug.motion.recording import Recording, rate
+
+# How far a limb of the zero pose may be turned from ours: legs astride, arms down.
+ASTRIDE, ARMS_DOWN = np.deg2rad(60.0), np.deg2rad(95.0)
+
+
+def read_bvh(path: Path, reading: Reading) -> Recording:
+    """A .bvh of one body, whatever its unit of length: the path is scaled by the length of the legs.
+
+    Raises MotionError.
+    """
+    clip = read_clip(path)
+    names = [joint.name for joint in clip.joints]
+    parents = [joint.parent for joint in clip.joints]
+    found = find_joints(path, names, parents, reading.joint_map)
+    places = np.zeros((len(names), 3))
+    for index, joint in enumerate(clip.joints):
+        places[index] = joint.offset + (places[joint.parent] if joint.parent >= 0 else 0.0)
+    axes, leg = _standing(path, places, found)
+    turned, pelvis = _moved(clip, found)
+    rotations = np.empty((len(clip.frames), len(JOINT_NAMES), 3, 3))
+    for ours, name in enumerate(JOINT_NAMES):
+        if name in found:
+            rotations[:, ours] = turned[found[name]] @ axes @ _alignment(path, name, places @ axes, found)
+        else:
+            rotations[:, ours] = rotations[:, PARENTS[ours]]
+    return Recording(
+        path=path, poses=relative_poses(rotations), translations=LEG_LENGTH / leg * pelvis,
+        fps=rate(path, clip.fps, reading), source=f"{path.name} ({len(found)} of 24 joints)",
+    )  # fmt: skip
+
+
+def _standing(path: Path, places: np.ndarray, found: Mapping[str, int]) -> tuple[np.ndarray, float]:
+    """W, our axes as columns (3, 3) in the zero pose with joints at places (J, 3), and its leg's length.
+
+    Up is the axis nearest to the way from ankles to head; left leads from hip to hip. Raises MotionError.
+    """
+    at = {name: places[index] for name, index in found.items()}
+    leg = sum(
+        float(np.linalg.norm(at[near] - at[far]))
+        for near, far in (("left_hip", "left_knee"), ("left_knee", "left_ankle"))
+    )
+    way = at["head"] - 0.5 * (at["left_ankle"] + at["right_ankle"])
+    up = np.zeros(3)
+    up[np.abs(way).argmax()] = np.sign(way[np.abs(way).argmax()])
+    left = at["left_hip"] - at["right_hip"]
+    left -= up * (up @ left)
+    across = float(np.linalg.norm(left))
+    if not (1e-6 < leg < 1e6 and across > 1e-3 * leg and up.any()):
+        raise MotionError(f"{path}: legs or hips of its zero pose have no length; export it with offsets")
+    left /= across
+    axes = np.stack((left, up, np.cross(left, up)), axis=1)
+    for side in ("left", "right"):
+        if f"{side}_foot" in found:
+            toes = (at[f"{side}_foot"] - at[f"{side}_ankle"]) @ axes[:, 2]
+            if toes < -0.02 * leg:
+                raise MotionError(f"{path}: the {side} foot points backwards; are left and right exchanged?")
+    return axes, leg
+
+
+def _moved(clip: Clip, found: Mapping[str, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
+    """World turns (T, 3, 3) of the joints found, and the pelvis' path (T, 3) in the file's unit."""
+    wanted: set[int] = set()
+    for index in found.values():
+        while index >= 0 and index not in wanted:
+            wanted.add(index)
+            index = clip.joints[index].parent
+    turned: dict[int, np.ndarray] = {}
+    paths: dict[int, np.ndarray] = {}
+    for index in sorted(wanted):
+        joint = clip.joints[index]
+        local, shift = clip.turns(joint), clip.shift(joint)
+        if joint.parent < 0:
+            turned[index], paths[index] = local, shift
+            continue
+        turned[index] = turned[joint.parent] @ local
+        if index <= found["pelvis"]:
+            way = np.einsum("tij,tj->ti", turned[joint.parent], shift)
+            paths[index] = paths[joint.parent] + way
+    return turned, paths[found["pelvis"]]
+
+
+def _alignment(path: Path, name: str, places: np.ndarray, found: Mapping[str, int]) -> np.ndarray:
+    """A of one joint; places: (J, 3) of the zero pose in our axes. -> (3, 3). Raises MotionError."""
+    side = name.split("_")[0]
+    if name.endswith(("wrist", "hand")):
+        return _alignment(path, f"{side}_elbow", places, found)
+    if name.endswith(("ankle", "foot")):
+        foot = found.get(f"{side}_foot")
+        if foot is None:
+            return np.eye(3)
+        return foot_alignment(side, places[foot] - places[found[f"{side}_ankle"]])
+    if name not in LIMBS:
+        return np.eye(3)
+    far = LIMBS[name]
+    theirs = places[found[far]] - places[found[name]]
+    if np.linalg.norm(theirs) == 0.0:
+        raise MotionError(f"{path}: joints for {name} and {far} in one place; export it with offsets")
+    ours = REST_JOINTS[JOINT[far]] - REST_JOINTS[JOINT[name]]
+    axis = np.cross(ours, theirs)
+    sine = float(np.linalg.norm(axis))
+    angle = float(np.arctan2(sine, ours @ theirs))
+    if angle > (ARMS_DOWN if name.endswith(("shoulder", "elbow")) else ASTRIDE):
+        raise MotionError(
+            f"{path}: its zero pose is no T or A pose: {name} is turned by {np.degrees(angle):.0f} degrees; "
+            "export it with a T pose at rest"
+        )
+    return rotation_matrices(axis * (angle / sine)) if sine > 0.0 else np.eye(3)

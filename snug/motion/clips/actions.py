@@ -1,0 +1,213 @@
+"""Actions on the spot: tables of key angles, joined smoothly.
+
+A key is (time [s], angle [degrees]). Names without a side move both limbs; `left_` and `right_` move one.
+Between keys the angle is monotone (PCHIP: continuous slope, no overshoot), before the first and after the
+last it rests. Feet stay level with the floor unless foot_pitch says otherwise (positive: on tiptoe).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from snug.motion.clips.posture import RATE, SIDED
+
+Keys = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Action:
+    """A table of keys; with a period the table is one cycle and is repeated `cycles` times.
+
+    flights: (take-off, landing) [s] within one cycle.
+    """
+
+    seconds: float
+    keys: dict[str, Keys]
+    flights: tuple[tuple[float, float], ...] = ()
+    cycles: int = 1
+
+    @property
+    def frames(self) -> int:
+        """Number of frames at RATE."""
+        return round(self.seconds * self.cycles * RATE)
+
+    def angles(self) -> tuple[dict[str, np.ndarray], list[tuple[float, float]]]:
+        """Angle name -> (T,) [degrees] at RATE, and the flights [s]."""
+        within = (np.arange(self.frames) / RATE) % self.seconds
+        angles = {}
+        for name, keys in self.keys.items():
+            at, degrees = np.array(keys, dtype=float).T
+            if len(keys) == 1:
+                values = np.full(self.frames, degrees[0])
+            else:
+                values = PchipInterpolator(at, degrees)(np.clip(within, at[0], at[-1]))
+            sided = name in SIDED
+            for full_name in (f"left_{name}", f"right_{name}") if sided else (name,):
+                if not (sided and full_name in self.keys):
+                    angles[full_name] = values
+        starts = self.seconds * np.arange(self.cycles)
+        return angles, [(s + start, s + end) for s in starts for start, end in self.flights]
+
+
+ARM = SIDED["arm_lowering"]  # hanging at ease
+
+# fmt: off
+JUMP = Action(
+    seconds=2.6,
+    flights=((0.92, 1.40),),
+    keys={
+        "hip_flexion": ((0.2, 2), (0.62, 78), (0.70, 78), (0.92, 0), (1.12, 14), (1.36, 18), (1.62, 62),
+                        (2.2, 2)),
+        "knee_flexion": ((0.2, 4), (0.62, 88), (0.70, 88), (0.92, 4), (1.12, 18), (1.36, 14), (1.62, 78),
+                         (2.2, 4)),
+        "foot_pitch": ((0.72, 0), (0.92, 48), (1.15, 30), (1.38, 14), (1.48, 0)),
+        "pelvis_pitch": ((0.2, 0), (0.62, 26), (0.70, 26), (0.92, 2), (1.36, 4), (1.62, 20), (2.2, 0)),
+        "trunk_flexion": ((0.2, 0), (0.62, 20), (0.70, 20), (0.92, -4), (1.36, 3), (1.62, 16), (2.2, 0)),
+        "head_pitch": ((0.2, 0), (0.62, -28), (0.70, -28), (0.92, -4), (1.62, -22), (2.2, 0)),
+        "arm_flexion": ((0.1, 0), (0.55, -42), (0.66, -42), (0.98, 92), (1.15, 95), (1.55, 25), (2.2, 0)),
+        "elbow_flexion": ((0.2, 15), (0.66, 22), (0.98, 35), (1.55, 30), (2.2, 15)),
+    },
+)
+
+# Half a turn in the air; the arms wind up against it first.
+SPIN_JUMP = Action(
+    seconds=2.8,
+    flights=((0.95, 1.43),),
+    keys={
+        "pelvis_yaw": ((0.25, 0), (0.66, -16), (0.72, -16), (0.95, 22), (1.43, 172), (1.75, 180)),
+        "trunk_twist": ((0.25, 0), (0.66, -30), (0.72, -30), (1.02, 30), (1.43, 14), (1.72, -8), (2.3, 0)),
+        "head_yaw": ((0.25, 0), (0.66, 14), (1.05, 30), (1.5, 0)),
+        "hip_flexion": ((0.25, 2), (0.64, 70), (0.74, 70), (0.95, 0), (1.15, 22), (1.40, 22), (1.66, 66),
+                        (2.3, 2)),
+        "knee_flexion": ((0.25, 4), (0.64, 82), (0.74, 82), (0.95, 4), (1.15, 36), (1.40, 18), (1.66, 82),
+                         (2.3, 4)),
+        "hip_abduction": ((0.95, 3), (1.43, 8), (2.3, 6)),
+        "foot_pitch": ((0.76, 0), (0.95, 46), (1.18, 32), (1.41, 14), (1.51, 0)),
+        "pelvis_pitch": ((0.25, 0), (0.64, 22), (0.74, 22), (0.95, 0), (1.40, 2), (1.66, 20), (2.3, 0)),
+        "trunk_flexion": ((0.25, 0), (0.64, 16), (0.74, 16), (0.95, -2), (1.40, 2), (1.66, 14), (2.3, 0)),
+        "head_pitch": ((0.25, 0), (0.70, -18), (0.95, 0), (1.66, -18), (2.3, 0)),
+        "arm_lowering": ((0.2, ARM), (0.66, 45), (1.0, 35), (1.25, 50), (1.6, 28), (2.3, ARM)),
+        "left_arm_flexion": ((0.2, 0), (0.66, 35), (1.0, -25), (1.4, 20), (2.3, 0)),
+        "right_arm_flexion": ((0.2, 0), (0.66, -35), (1.0, 45), (1.4, 20), (2.3, 0)),
+        "elbow_flexion": ((0.2, 15), (0.66, 40), (1.2, 70), (1.6, 40), (2.3, 15)),
+    },
+)
+
+JUMPING_JACK = Action(
+    seconds=1.1,
+    cycles=3,
+    flights=((0.22, 0.46), (0.74, 0.98)),
+    keys={
+        "hip_abduction": ((0.20, 3), (0.48, 22), (0.72, 22), (1.0, 3)),
+        "arm_lowering": ((0.12, ARM), (0.52, -38), (0.66, -38), (1.04, ARM)),
+        "arm_flexion": ((0.12, 0), (0.35, 12), (0.6, 8), (0.85, 12), (1.04, 0)),
+        "elbow_flexion": ((0.0, 15), (0.55, 22), (1.1, 15)),
+        "hip_flexion": ((0, 8), (0.10, 20), (0.22, 4), (0.42, 6), (0.58, 20), (0.74, 4), (0.94, 6), (1.1, 8)),
+        "knee_flexion": ((0, 14), (0.10, 38), (0.22, 6), (0.42, 10), (0.58, 38), (0.74, 6), (0.94, 10),
+                         (1.1, 14)),
+        "foot_pitch": ((0.10, 0), (0.22, 34), (0.46, 20), (0.58, 0), (0.74, 34), (0.98, 20), (1.08, 0)),
+        "trunk_flexion": ((0, 2), (0.10, 7), (0.25, 0), (0.58, 7), (0.78, 0), (1.1, 2)),
+    },
+)
+
+SQUAT = Action(
+    seconds=2.0,
+    cycles=2,
+    keys={
+        "hip_flexion": ((0.1, 2), (0.85, 105), (1.05, 105), (1.7, 2)),
+        "knee_flexion": ((0.1, 4), (0.85, 108), (1.05, 108), (1.7, 4)),
+        "hip_abduction": ((0.1, 6), (0.85, 14), (1.05, 14), (1.7, 6)),
+        "hip_rotation": ((0.0, 12),),
+        "pelvis_pitch": ((0.1, 0), (0.85, 26), (1.05, 26), (1.7, 0)),
+        "trunk_flexion": ((0.1, 0), (0.85, 14), (1.05, 14), (1.7, 0)),
+        "head_pitch": ((0.1, 0), (0.85, -28), (1.05, -28), (1.7, 0)),
+        "arm_flexion": ((0.1, 0), (0.8, 85), (1.05, 85), (1.7, 0)),
+        "elbow_flexion": ((0.1, 15), (0.85, 8), (1.05, 8), (1.7, 15)),
+    },
+)
+
+# Both to the side and up; then the left and the right to the front in turn.
+ARM_RAISE = Action(
+    seconds=4.0,
+    keys={
+        "arm_lowering": ((0.1, ARM), (0.75, -36), (0.95, -36), (1.6, ARM)),
+        "left_arm_flexion": ((1.7, 0), (2.3, 118), (2.5, 118), (2.95, 0)),
+        "right_arm_flexion": ((2.55, 0), (3.1, 118), (3.25, 118), (3.75, 0)),
+        "trunk_flexion": ((0.1, 0), (0.85, -5), (1.6, 0), (2.4, -3), (3.2, -3), (3.8, 0)),
+        "trunk_bend": ((1.7, 0), (2.4, -4), (3.1, 4), (3.8, 0)),
+    },
+)
+
+# Upper arms level, forearms turning: small fast circles of the whole arm.
+ARM_CIRCLE = Action(
+    seconds=3.0,
+    keys={
+        "arm_lowering": ((0.1, ARM), (0.5, 12), (0.75, -18), (1.0, 12), (1.25, 38), (1.5, 12), (1.75, -18),
+                         (2.0, 12), (2.25, 38), (2.7, ARM)),
+        "arm_flexion": ((0.3, 0), (0.5, 28), (0.75, 0), (1.0, -28), (1.25, 0), (1.5, 28), (1.75, 0),
+                        (2.0, -28), (2.3, 0)),
+        "elbow_flexion": ((0.1, 15), (0.5, 20), (2.3, 20), (2.7, 15)),
+    },
+)
+
+TORSO_TWIST = Action(
+    seconds=1.6,
+    cycles=2,
+    keys={
+        "trunk_twist": ((0, 0), (0.4, 42), (0.5, 42), (1.1, -42), (1.2, -42), (1.6, 0)),
+        "pelvis_yaw": ((0, 0), (0.4, 14), (0.5, 14), (1.1, -14), (1.2, -14), (1.6, 0)),
+        "head_yaw": ((0, 0), (0.42, 18), (1.12, -18), (1.6, 0)),
+        "arm_lowering": ((0, 34),),
+        "arm_flexion": ((0, 12),),
+        "elbow_flexion": ((0, 75),),
+        "hip_abduction": ((0, 9),),
+        "knee_flexion": ((0, 10),),
+        "hip_flexion": ((0, 6),),
+    },
+)
+
+SIDE_BEND = Action(
+    seconds=3.4,
+    keys={
+        "trunk_bend": ((0.1, 0), (0.85, 34), (1.0, 34), (2.1, -34), (2.3, -34), (3.1, 0)),
+        "pelvis_roll": ((0.1, 0), (0.85, 7), (1.0, 7), (2.1, -7), (2.3, -7), (3.1, 0)),
+        "left_hip_abduction": ((0.1, 8), (0.85, 15), (1.0, 15), (2.1, 1), (2.3, 1), (3.1, 8)),
+        "right_hip_abduction": ((0.1, 8), (0.85, 1), (1.0, 1), (2.1, 15), (2.3, 15), (3.1, 8)),
+        # The arm on the bent side is held off the hip.
+        "right_arm_lowering": ((0.1, ARM), (0.85, -40), (1.0, -40), (2.1, 42), (2.3, 42), (3.1, ARM)),
+        "left_arm_lowering": ((0.1, ARM), (0.85, 42), (1.0, 42), (2.1, -40), (2.3, -40), (3.1, ARM)),
+        "elbow_flexion": ((0, 15),),
+    },
+)
+
+BOW = Action(
+    seconds=3.0,
+    keys={
+        "pelvis_pitch": ((0.1, 0), (1.0, 48), (1.4, 48), (2.4, 0)),
+        "hip_flexion": ((0.1, 2), (1.0, 58), (1.4, 58), (2.4, 2)),
+        "knee_flexion": ((0.1, 4), (1.0, 12), (1.4, 12), (2.4, 4)),
+        "trunk_flexion": ((0.1, 0), (1.0, 38), (1.4, 38), (2.4, 0)),
+        "head_pitch": ((0.1, 0), (1.0, 12), (1.4, 12), (2.3, 0)),
+        "arm_flexion": ((0.1, 0), (1.1, 52), (1.5, 52), (2.5, 0)),
+    },
+)
+
+LUNGE = Action(
+    seconds=3.0,
+    keys={
+        "left_hip_flexion": ((0.1, 2), (0.45, 62), (0.9, 72), (1.5, 72), (1.95, 50), (2.5, 2)),
+        "left_knee_flexion": ((0.1, 4), (0.45, 60), (0.9, 84), (1.5, 84), (1.95, 62), (2.5, 4)),
+        "right_hip_flexion": ((0.2, 2), (0.9, -18), (1.5, -18), (2.4, 2)),
+        "right_knee_flexion": ((0.2, 4), (0.9, 53), (1.5, 53), (2.4, 4)),
+        "right_foot_pitch": ((0.3, 0), (0.9, 50), (1.5, 50), (2.2, 0)),
+        "hip_rotation": ((0, 5), (0.5, 0), (2.2, 0), (2.6, 5)),
+        "trunk_twist": ((0.3, 0), (0.9, 0), (1.2, 32), (1.5, 0), (2.5, 0)),
+        "trunk_flexion": ((0.1, 0), (0.9, 6), (1.5, 6), (2.5, 0)),
+        "arm_lowering": ((0.2, ARM), (0.9, 45), (1.6, 45), (2.4, ARM)),
+        "arm_flexion": ((0.2, 0), (0.9, 30), (1.6, 30), (2.4, 0)),
+        "elbow_flexion": ((0.2, 15), (0.9, 70), (1.6, 70), (2.4, 15)),
+    },
+)

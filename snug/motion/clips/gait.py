@@ -1,0 +1,126 @@
+"""Walking, running and coming to a stop, from published normative joint-angle curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from snug.motion.clips.posture import RATE, STANDING
+
+Curve = tuple[tuple[float, float], ...]  # (percent of the stride from that foot's contact, degrees)
+
+
+@dataclass(frozen=True)
+class Stride:
+    """One stride: sagittal curves of a leg and the swing of pelvis, trunk and arms. Angles in degrees.
+
+    rises: whether each foot comes down a step higher than the other.
+    """
+
+    seconds: float
+    hip: Curve
+    knee: Curve
+    ankle: Curve
+    toe_off: float  # percent of the stride; below 50 there is a flight before the other foot lands
+    pelvis_pitch: float
+    pelvis_yaw: float  # amplitudes of the first harmonic
+    pelvis_roll: float
+    arm_mean: float
+    arm_swing: float
+    elbow_mean: float
+    elbow_swing: float
+    trunk_lean: float
+    rises: bool = False
+
+
+# Approximate values of the mean curves of D. A. Winter, The Biomechanics and Motor Control of Human Gait
+# (University of Waterloo Press), natural cadence: 105 steps per minute. Ankle dorsiflexion is positive.
+# Pelvis: Perry, Gait Analysis (1992), 5 degrees of rotation, 4 of obliquity. Arms: Murray et al.,
+# Patterns of sagittal rotation of the upper limbs in walking, Physical Therapy 47 (1967), about 32 degrees.
+WALK = Stride(
+    seconds=1.14,
+    hip=((0, 21), (10, 17), (20, 9), (30, 0), (40, -7), (50, -11), (60, -6), (70, 8), (80, 18), (90, 22)),
+    knee=((0, 4), (7, 13), (14, 20), (22, 18), (32, 11), (40, 8), (48, 11), (55, 23), (63, 50), (71, 64),
+          (79, 54), (87, 27), (95, 3)),
+    ankle=((0, 0), (7, -5), (15, 1), (25, 6), (35, 9), (45, 10), (52, 4), (58, -10), (64, -19), (72, -9),
+           (80, 0), (90, 1)),
+    toe_off=62.0, pelvis_pitch=2.0, pelvis_yaw=5.0, pelvis_roll=3.0,
+    arm_mean=-7.0, arm_swing=18.0, elbow_mean=25.0, elbow_swing=10.0, trunk_lean=2.0,
+)  # fmt: skip
+
+# Approximate values of the curves for running in T. F. Novacheck, The biomechanics of running,
+# Gait and Posture 7 (1998), about 3.2 m/s, and of the arm swing he describes: elbows held near 90 degrees.
+RUN = Stride(
+    seconds=0.72,
+    hip=((0, 38), (10, 34), (20, 19), (30, 4), (38, -5), (46, -4), (56, 16), (66, 42), (76, 56), (86, 53),
+         (94, 43)),
+    knee=((0, 21), (8, 36), (16, 43), (26, 32), (36, 19), (44, 31), (54, 70), (64, 93), (72, 91), (82, 58),
+          (92, 23)),
+    ankle=((0, 8), (8, 15), (18, 24), (26, 15), (34, -10), (41, -24), (50, -15), (62, 0), (75, 6), (90, 6)),
+    toe_off=38.0, pelvis_pitch=8.0, pelvis_yaw=7.0, pelvis_roll=4.0,
+    arm_mean=-5.0, arm_swing=34.0, elbow_mean=80.0, elbow_swing=15.0, trunk_lean=5.0,
+)  # fmt: skip
+
+
+def stride_phase(stride: Stride, pace: np.ndarray) -> np.ndarray:
+    """Strides done so far, (T,), at a pace (T,) given as a share of the stride's normal rate."""
+    return np.cumsum(pace) / RATE / stride.seconds
+
+
+def gait_angles(stride: Stride, phase: np.ndarray, size: np.ndarray) -> dict[str, np.ndarray]:
+    """Joint angles of a gait: phase (T,) [strides], size (T,) 0 standing to 1 the full curves.
+
+    -> angle name -> (T,) [degrees].
+    """
+    swing = 2.0 * np.pi * phase
+    angles = {
+        "pelvis_pitch": np.full_like(phase, stride.pelvis_pitch),
+        "pelvis_yaw": stride.pelvis_yaw * np.cos(swing),
+        "pelvis_roll": stride.pelvis_roll * np.sin(swing),
+        "trunk_flexion": np.full_like(phase, stride.trunk_lean),
+        "trunk_bend": -0.8 * stride.pelvis_roll * np.sin(swing),
+        # The chest turns against the pelvis, with the arms.
+        "trunk_twist": -2.0 * stride.pelvis_yaw * np.cos(swing),
+        "head_yaw": stride.pelvis_yaw * np.cos(swing),
+        "head_pitch": np.full_like(phase, -stride.pelvis_pitch - stride.trunk_lean),
+    }
+    for side, offset, mirror in (("right", 0.0, -1.0), ("left", 0.5, 1.0)):
+        at = (phase + offset) % 1.0
+        hip, knee, ankle = (_periodic(curve, at) for curve in (stride.hip, stride.knee, stride.ankle))
+        # Winter's and Novacheck's hip angle is measured from the upright; the pelvis carries the leg.
+        angles[f"{side}_hip_flexion"] = hip + stride.pelvis_pitch
+        angles[f"{side}_hip_abduction"] = 2.0 + mirror * stride.pelvis_roll * np.sin(swing)
+        angles[f"{side}_knee_flexion"] = knee
+        angles[f"{side}_foot_pitch"] = knee - hip - ankle
+        forward = -np.cos(2.0 * np.pi * (at - 0.03))
+        angles[f"{side}_arm_flexion"] = stride.arm_mean + stride.arm_swing * forward
+        angles[f"{side}_elbow_flexion"] = stride.elbow_mean + stride.elbow_swing * forward
+    return {name: STANDING[name] + size * (value - STANDING[name]) for name, value in angles.items()}
+
+
+def gait_support(phase: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Share of the load on the left and right foot, (T, 2): passed on while both feet are down."""
+    at = phase % 1.0
+    right = np.interp(at, (0.0, 0.10, 0.50, 0.60, 1.0), (0.0, 1.0, 1.0, 0.0, 0.0))
+    right = 0.5 + size * (right - 0.5)
+    return np.stack((1.0 - right, right), axis=1)
+
+
+def gait_flights(stride: Stride, phase: np.ndarray, size: np.ndarray) -> list[tuple[float, float]]:
+    """From each toe-off to the other foot's contact, (start, end) [s], where the gait is nearly full size."""
+    time = np.arange(len(phase)) / RATE
+    flights: list[tuple[float, float]] = []
+    if stride.toe_off >= 50.0:
+        return flights
+    for step in np.arange(0.0, phase[-1] - 0.5, 0.5):
+        start, end = np.interp((step + stride.toe_off / 100.0, step + 0.5), phase, time)
+        if np.interp((start, end), time, size).min() > 0.8:
+            flights.append((float(start), float(end)))
+    return flights
+
+
+def _periodic(curve: Curve, at: np.ndarray) -> np.ndarray:
+    percent, degrees = np.array([*curve, (100.0, curve[0][1])]).T
+    return CubicSpline(percent / 100.0, degrees, bc_type="periodic")(at)

@@ -1,0 +1,108 @@
+"""Twists and turning walks that end within one frame: what sets a wide hem swinging, and lets it ring.
+
+A body cannot stop within a frame. That is the point: the cloth then moves by itself, and what it does cannot
+be told from the pose. Test and training differ in amplitude, frequency and the phase of the stop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.motion.clips.gait import WALK, gait_angles, gait_flights, gait_support, stride_phase
+from snug.motion.clips.posture import RATE, SPINE_SHARES, poses_from_angles, root_path, smoothstep
+
+FPS = 30.0
+HELD = 36  # frames after the stop: over a second, in which a hem comes to rest
+STANCE = {
+    "hip_abduction": 9.0, "knee_flexion": 10.0, "hip_flexion": 6.0, "arm_lowering": 34.0,
+    "arm_flexion": 12.0, "elbow_flexion": 60.0,
+}  # fmt: skip
+ONSET = 0.5  # [s] from rest to the full swing
+
+
+@dataclass(frozen=True)
+class Twist:
+    """The chest yaws by `degrees` at `hertz`, the pelvis by the share `hips` of it, until `stop` [s].
+
+    With hips = 1 the body turns as one piece, as on a turntable.
+    """
+
+    degrees: float
+    hertz: float
+    hips: float
+    stop: float
+
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS, feet on the floor."""
+        time = np.arange(round(self.stop * FPS) + 1 + HELD) / FPS
+        time = np.minimum(time, round(self.stop * FPS) / FPS)
+        yaw = self.degrees * np.sin(2 * np.pi * self.hertz * time) * smoothstep(time / ONSET)
+        sided = {
+            f"{side}_{name}": np.array(value) for side in ("left", "right") for name, value in STANCE.items()
+        }
+        poses = poses_from_angles(sided, len(time))
+        _turn(poses, "pelvis", self.hips * yaw)
+        for name, share in SPINE_SHARES:
+            _turn(poses, name, share * (1.0 - self.hips) * yaw)
+        translations = np.zeros((len(time), 3))
+        translations[:, 1] = root_path(poses[:2])[0, 1]
+        return poses, translations
+
+
+@dataclass(frozen=True)
+class TurningWalk:
+    """A walk whose heading swings by `degrees` at `hertz`, at a pace, and freezes after `stop` [s]."""
+
+    degrees: float
+    hertz: float
+    pace: float
+    stop: float
+
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS."""
+        time = np.arange(round(self.stop * RATE) + 1) / RATE
+        size = smoothstep(time / 0.7)
+        phase = stride_phase(WALK, self.pace * size)
+        angles = gait_angles(WALK, phase, size)
+        angles["pelvis_yaw"] = angles["pelvis_yaw"] + self.degrees * size * np.sin(
+            2 * np.pi * self.hertz * time
+        )
+        poses = poses_from_angles(angles, len(time))
+        path = root_path(
+            poses, gait_flights(WALK, phase, size), support=gait_support(phase, size),
+            height_smoothing=0.045, speed_smoothing=0.08,
+        )  # fmt: skip
+        every = round(RATE / FPS)
+        poses, path = poses[::every], path[::every]
+        frozen = np.minimum(np.arange(len(poses) + HELD), len(poses) - 1)
+        return poses[frozen], path[frozen] - path[0] * [1.0, 0.0, 1.0]
+
+
+def _turn(poses: np.ndarray, joint: str, degrees: np.ndarray) -> None:
+    """Yaw (T,) of one joint before the rotation that it has."""
+    yaw = Rotation.from_euler("y", degrees[:, None], degrees=True).as_matrix()
+    poses[:, JOINT[joint]] = axis_angles(yaw @ rotation_matrices(poses[:, JOINT[joint]]))
+
+
+# Signs, phases and amplitudes of the stops differ; the last two are for tests alone.
+STOPS: dict[str, Twist | TurningWalk] = {
+    "twist_1": Twist(-30.0, 0.7, 0.33, 1.6),
+    "twist_2": Twist(55.0, 0.8, 0.33, 2.1),
+    "twist_3": Twist(-38.0, 1.3, 0.33, 1.5),
+    "twist_4": Twist(60.0, 0.6, 0.5, 1.9),
+    "twist_5": Twist(-25.0, 1.6, 0.5, 1.3),
+    "twist_6": Twist(50.0, 1.15, 0.2, 1.6),
+    "turntable_1": Twist(35.0, 0.8, 1.0, 1.7),
+    "turntable_2": Twist(-50.0, 0.65, 1.0, 2.2),
+    "turntable_3": Twist(28.0, 1.4, 1.0, 1.5),
+    "turning_walk_1": TurningWalk(25.0, 0.5, 1.0, 2.6),
+    "turning_walk_2": TurningWalk(-40.0, 0.35, 0.85, 2.3),
+    "turning_walk_3": TurningWalk(15.0, 0.8, 1.2, 2.0),
+    "turning_walk_4": TurningWalk(-30.0, 0.6, 1.1, 3.0),
+    "twist_stop": Twist(45.0, 1.0, 0.33, 1.9),
+    "turning_stop": TurningWalk(32.0, 0.45, 0.95, 2.4),
+}

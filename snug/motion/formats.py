@@ -1,0 +1,21 @@
+"""Readers of other people's files: one file per format, one line in a visible table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from snug.motion.acclaim_to_smpl import read_asf_amc
+from snug.motion.bvh_to_smpl import read_bvh
+from snug.motion.options import Reading
+from snug.motion.recording import Recording
+from snug.motion.smpl import read_npy, read_npz, read_pkl
+
+# Extension of a motion file: its reader. Each gives the clip as recorded, in the axes of the file.
+READERS: dict[str, Callable[[Path, Reading], Recording]] = {
+    ".amc": read_asf_amc,
+    ".bvh": read_bvh,
+    ".npz": read_npz,
+    ".npy": read_npy,
+    ".pkl": read_pkl,
+}

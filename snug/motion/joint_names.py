@@ -1,0 +1,168 @@
+"""Which joint of a foreign skeleton is which of ours: from a file, or guessed from common names.
+
+Limbs are found by name; pelvis, spine and neck by place: the pelvis is where the legs meet, the spine leads
+from there to where the arms meet, and the neck from there to the head.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from itertools import pairwise
+from pathlib import Path
+
+from snug.body.skeleton import JOINT_NAMES
+from snug.motion.motion import MotionError
+
+# Joints of a side, from the trunk outwards; those of NEEDED a skeleton must have.
+LIMBS = (("hip", "knee", "ankle", "foot"), ("collar", "shoulder", "elbow", "wrist", "hand"))
+NEEDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+# What common skeletons call them: after joints (ours, Biovision), or after bones (Mixamo, CMU's clips as BVH,
+# Unity, Unreal, 3ds Max, Daz). Arms and legs are each named in the style that fits best.
+STYLES: tuple[dict[str, tuple[str, ...]], ...] = (
+    {joint: (joint,) for limb in LIMBS for joint in limb}
+    | {"ankle": ("ankle", "foot"), "foot": ("toe", "toes", "foot"), "wrist": ("wrist", "hand")},
+    {
+        "hip": ("upleg", "upperleg", "thigh"), "knee": ("leg", "lowleg", "lowerleg", "shin", "calf"),
+        "ankle": ("foot",), "foot": ("toebase", "toe", "toes", "toe0", "ball"),
+        "collar": ("shoulder", "collar", "clavicle"), "shoulder": ("arm", "uparm", "upperarm", "shldr"),
+        "elbow": ("forearm", "lowarm", "lowerarm"), "wrist": ("hand",), "hand": (),
+    },
+)  # fmt: skip
+SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
+_BREAKS = re.compile(r"[\s_.\-]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+
+
+def find_joints(
+    path: Path, names: Sequence[str], parents: Sequence[int], given: Path | None
+) -> dict[str, int]:
+    """Our name -> index of their joint; what they lack and nothing needs is left out.
+
+    names: of their joints, empty for end sites; parents: indices, -1 for the root, parents first. given: a
+    TOML file, our name = theirs, which goes before what is guessed.
+    Raises MotionError, naming the joint, where one that is needed is missing or hangs elsewhere.
+    """
+    found = {ours: names.index(theirs) for ours, theirs in _given(given, path, names).items()}
+    found = _limbs(names) | found
+    needed = [f"{side}_{joint}" for side in ("left", "right") for joint in NEEDED]
+    for ours in needed:
+        if ours not in found:
+            there = ", ".join(filter(None, names))
+            raise MotionError(
+                f"{path}: no joint is known as '{ours}'; name it by --joint-map (there are {there[:300]})"
+            )
+    found = _trunk(path, names, parents, found) | found
+    above = {
+        f"{side}_{joint}": f"{side}_{before}"
+        for side in ("left", "right")
+        for limb in LIMBS
+        for before, joint in pairwise(limb)
+    }
+    for ours, theirs in found.items():
+        upper = above.get(ours, "pelvis")
+        if upper in found and ours != "pelvis" and found[upper] not in _way(parents, theirs)[1:]:
+            raise MotionError(
+                f"{path}: '{names[theirs]}' taken for {ours} does not hang below '{names[found[upper]]}' "
+                f"taken for {upper}; name them by --joint-map"
+            )
+    return found
+
+
+def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, str]:
+    if file is None:
+        return {}
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as problem:
+        raise MotionError(f"{file}: cannot be read ({problem.strerror}); check --joint-map") from None
+    except (ValueError, RecursionError) as problem:
+        reason = " ".join(str(problem).split())
+        raise MotionError(f'{file}: not a TOML file ({reason}); write lines as left_hip = "LHip"') from None
+    for ours, theirs in table.items():
+        if ours not in JOINT_NAMES:
+            raise MotionError(f"{file}: '{ours}' is none of our joints; they are {', '.join(JOINT_NAMES)}")
+        if not isinstance(theirs, str) or not theirs or theirs not in names:
+            near = get_close_matches(str(theirs), [name for name in names if name], n=3)
+            hint = f"did you mean {' or '.join(near)}?" if near else "look into its hierarchy"
+            raise MotionError(f"{file}: {path.name} has no joint '{theirs}' for {ours}; {hint}")
+    return table
+
+
+def _limbs(names: Sequence[str]) -> dict[str, int]:
+    """The joints of legs and arms, each in the style that names most of those needed."""
+    sided: dict[tuple[str, str], int] = {}
+    for index, name in enumerate(names):
+        side, base = _side(name)
+        if side:
+            sided.setdefault((side, base), index)
+    found: dict[str, int] = {}
+    for limb in LIMBS:
+        guesses = [_limb(limb, style, sided) for style in STYLES]
+        best = max(guesses, key=_needed)
+        found.update(best)
+    return found
+
+
+def _needed(guess: Mapping[str, int]) -> int:
+    """How many of the joints that a skeleton must have are named."""
+    return sum(ours.partition("_")[2] in NEEDED for ours in guess)
+
+
+def _limb(
+    limb: Sequence[str], style: Mapping[str, Sequence[str]], sided: Mapping[tuple[str, str], int]
+) -> dict[str, int]:
+    """The joints of both limbs of a kind, named in one style; none stands for two of ours."""
+    guess: dict[str, int] = {}
+    for side in ("left", "right"):
+        for joint in limb:
+            places = [sided[side, base] for base in style[joint] if (side, base) in sided]
+            if places and places[0] not in guess.values():
+                guess[f"{side}_{joint}"] = places[0]
+    return guess
+
+
+def _side(name: str) -> tuple[str, str]:
+    """ "mixamorig:LeftUpLeg", "lThigh", "thigh_l", "Bip01 L Thigh" -> side and the rest, in small letters."""
+    words = [word.lower() for word in _BREAKS.split(name.rpartition(":")[2]) if word]
+    for place, rest in ((0, words[1:]), (-1, words[:-1]), (1, words[2:])):
+        if rest and words[place] in SIDES:
+            return SIDES[words[place]], "".join(rest)
+    return "", "".join(words)
+
+
+def _trunk(
+    path: Path, names: Sequence[str], parents: Sequence[int], found: Mapping[str, int]
+) -> dict[str, int]:
+    """Pelvis, spine, neck and head by their places; from one to any number of joints in the spine."""
+    pelvis = found.get("pelvis", _meet(parents, found["left_hip"], found["right_hip"]))
+    chest = _meet(parents, found["left_shoulder"], found["right_shoulder"])
+    heads = [index for index, name in enumerate(names) if _side(name)[1].endswith("head")]
+    head = found.get("head", heads[0] if heads else None)
+    if head is None:
+        raise MotionError(f"{path}: no joint is known as 'head'; name it by --joint-map")
+    trunk = {"pelvis": pelvis, "head": head}
+    spine = [joint for joint in reversed(_way(parents, chest)) if pelvis in _way(parents, joint)[1:]]
+    if spine:
+        trunk["spine1"] = spine[0]
+    if len(spine) > 1:
+        trunk["spine3"] = spine[-1]
+    if len(spine) > 2:
+        trunk["spine2"] = spine[len(spine) // 2]
+    neck = [joint for joint in _way(parents, head)[1:] if chest in _way(parents, joint)[1:]]
+    return trunk | ({"neck": neck[0]} if neck else {})
+
+
+def _way(parents: Sequence[int], joint: int) -> list[int]:
+    """The joint and all above it, upwards."""
+    way = [joint]
+    while parents[way[-1]] >= 0:
+        way.append(parents[way[-1]])
+    return way
+
+
+def _meet(parents: Sequence[int], one: int, other: int) -> int:
+    """The lowest joint above both."""
+    above = set(_way(parents, other))
+    return next(joint for joint in _way(parents, one) if joint in above)

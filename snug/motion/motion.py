@@ -1,0 +1,248 @@
+"""Motions: joint rotations and root translations over time, and what is done to one.
+
+A motion follows the convention of `snug.body.parametric_body.Body`: rotation of each joint relative to its parent as
+axis-angle, joint 0 at its rest position plus the translation, y up, facing +z at first, standing at
+translation zero. They come from `snug.motion.library` or `snug.motion.files`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from snug.body.skeleton import (
+    JOINT,
+    JOINT_NAMES,
+    axis_angles,
+    joint_positions,
+    rotation_matrices,
+    sole_points,
+)
+
+# Upper arm to the spine's direction: on the default body this leaves about 2 cm between arm and chest.
+ARMS_CLEAR = np.deg2rad(25.0)
+
+
+class MotionError(ValueError):
+    """A motion that cannot be read, named or built; the message says where and what to do."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """poses: (T, 24, 3) axis-angle [rad]; translations: (T, 3) [m]; fps [1/s].
+
+    kind groups motions of one sort ("walk", "jump"); source tells where it came from and every repair.
+    Raises MotionError when the shapes disagree, a number is not finite or there is no frame.
+    """
+
+    name: str
+    poses: np.ndarray
+    translations: np.ndarray
+    fps: float = 30.0
+    kind: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        poses = np.ascontiguousarray(self.poses, dtype=np.float64)
+        translations = np.ascontiguousarray(self.translations, dtype=np.float64)
+        if poses.ndim != 3 or poses.shape[1:] != (24, 3) or len(poses) == 0:
+            raise MotionError(f"motion {self.name}: poses have shape {poses.shape}; give (frames, 24, 3)")
+        if translations.shape != (len(poses), 3):
+            raise MotionError(
+                f"motion {self.name}: translations have shape {translations.shape}; give ({len(poses)}, 3)"
+            )
+        if not (np.isfinite(poses).all() and np.isfinite(translations).all()):
+            raise MotionError(f"motion {self.name}: not every number is finite; repair the file")
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise MotionError(f"motion {self.name}: {self.fps} frames per second; give a positive rate")
+        object.__setattr__(self, "poses", poses)
+        object.__setattr__(self, "translations", translations)
+
+    @property
+    def frames(self) -> int:
+        return len(self.poses)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last."""
+        return (self.frames - 1) / self.fps
+
+    def cut(self, start: int, stop: int) -> Motion:
+        """Frames start to stop - 1. Raises MotionError when nothing is left."""
+        return replace(self, poses=self.poses[start:stop], translations=self.translations[start:stop])
+
+    def followed_by(self, other: Motion) -> Motion:
+        """This motion and then the other one's frames, as they are."""
+        poses = np.concatenate([self.poses, other.poses])
+        return replace(
+            self, poses=poses, translations=np.concatenate([self.translations, other.translations])
+        )
+
+
+def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
+    """Turn both shoulders outward and up by the same angle in all frames, about the chest's front axis.
+
+    So did the authors of SNUG with their data: a T-shirt pinched between upper arm and torso has no good
+    solution (and the simulator's contact planes no good choice).
+    """
+    if degrees == 0.0:
+        return motion
+    poses = motion.poses.copy()
+    for joint, sign in ((JOINT["left_shoulder"], 1.0), (JOINT["right_shoulder"], -1.0)):
+        turn = rotation_matrices(np.array([0.0, 0.0, sign * np.deg2rad(degrees)]))
+        poses[:, joint] = axis_angles(turn @ rotation_matrices(poses[:, joint]))
+    source = f"{motion.source}; arms spread by {degrees:g} degrees".lstrip("; ")
+    return replace(motion, poses=poses, source=source)
+
+
+def clear_arms(motion: Motion) -> Motion:
+    """Spread the arms by 20 degrees, or in steps of 5 up to 40 until they are clear of the torso.
+
+    Clear: every upper arm at least ARMS_CLEAR from the spine's direction in 95 % of the frames. A clip
+    whose arms stay nearer says so in its source.
+    """
+    for degrees in (20.0, 25.0, 30.0, 35.0, 40.0):
+        spread = spread_arms(motion, degrees)
+        near = (arm_clearance(spread).min(axis=1) < ARMS_CLEAR).mean()
+        if near <= 0.05:
+            return spread
+    limit = f"{np.degrees(ARMS_CLEAR):.0f} degrees"
+    note = f"an upper arm within {limit} of the torso in {100 * near:.0f} % of frames"
+    return replace(spread, source=f"{spread.source}; {note}")
+
+
+def resample(motion: Motion, fps: float = 30.0) -> Motion:
+    """The same motion at another frame rate: spherical interpolation of rotations, linear of translations.
+
+    First and last pose stay. Where the rates do not divide, the clip is stretched by at most half a new
+    frame in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed).
+    """
+    if not (np.isfinite(fps) and fps > 0):
+        raise MotionError(f"motion {motion.name}: cannot resample to {fps} frames per second")
+    if motion.frames == 1 or fps == motion.fps:
+        return replace(motion, fps=fps)
+    intervals = max(1, round(motion.duration * fps))
+    at = np.linspace(0.0, motion.frames - 1.0, intervals + 1)
+    left = np.minimum(at.astype(int), motion.frames - 2)
+    share = at - left
+    poses = slerp(motion.poses[left], motion.poses[left + 1], share[:, None])
+    low, high = motion.translations[left], motion.translations[left + 1]
+    return replace(motion, poses=poses, translations=low + share[:, None] * (high - low), fps=fps)
+
+
+def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarray:
+    """From one pose to another in `frames` frames, both ends included, at rest at both.
+
+    pose_a, pose_b: (24, 3) [rad] -> (frames, 24, 3) [rad]. Each joint turns along the shortest arc with
+    the minimum-jerk timing 10 s^3 - 15 s^4 + 6 s^5 (Flash and Hogan 1985).
+    """
+    if frames < 2:
+        raise MotionError(f"a transition needs at least 2 frames, not {frames}")
+    s = np.linspace(0.0, 1.0, frames)[:, None]
+    ease = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    shape = (frames, 24, 3)
+    return slerp(np.broadcast_to(pose_a, shape), np.broadcast_to(pose_b, shape), ease)
+
+
+def place(motion: Motion) -> Motion:
+    """Move a clip so that it starts above the origin, facing +z, with its feet on the floor y = 0.
+
+    The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second
+    percentile of the lower foot's height over all frames is taken for the floor.
+    """
+    placed = turned(motion, -heading(motion.poses[0]))
+    poses, translations = placed.poses, placed.translations
+    lowest = sole_points(poses, translations)[..., 1].min(axis=1)
+    translations[:, 1] -= np.percentile(lowest, 2.0)
+    return replace(motion, poses=poses, translations=translations)
+
+
+def heading(pose: np.ndarray) -> float:
+    """Where a pose (24, 3) [rad] faces: the angle [rad] about the vertical from +z towards +x."""
+    facing = rotation_matrices(pose[0])[:, 2]
+    # A body lying on its back or front has no heading; it keeps the recorded one.
+    return float(np.arctan2(facing[0], facing[2])) if np.hypot(facing[0], facing[2]) > 0.1 else 0.0
+
+
+def turned(motion: Motion, angle: float) -> Motion:
+    """The whole motion turned by that angle [rad] about the vertical, beginning above the origin."""
+    turn = rotation_matrices(np.array([0.0, angle, 0.0]))
+    poses = motion.poses.copy()
+    poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
+    translations = (motion.translations - motion.translations[0]) @ turn.T
+    return replace(motion, poses=poses, translations=translations)
+
+
+def mirrored(motion: Motion) -> Motion:
+    """The motion as a mirror in the plane x = 0 shows it: sides change, turns about y and z change sign."""
+    twin = [JOINT[_other_side(name)] for name in JOINT]
+    return Motion(
+        name=f"{motion.name}_mirrored",
+        poses=motion.poses[:, twin] * [1.0, -1.0, -1.0],
+        translations=motion.translations * [-1.0, 1.0, 1.0],
+        fps=motion.fps,
+        kind=motion.kind,
+        source=motion.source,
+    )
+
+
+def _other_side(name: str) -> str:
+    if name.startswith("left_"):
+        return "right_" + name.removeprefix("left_")
+    return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
+
+
+def joint_speeds(motion: Motion) -> np.ndarray:
+    """Angular speed of every joint relative to its parent. -> (T - 1, 24) [rad/s]."""
+    rotations = rotation_matrices(motion.poses)
+    steps = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
+    return np.linalg.norm(steps, axis=-1) * motion.fps
+
+
+def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """How far each pose is from the nearest of the others: poses (T, 24, 3), others (N, 24, 3) [rad] -> (T,).
+
+    The mean over the body's joints, hands aside, of the geodesic angle between their rotations [rad]. Of the
+    root it is the angle between the two upward directions: which way a body faces is no difference.
+    """
+    up, turns = _up_and_turns(poses)
+    other_up, other_turns = _up_and_turns(others)
+    nearest = np.empty(len(poses))
+    for frame in range(len(poses)):
+        total = np.arccos(np.clip(other_up @ up[frame], -1.0, 1.0))
+        cosines = np.abs(np.einsum("njq,jq->nj", other_turns, turns[frame]))
+        total += 2.0 * np.arccos(np.minimum(cosines, 1.0)).sum(axis=1)
+        nearest[frame] = total.min() / (1 + turns.shape[1])
+    return nearest
+
+
+def _up_and_turns(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Upward directions in the root's axes (T, 3), and unit quaternions (T, 21, 4) of the other joints."""
+    from scipy.spatial.transform import Rotation
+
+    turning = [JOINT[name] for name in JOINT_NAMES[1:] if not name.endswith("hand")]
+    quaternions = Rotation.from_rotvec(poses[:, turning].reshape(-1, 3)).as_quat()
+    return rotation_matrices(poses[:, 0])[:, 1], quaternions.reshape(len(poses), len(turning), 4)
+
+
+def arm_clearance(motion: Motion) -> np.ndarray:
+    """Angle between each upper arm and the downward spine: small when the arm lies on the torso.
+
+    -> (T, 2) [rad], left and right.
+    """
+    joints = joint_positions(motion.poses, motion.translations)
+    down = joints[:, JOINT["spine1"]] - joints[:, JOINT["spine3"]]
+    angles = []
+    for side in ("left", "right"):
+        arm = joints[:, JOINT[f"{side}_elbow"]] - joints[:, JOINT[f"{side}_shoulder"]]
+        cosine = (arm * down).sum(-1) / np.linalg.norm(arm, axis=-1) / np.linalg.norm(down, axis=-1)
+        angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return np.stack(angles, axis=1)
+
+
+def slerp(poses_a: np.ndarray, poses_b: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Interpolate along the shortest arc: twice (..., 3) [rad], a share in [0, 1] for (...) -> (..., 3)."""
+    start = rotation_matrices(poses_a)
+    arc = axis_angles(np.swapaxes(start, -1, -2) @ rotation_matrices(poses_b))
+    return axis_angles(start @ rotation_matrices(arc * share[..., None]))

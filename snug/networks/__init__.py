@@ -1,0 +1,1 @@
+"""Networks that dress a body: architectures, inputs, trained models, roll-outs."""

@@ -1,0 +1,171 @@
+"""Recipe: every choice of a training run in one frozen place. The named ones are in snug.recipes.named.
+
+No recipe holds a balancing weight between the energies: there is none. Imports
+nothing heavy, so that a command can list recipes without loading torch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+TERMS = ("strain", "bending", "gravity", "inertia", "collision")
+
+
+class RecipeError(ValueError):
+    """A recipe that cannot be trained: the message names the option, its value and what it may be."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """Options of the network and of its training. Lengths in metres, energies in joules.
+
+    name: shown in tables.
+    pose_input: `six` (two columns of each joint's rotation matrix, the root by its up direction alone, so
+        that the direction a person walks in does not matter) or `axis_angle` (the 72 numbers of the pose).
+    velocity_frame: axes of the root velocity, `root` or `world`.
+    smoothing: sweeps of neighbour averaging over the borrowed skinning weights, at 1000 vertices (see
+        DressedBody.weights).
+    zero_last_layer: start at the skinned template instead of at centimetres of noise.
+    output_scale: factor on the predicted offsets.
+    learning_rate: of Adam. schedule: what becomes of it, `cosine` (half a cosine, down to a hundredth of it
+        at the last step), `epochs` (a tenth after `drop_after_epochs` epochs) or `constant`.
+    weight_decay: share, times the rate, taken off each weight in a step (AdamW, Loshchilov and Hutter 2019).
+    h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
+    remembered: that noise is added to the state which the network last had after the frame before (see
+        snug.training.hidden_state_cache), instead of to nothing. Not for what learns simulated vertices, nor where
+        each window gets a shape of its own (`shape_of`); of little use where `window_stride` is no
+        divisor of `window`, for then few frames before a window ever end one.
+    window, batch: frames of a sub-sequence, sub-sequences of a step.
+    window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
+    even: parts of an epoch that each pass over all motions, each taking one sub-sequence of so many: by
+        chance alone (1) a hard pose may come so late that the network, by then settled, meets it with joules.
+    shape_range: bodies get shape numbers from U(-r, r). shape_of: who gets them, each `window` in each step
+        anew, as the paper has it, or each mixed `clip` once, while given motions stay on the mean body: what
+        is known of a frame (its posed body, its anchors, the state before it) then stays true. shape_share:
+        of these clips that leave the mean body.
+    contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
+    contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
+    contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most one
+        of each window; in between anchors walk with the cloth.
+    mixed: frames of mixed motions (snug.training.motion_augmentation) for each frame of a training motion, up to
+        20,000; not for what learns simulated vertices. mixed_turn [rad], mixed_lift: see there.
+    terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
+        snug.recipes.energies. Leaving one out is an ablation, and it is then never evaluated.
+    material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
+        (edges, hinges, uniform mass and squared contact of PBNS, see snug.training.pbns_material; it has its own
+        stiffness and margin of contact).
+    bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints them; of
+        no account with material `pbns`.
+    pretraining: updates before those by the energies, for a network that learns from a simulated past, see
+        snug.training.simulated_past.
+    spike: a window above this many joules a frame is named and counted, and its step's gradient clipped; what
+        else is done about such batches: see snug.training.divergence_guard.
+    gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
+    """
+
+    name: str = "default"
+    pose_input: str = "six"
+    velocity_frame: str = "root"
+    smoothing: int = 20
+    zero_last_layer: bool = True
+    output_scale: float = 0.1
+    learning_rate: float = 2e-3
+    weight_decay: float = 0.1
+    schedule: str = "cosine"
+    drop_after_epochs: int = 10
+    h0_sigma: float = 0.05
+    remembered: bool = True
+    window: int = 3
+    batch: int = 16
+    window_stride: int = 1
+    even: int = 20
+    shape_range: float = 0.0
+    shape_of: str = "window"
+    shape_share: float = 1.0
+    contact_samples: str = "all"
+    contact_stiffness: float | None = None
+    contact_margin: float | None = None
+    contact_refresh: float = 0.01
+    mixed: float = 12.0
+    mixed_turn: float = 0.1
+    mixed_lift: float = 1.0
+    terms: tuple[str, ...] = TERMS
+    material: str = "stvk"
+    bending: str = "length_area"
+    pretraining: int = 0
+    spike: float = 2.0
+    gradient_limit: float = 1.0
+
+    def __post_init__(self) -> None:
+        for option, allowed in (
+            ("pose_input", ("six", "axis_angle")),
+            ("velocity_frame", ("root", "world")),
+            ("schedule", ("cosine", "epochs", "constant")),
+            ("contact_samples", ("all", "vertices")),
+            ("material", ("stvk", "springs", "pbns")),
+            ("bending", ("length_area", "none")),
+            ("shape_of", ("window", "clip")),
+        ):
+            if getattr(self, option) not in allowed:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
+        self._demand_known(term for term in self.terms if term not in TERMS)
+        if min(self.window, self.batch, self.window_stride, self.even) < 1:
+            raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
+        if "inertia" in self.terms and self.window < 3:
+            raise RecipeError(
+                "recipe option window: inertia needs two frames before the one it judges, so >= 3"
+            )
+        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pretraining")
+        for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", "shape_share", *sizes):
+            if getattr(self, option) < 0:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
+        if self.shape_of == "clip" and self.shape_range and not self.mixed:
+            raise RecipeError(
+                "recipe option shape_of='clip': mixed clips get the shapes, so mixed above zero"
+            )
+        for option in ("mixed_lift", "shape_share"):
+            if getattr(self, option) > 1.0:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)}: a share, so at most 1")
+        for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):
+            if not getattr(self, option) > 0:
+                raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
+
+    @staticmethod
+    def _demand_known(terms: Iterable[str]) -> None:
+        """Raises RecipeError for what is no energy of the simulator that can be trained on."""
+        for term in terms:
+            from snug.recipes.energies import find_energy
+
+            try:
+                find_energy(term)
+            except ValueError as error:
+                here = ", ".join(TERMS)
+                raise RecipeError(f"recipe option terms: {error}; the recipes here have {here}") from error
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for a model file or run.json."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Recipe:
+        """The inverse of `as_dict`. Raises RecipeError for an option that this version does not know."""
+        known = {field.name for field in fields(cls)}
+        unknown = sorted(set(values) - known)
+        if unknown:
+            raise RecipeError(f"unknown recipe option {unknown[0]!r}")
+        for field in fields(cls):
+            value = values.get(field.name, field.default)
+            if type(value) not in _READ_AS.get(type(field.default), (type(field.default),)):
+                raise RecipeError(f"recipe option {field.name}={str(value)[:40]!r}: of another type")
+        if not all(isinstance(term, str) for term in values.get("terms", ())):
+            raise RecipeError("recipe option terms: give names")
+        return cls(**{**values, "terms": tuple(values.get("terms", TERMS))})
+
+
+# Types of an option in a file, by that of its default; an optional one is a number.
+_READ_AS: dict[type, tuple[type, ...]] = {
+    float: (float, int), tuple: (tuple, list), type(None): (type(None), float, int),
+}  # fmt: skip
+DEFAULT = Recipe()

@@ -1,0 +1,1 @@
+"""Training: loss, training set, steps, checkpoints, validation."""

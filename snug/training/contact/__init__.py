@@ -1,0 +1,1 @@
+"""Contact planes for training: cached anchors, queried anew as the network learns."""

@@ -1,0 +1,212 @@
+"""Contact planes for training: where each point of a garment may touch the body, cached and queried anew.
+
+The loss needs, for each contact sample x of each frame, a plane (closest body point c, outward normal n), so
+that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So an
+anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the frame
+carry it to a plane in no time. Near the skin it walks to where its sample is now, whenever the energy is
+taken (reference_sim.contact.anchor_walk), and a few frames of each batch search anew from the current prediction,
+with the simulator's own search and its rule of regions. All positions are float32, relative to the pelvis.
+With thousands of frames cached, an anchor has four bytes, two of them for its face: barycentric
+coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from reference_sim.contact.anchor_walk import SLACK, triangle_adjacency
+from reference_sim.contact.closest_point import FaceTree
+from reference_sim.energies import ContactPenalty
+from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
+from snug.kernels.contact import PARTS, byte_normals, contact_energy, interpolated_planes
+from snug.kernels.lanes import LANES
+
+EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
+
+
+@dataclass(frozen=True)
+class Patch:
+    """The part of a body that one garment may touch.
+
+    body_vertices (P,) into the whole body; faces (Q, 3) into the patch; rest (P, 3) and centroids (Q, 3) [m]
+    in the T-pose; sample_rest (S, 3) [m] of the garment; adjacency (Q, 3), see
+    surface_walk.triangle_adjacency; a tree to search the faces with.
+    """
+
+    body_vertices: np.ndarray
+    faces: np.ndarray
+    rest: np.ndarray
+    centroids: np.ndarray
+    sample_rest: np.ndarray
+    region: float
+    adjacency: np.ndarray
+    tree: FaceTree
+
+    @classmethod
+    def around(
+        cls,
+        samples: np.ndarray,
+        body_positions: np.ndarray,
+        body_faces: np.ndarray,
+        *,
+        region: float = DEFAULT_REGION,
+    ) -> Patch:
+        """Cut the patch for samples (S, 3) [m] out of a body in its T-pose (B, 3) [m], (Fb, 3)."""
+        from scipy.spatial import cKDTree
+
+        middles = body_positions[body_faces].mean(axis=1)
+        if cKDTree(middles).query(samples)[0].min() >= region:
+            raise ValueError(f"no body face lies within {region} m of the garment: they do not fit together")
+        kept = body_faces[reachable_faces(samples, middles, region)]
+        body_vertices, flat = np.unique(kept, return_inverse=True)
+        faces = flat.reshape(-1, 3).astype(np.int32)
+        rest = body_positions[body_vertices].astype(np.float32)
+        centroids = rest[faces].mean(axis=1)
+        return cls(
+            body_vertices=body_vertices,
+            faces=faces,
+            rest=rest,
+            centroids=centroids,
+            sample_rest=samples.astype(np.float32),
+            region=region,
+            adjacency=triangle_adjacency(faces),
+            tree=FaceTree(faces, centroids),
+        )
+
+    def search(
+        self, points: np.ndarray, positions: np.ndarray, anchor_faces: np.ndarray | None = None, *,
+        exact: bool = False,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Closest allowed body point of each sample in one frame.
+
+        points (S, 3), positions (P, 3) of the patch [m], anchor_faces (S,) where to look first
+        -> faces (S,), barycentric (S, 2) of the second and third corner. Beyond EXACT from the skin an old
+        anchor stands as long as no face is half as far, unless all are to be exact.
+        """
+        self.tree.refit(positions)
+        found = self.tree.nearest(
+            points,
+            hints=anchor_faces,
+            rest_points=self.sample_rest,
+            region=self.region,
+            exact=np.inf if exact else EXACT,
+        )
+        return found.faces, found.barycentric[:, 1:]
+
+    def normals(self, positions: np.ndarray) -> np.ndarray:
+        """Area-weighted vertex normals: positions (N, P, 3) float32 -> (N, P, 3) int8, 127 times unit length.
+
+        A byte is enough (0.3 degrees): planes interpolate them and make the result unit length again. With
+        thousands of frames cached, memory counts.
+        """
+        return byte_normals(positions, self.faces)
+
+
+def quantised(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Anchors on a body of so many faces as they are cached: faces (S,) in as few bytes as hold them,
+    barycentric (S, 2) as uint8 in 1 / PARTS, the two together never more than one.
+    """
+    parts = np.rint(PARTS * barycentric)
+    parts[:, 1] = np.minimum(parts[:, 1], PARTS - parts[:, 0])
+    return faces.astype(np.int16 if body_faces < 2**15 else np.int32), parts.astype(np.uint8)
+
+
+class ContactCache:
+    """One anchor per frame and sample, and the steps since each frame's were last searched or propagated."""
+
+    def __init__(self, patch: Patch, frames: int) -> None:
+        faces, barycentric = quantised(
+            *patch.search(patch.sample_rest, patch.rest, exact=True), len(patch.faces)
+        )
+        self.patch = patch
+        self.faces = np.repeat(faces[None], frames, axis=0)
+        self.barycentric = np.repeat(barycentric[None], frames, axis=0)
+        self.age = np.zeros(frames, np.int64)
+
+    def planes(
+        self, frames: np.ndarray, rows: np.ndarray, positions: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Planes of frames (N,), whose patch positions and normals are rows (N,) of (R, P, 3) arrays.
+
+        -> points, unit normals (N, S, 3) float32
+        """
+        shape = (len(frames), self.faces.shape[1], 3)
+        points, directions = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        interpolated_planes(
+            frames,
+            rows,
+            positions,
+            normals,
+            self.patch.faces,
+            self.faces,
+            self.barycentric,
+            points,
+            directions,
+        )
+        return points, directions
+
+    def energy(
+        self,
+        contact: ContactPenalty,
+        x: np.ndarray,
+        gradients: np.ndarray,
+        frames: np.ndarray,
+        rows: np.ndarray,
+        positions: np.ndarray,
+        normals: np.ndarray,
+        *,
+        walk: bool = False,
+    ) -> np.ndarray:
+        """Contact energy of garments x (C, V, 3, LANES) float32 [m], see snug.kernels.lanes, in frames (N, T), with
+        the planes of `planes`; rows (N, T).
+
+        -> values (C, LANES) [J], zero in lanes beyond the last frame; adds to gradients like x [N]. walk:
+        anchors near the skin first walk to where their samples are, and are remembered there. A sample that
+        is out of reach costs no more than the look at its anchor, and no plane is stored.
+        """
+        values = np.zeros((len(x), LANES), np.float32)
+        contact_energy(
+            x,
+            *_samples(contact),
+            contact.power,
+            frames,
+            rows,
+            positions,
+            normals,
+            self.patch.faces.view(np.uint32),
+            self.patch.adjacency,
+            self.patch.centroids,
+            self.patch.sample_rest,
+            np.float32(self.patch.region**2),
+            np.float32(SLACK),
+            walk,
+            self.faces,
+            self.barycentric,
+            values,
+            gradients,
+        )
+        return values
+
+    def requery(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:
+        """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame.
+
+        exact: no old anchor stands for being roughly right.
+        """
+        found = self.patch.search(points, positions, self.faces[frame], exact=exact)
+        self.faces[frame], self.barycentric[frame] = quantised(*found, len(self.patch.faces))
+        self.age[frame] = 0
+
+    def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
+        """Places in `frames` of the `count` whose anchors are oldest; every frame passed here grows older."""
+        self.age[frames] += 1
+        return np.argsort(-self.age[frames], kind="stable")[:count]
+
+
+@lru_cache(maxsize=16)
+def _samples(contact: ContactPenalty) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.float32]:
+    """Stencils, weights, stiffness and margin in the types of the kernel."""
+    weights, stiffness = contact.weights.astype(np.float32), contact.stiffness.astype(np.float32)
+    return contact.stencils.astype(np.uint32), weights, stiffness, np.float32(contact.margin)

@@ -1,0 +1,179 @@
+"""Contact anchors held and searched in torch: what `snug.training.contact.cache.ContactCache` does on a CPU, on any device.
+
+Normals are rounded to the same 127 steps as there, so that both give the same planes. The search is by brute
+force: of all allowed body vertices the nearest few, and of the faces around those the one that comes closest.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from reference_sim.contact.anchor_walk import CROSSINGS, SLACK
+from snug.training.contact.cache import PARTS, ContactCache, Patch
+
+NEAREST = 3  # body vertices whose faces are tried for each sample
+CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances
+FORBIDDEN = (
+    1.0  # m^2 added to the squared distance of a face out of the region: taken only for want of others
+)
+
+
+class TensorContactCache:
+    """One anchor per frame and sample, on `device`; on the CPU, when each was last searched or propagated."""
+
+    def __init__(self, patch: Patch, frames: int, device: torch.device) -> None:
+        start = ContactCache(patch, 1)
+        self.patch, self.age = patch, np.zeros(frames, np.int64)
+        self.faces = torch.as_tensor(start.faces, device=device).repeat(frames, 1)
+        self.barycentric = torch.as_tensor(start.barycentric, device=device).repeat(frames, 1, 1)
+        self.corners = torch.as_tensor(patch.faces, device=device).long()  # (Q, 3)
+        self.rest, self.centroids, self.sample_rest = (
+            torch.as_tensor(array, device=device)
+            for array in (patch.rest, patch.centroids, patch.sample_rest)
+        )
+        self.adjacency = torch.as_tensor(patch.adjacency, device=device).long()  # (Q, 3)
+        self.around = torch.as_tensor(
+            _incident(patch.faces), device=device
+        )  # (P, K) faces, -1 beyond the last
+
+    def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
+        """See ContactCache.oldest."""
+        return ContactCache.oldest(cast(ContactCache, self), frames, count)
+
+    def normals(self, positions: Tensor) -> Tensor:
+        """Area-weighted vertex normals (N, P, 3) of positions (N, P, 3), rounded to 1/127."""
+        a, b, c = (positions[:, self.corners[:, corner]] for corner in range(3))
+        of_faces = torch.linalg.cross(b - a, c - a)
+        # Gathered, not scattered: sums are then taken in one order on a GPU too.
+        there = (self.around >= 0)[..., None]
+        normals = (of_faces[:, self.around.clamp(min=0)] * there).sum(-2)
+        return (127.0 * normals / (torch.linalg.vector_norm(normals, dim=-1, keepdim=True) + 1e-30)).round()
+
+    def planes(
+        self, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """See ContactCache.planes; positions and normals (R, P, 3) and the result are tensors."""
+        device = positions.device
+        chosen = torch.as_tensor(frames, device=device)
+        corners = self.corners[self.faces[chosen].long()]  # (N, S, 3)
+        row = torch.as_tensor(rows, device=device)[:, None, None]
+        last = self.barycentric[chosen] / PARTS
+        weights = torch.cat([1 - last.sum(-1, keepdim=True), last], -1)[..., None]
+        points = (weights * positions[row, corners]).sum(-2)
+        directions = (weights * normals[row, corners]).sum(-2)
+        return points, directions / (torch.linalg.vector_norm(directions, dim=-1, keepdim=True) + 1e-30)
+
+    def walk(
+        self, samples: Tensor, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor, *,
+        reach: float,
+    ) -> None:  # fmt: skip
+        """Anchors of frames (N,) go to where reference_sim.contact.anchor_walk.walk_to_foot takes them for samples
+        (N, S, 3): those of samples less than `reach` and SLACK above their planes. positions, normals: see
+        `planes`.
+        """
+        # A frame that comes twice walks once: which of two writes lands last is not a GPU's to choose.
+        once = np.sort(np.unique(frames, return_index=True)[1])
+        samples, frames, rows = (
+            samples[torch.as_tensor(once, device=samples.device)],
+            frames[once],
+            rows[once],
+        )
+        points, directions = self.planes(frames, rows, positions, normals)
+        near = ((samples - points) * directions).sum(-1) < reach + SLACK
+        place, sample = near.nonzero(as_tuple=True)
+        chosen = torch.as_tensor(frames, device=samples.device)[place]
+        row = torch.as_tensor(rows, device=samples.device)[place]
+        x, home = samples[place, sample], self.sample_rest[sample]
+        face = self.faces[chosen, sample].long()
+        last, moving = face, torch.ones_like(face, dtype=torch.bool)
+        for _ in range(CROSSINGS):
+            a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
+            v, w, _ = foot(b - a, c - a, x - a)
+            weights = torch.stack([1 - v - w, v, w], -1)
+            side = weights.argmin(-1)
+            other = self.adjacency[face, side]
+            far = (self.centroids[other] - home).square().sum(-1) > self.patch.region**2
+            moving = moving & (weights.amin(-1) < 0) & (other >= 0) & (other != last) & ~far
+            last, face = torch.where(moving, face, last), torch.where(moving, other, face)
+        a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
+        v, w = closest_on_triangle(b - a, c - a, x - a)
+        faces, parts = in_parts(face, torch.stack([v, w], -1), self.faces.dtype)
+        self.faces[chosen, sample], self.barycentric[chosen, sample] = faces, parts
+
+    def requery(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
+        """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame. Brute force has no
+        use for old anchors, so that `exact` changes nothing.
+        """
+        for start in range(0, len(points), CHUNK):
+            part = slice(start, start + CHUNK)
+            faces, barycentric = self._searched(points[part], self.sample_rest[part], positions)
+            found = in_parts(faces, barycentric, self.faces.dtype)
+            self.faces[frame, part], self.barycentric[frame, part] = found
+        self.age[frame] = 0
+
+    def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
+        distances = torch.cdist(points, positions)
+        allowed = torch.cdist(home, self.rest) < self.patch.region
+        distances = torch.where(allowed | ~allowed.any(1, keepdim=True), distances, torch.inf)
+        nearest = distances.topk(min(NEAREST, len(positions)), largest=False).indices
+        faces = self.around[nearest].flatten(1)  # (S, NEAREST K)
+        a, b, c = positions[self.corners[faces.clamp(min=0)]].unbind(-2)
+        s, t, r = b - a, c - a, points[:, None] - a
+        v, w = closest_on_triangle(s, t, r)
+        squared = (r - v[..., None] * s - w[..., None] * t).square().sum(-1)
+        far = (self.centroids[faces.clamp(min=0)] - home[:, None]).square().sum(-1) >= self.patch.region**2
+        squared = torch.where(faces < 0, torch.inf, squared + FORBIDDEN * far)
+        best = squared.argmin(1, keepdim=True)
+        pick = [table.gather(1, best)[:, 0] for table in (faces, v, w)]
+        return pick[0], torch.stack(pick[1:], -1)
+
+
+def in_parts(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:
+    """As snug.training.contact.cache.quantised: faces (S,) of a small type, barycentric (S, 2) as uint8."""
+    second = (PARTS * barycentric[:, :1]).round()
+    third = torch.minimum((PARTS * barycentric[:, 1:]).round(), PARTS - second)
+    return faces.to(kind), torch.cat([second, third], 1).to(torch.uint8)
+
+
+def foot(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Weights v, w where the plane of a triangle comes closest to a point, and the squared area of its
+    parallelogram [m^4]; s, t, r as for `closest_on_triangle`.
+    """
+    aa, cc, m = (s * s).sum(-1), (t * t).sum(-1), (s * t).sum(-1)
+    d, e = (s * r).sum(-1), (t * r).sum(-1)
+    determinant = aa * cc - m * m
+    return (cc * d - m * e) / determinant, (aa * e - m * d) / determinant, determinant
+
+
+def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor]:
+    """Weights v, w of the second and third corner where a triangle comes closest to a point.
+
+    s, t (..., 3): sides from the first corner; r (..., 3): from it to the point [m].
+    """
+    aa, cc, m = (s * s).sum(-1), (t * t).sum(-1), (s * t).sum(-1)
+    d, e = (s * r).sum(-1), (t * r).sum(-1)
+    v, w, determinant = foot(s, t, r)
+    inside = (determinant > 0) & (v >= 0) & (w >= 0) & (v + w <= 1)
+    # Where the foot is outside: the nearest of the three edges, each clamped to its ends.
+    zero = torch.zeros_like(d)
+    on_s, on_t = (d / aa).clamp(0, 1), (e / cc).clamp(0, 1)
+    on_u = ((e - d + aa - m) / (aa + cc - 2 * m)).clamp(0, 1)
+    edges_v, edges_w = torch.stack([on_s, zero, 1 - on_u]), torch.stack([zero, on_t, on_u])
+    q = edges_v**2 * aa + edges_w**2 * cc + 2 * edges_v * edges_w * m - 2 * edges_v * d - 2 * edges_w * e
+    best = q.argmin(0, keepdim=True)
+    edge_v, edge_w = edges_v.gather(0, best)[0], edges_w.gather(0, best)[0]
+    return torch.where(inside, v, edge_v), torch.where(inside, w, edge_w)
+
+
+def _incident(faces: np.ndarray) -> np.ndarray:
+    """Faces around each vertex, ascending: (Q, 3) -> (P, K) int64, rows filled up with -1."""
+    counts = np.bincount(faces.ravel())
+    table = np.full((len(counts), counts.max()), -1, np.int64)
+    order = np.argsort(faces.ravel(), kind="stable")
+    column = np.arange(len(order)) - np.repeat(np.cumsum(counts) - counts, counts)
+    table[faces.ravel()[order], column] = order // 3
+    return table

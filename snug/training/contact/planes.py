@@ -1,0 +1,292 @@
+"""Contact planes of batches of a training set, from cached anchors, queried anew as the network learns.
+
+Anchors walk with their samples in every step (reference_sim.contact.anchor_walk). Searched, for skin that no walk
+would find, are the middle frames of a few windows in a step. What is found there is propagated to the frames
+around it that show almost the same pose. Propagated farther, an anchor from where the thigh was elsewhere
+claims a contact that is none, or misses a thigh that stands in the hem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from reference_sim.energies import ContactPenalty
+from snug.body.skinning import corrected, skin
+from snug.training.contact.cache import ContactCache, Patch
+from snug.training.contact.cache_torch import TensorContactCache
+from snug.training.loss import Planes
+from snug.training.process_group import ALONE, Group
+from snug.training.training_set import Batch, TrainingSet
+
+# rows (N T,) into the positions and normals (R, P, 3) that follow: the body's patch in the frames of a batch.
+Posed = tuple[np.ndarray, Any, Any]
+TOGETHER = 64  # frames whose bodies are posed by one matrix product
+# Frames before and after a searched one that may take over its anchors; at the start.
+PROPAGATED, FIRST_PROPAGATED = 3, 7
+# m: how far a mark of the body may have moved from a frame to one that takes over its anchors. At the start a
+# frame lies within FIRST_NEAR of the first and of the last of those; from those between it may be twice as
+# far.
+NEAR, FIRST_NEAR = 0.03, 0.07
+MARKED = 25  # every so many vertices of the patch there is a mark
+
+
+class TrainingContact:
+    """Anchors of all training frames. With `kernels` in numpy and numba, else in torch on the set's device.
+
+    refresh: see Recipe.contact_refresh. kept: whether each frame has one body for good; the kernels then pose
+    them all once. A group shares the work, and every process of it keeps all anchors.
+    """
+
+    def __init__(
+        self,
+        data: TrainingSet,
+        contact: ContactPenalty,
+        *,
+        refresh: float,
+        kept: bool,
+        kernels: bool = True,
+        group: Group = ALONE,
+    ) -> None:
+        body, device = data.dressed.body, data.device
+        self.data, self.contact, self.refresh = data, contact, refresh
+        self.kernels, self.group = kernels, group
+        self.patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
+        frames = data.frames
+        self.cache: ContactCache | TensorContactCache
+        self.cache = (
+            ContactCache(self.patch, frames) if kernels else TensorContactCache(self.patch, frames, device)
+        )
+        vertices = self.patch.body_vertices
+        self.weights, self.template, self.directions = (
+            torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
+            for array in (body.skinning_weights, body.template, body.shape_directions)
+        )
+        self.correctives: Tensor | None = None
+        if body.pose_directions is not None:
+            correctives = body.pose_directions[vertices]
+            self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
+        self.stencils = torch.as_tensor(contact.stencils, device=device)
+        self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
+        self._kept = self._posed_everywhere() if kept and kernels else None
+        self._changed = np.zeros(frames, bool)
+        self._before: tuple[Any, ...] | None = None
+        self._credit = 0.0
+
+    def _skinned(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
+        """Patch positions (..., P, 3) of unposed ones, with pose correctives; or of `every` so many."""
+        rest = rest[..., ::every, :]
+        if self.correctives is not None:
+            parents = self.data.dressed.parents
+            directions = self.correctives[::every].to(rest.device)
+            rest = corrected(rest, directions, transforms, parents)
+        return skin(rest, self.weights[::every].to(rest.device), transforms)
+
+    def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
+        """Patch positions and normals (F, P, 3) of every frame, computed once."""
+        positions = np.empty((self.data.frames, *self.template.shape), np.float32)
+        for rest, frames in self._worn():
+            corners = torch.cat([rest, torch.ones(len(rest), 1)], 1)  # (P, 4)
+            # sum_j w_pj T_j (p, 1) as a matrix product over (j, 4), of many frames at once: several times
+            # faster than blending first, and ten times faster than frame by frame.
+            spread = (self.weights[:, :, None] * corners[:, None]).flatten(1)  # (P, 96)
+            for start in range(frames.start, frames.stop, TOGETHER):
+                some = slice(start, min(start + TOGETHER, frames.stop))
+                transforms = self.data.transforms[some]  # (C, 24, 3, 4)
+                if self.correctives is not None:
+                    positions[some] = self._skinned(rest, transforms).numpy()
+                    continue
+                columns = transforms.permute(1, 3, 0, 2).reshape(spread.shape[1], -1)  # (96, 3 C)
+                posed = (spread @ columns).view(len(spread), len(transforms), 3)
+                positions[some] = posed.transpose(0, 1).numpy()
+        return positions, self.patch.normals(positions)
+
+    def _worn(self) -> Iterator[tuple[Tensor, slice]]:
+        """Unposed patches (P, 3) and the frames of each: motion by motion, or one of all frames."""
+        shapes, first = self.data.shapes, self.data.first
+        if shapes is None:
+            yield self.template, slice(0, self.data.frames)
+            return
+        for betas, start, stop in zip(shapes, first[:-1], first[1:]):
+            moved = self.directions @ torch.as_tensor(betas).to(self.directions)
+            yield self.template + moved, slice(int(start), int(stop))
+
+    @cached_property
+    def _marks(self) -> np.ndarray:
+        """Some vertices of the patch in every frame: (F, M, 3) [m]; to propagate by."""
+        # On the CPU whatever the device, so that processes that share a run propagate alike.
+        return np.concatenate([
+            self._skinned(rest.cpu(), part.cpu(), MARKED).numpy()
+            for rest, frames in self._worn()
+            for part in self.data.transforms[frames].split(TOGETHER)
+        ])  # fmt: skip
+
+    def posed(self, batch: Batch) -> Posed:
+        """The body where the frames of a batch have it."""
+        if self._kept is not None:
+            return batch.frames.ravel(), *self._kept
+        rest = self.template
+        if batch.betas is not None:
+            rest = (rest + torch.einsum("vis,ns->nvi", self.directions, batch.betas))[:, None]
+        positions = self._skinned(rest, batch.transforms).flatten(0, 1)
+        rows = np.arange(len(positions))
+        if isinstance(self.cache, TensorContactCache):
+            return rows, positions, self.cache.normals(positions)
+        return rows, positions.numpy(), self.patch.normals(positions.numpy())
+
+    def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
+        """What the loss takes: of the cached anchors, points and normals (N, T, S, 3), or, with kernels,
+        the energy itself.
+
+        x (N, T, V, 3): vertices that the anchors first walk to, until `settle` says whether for good; None
+        where they have just been searched.
+        """
+        walk = x is not None
+        if walk:
+            held = np.unique(batch.frames)
+            self._before = held, *(table[held] for table in self._tables())
+        if isinstance(self.cache, ContactCache):
+            cache, (of_body, *body) = self.cache, posed
+            rows = of_body.reshape(batch.frames.shape)
+            where = batch.frames, rows, *body
+            return lambda lanes, into: cache.energy(self.contact, lanes, into, *where, walk=walk)
+        flat = batch.frames.ravel()
+        if x is not None:
+            samples = self._samples(x.detach().flatten(0, 1))
+            self.cache.walk(samples, flat, *posed, reach=self.contact.margin)
+        points, normals = self.cache.planes(flat, *posed)
+        shape = (*batch.frames.shape, *points.shape[1:])
+        return points.reshape(shape), normals.reshape(shape)
+
+    def search_first(self, weights: Tensor) -> None:
+        """Search where the skinned template touches, in as many frames as give to all others.
+
+        weights (V, 24): skinning weights of the garment. Now, for a thigh that is found in the hem only later
+        meets, with joules, a network that has long since settled.
+        """
+        data, frame, done = self.data, 0, 0
+        while done < data.frames:
+            last, frame = frame, self._near(done, FIRST_PROPAGATED, FIRST_NEAR).stop - 1
+            batch = data.at(np.array([[frame]]))
+            x = skin(batch.rest, weights, batch.transforms)
+            rows, positions, _ = self.posed(batch)
+            self.cache.faces[frame] = self.cache.faces[last]  # a good place to begin
+            self.cache.requery(frame, self._samples(x[0, 0]), positions[rows[0]])
+            end = self._near(frame, FIRST_PROPAGATED, FIRST_NEAR).stop
+            self._propagate(frame, np.arange(done, end))
+            done = end
+        self._changed[:] = False  # a resumed run makes these anchors again
+
+    def requery(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
+        """Search a few windows of a batch anew, those that were left alone for longest.
+
+        frames (N, T): of the whole batch. posed and the predicted vertices x (n, T, V, 3): of the windows
+        that this process works on.
+        """
+        self._credit += self.refresh * frames.size
+        count = int(self._credit)
+        self._credit -= count
+        window = frames.shape[1]
+        middle = frames[:, window // 2]
+        oldest = self.cache.oldest(middle, count)
+        self.search(oldest * window + window // 2, frames, posed, x)
+        searched = np.unique(middle[oldest])
+        for frame in searched:
+            around = self._near(int(frame), PROPAGATED, NEAR)
+            self._propagate(int(frame), np.setdiff1d(np.arange(around.start, around.stop), searched))
+
+    def _near(self, frame: int, reach: int, near: float) -> slice:
+        """The frames around it, of the same motion and at most `reach` off, up to where a mark has moved by
+        `near` [m].
+        """
+        first = self.data.first
+        motion = int(self.data.motion_of(frame))
+        start, stop = max(frame - reach, int(first[motion])), min(frame + reach + 1, int(first[motion + 1]))
+        moved = np.linalg.norm(self._marks[start:stop] - self._marks[frame], axis=2).max(axis=1)
+        far = (start + np.flatnonzero(moved > near)).tolist()
+        before, after = (f + 1 for f in far if f < frame), (f for f in far if f > frame)
+        return slice(max([start, *before]), min([stop, *after]))
+
+    def _propagate(self, frame: int, others: np.ndarray) -> None:
+        """The anchors of a frame to others (n,), as if they had been searched."""
+        for table in self._tables():
+            table[others] = table[[frame]]  # a copy: torch writes no tensor onto itself
+        self.cache.age[others], self._changed[others] = 0, True
+
+    def settle(self, frames: np.ndarray, *, trusted: bool) -> None:
+        """Keep where anchors walked to since `planes`, or put them back where it is no guide. Then
+        every process gives its own to the others. frames: see `requery`.
+        """
+        if self._before and not trusted:
+            rows, *before = self._before
+            for table, held in zip(self._tables(), before):
+                table[rows] = held
+        self._before = None
+        flat = frames.ravel()
+        self._changed[flat] = True
+        if self.group.size == 1:
+            return
+        mine = flat[self.group.part(len(flat))]
+        for table in self._tables():
+            # As bytes, for not every backend sends integers of two; row by row, for a frame may come twice.
+            given = torch.as_tensor(table[mine]).view(torch.uint8)
+            for frame, row in zip(flat, self.group.gathered(given)):
+                torch.as_tensor(table[frame]).view(torch.uint8).copy_(row)  # shares memory
+
+    def search(
+        self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor, *, exact: bool = False
+    ) -> None:
+        """Search the anchors of some places (n,) among the frames (N T,) of a batch; else as `requery`.
+
+        exact: see ContactCache.requery.
+        """
+        flat, (rows, positions, _) = frames.ravel(), posed
+        vertices, window = x.detach(), frames.shape[1]
+        share = vertices.shape[0] * window
+        for place in places:
+            owner, mine = divmod(int(place), share)
+            if owner == self.group.rank:
+                samples = self._samples(vertices[divmod(mine, window)])
+                self.cache.requery(int(flat[place]), samples, positions[rows[mine]], exact=exact)
+            self.cache.age[flat[place]] = 0
+            self._send(int(flat[place]), owner)
+
+    def _samples(self, vertices: Tensor) -> Any:
+        """Contact samples (S, 3) of vertices (V, 3); of tensors also (..., S, 3) of (..., V, 3)."""
+        if self.kernels:
+            return (self.contact.sample_matrix @ vertices.numpy()).astype(np.float32)
+        return (vertices[..., self.stencils, :] * self.sample_weights[..., None]).sum(-2)
+
+    def _tables(self) -> tuple[Any, Any]:
+        """Faces (F, S) and barycentric coordinates (F, S, 2) of all anchors."""
+        return self.cache.faces, self.cache.barycentric
+
+    def _send(self, frame: int, owner: int) -> None:
+        for table in self._tables():
+            # Shares memory with the row; as bytes, for not every backend sends integers of two.
+            self.group.sent(torch.as_tensor(table[frame]).view(torch.uint8), owner)
+
+    def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
+        """What a resumed run needs: anchors that changed in training, ages of all, a search not yet due."""
+        changed = torch.as_tensor(np.flatnonzero(self._changed))
+        faces, barycentric = (torch.as_tensor(table) for table in self._tables())
+        there = changed.to(faces.device)
+        return {
+            "changed": changed, "faces": faces[there], "barycentric": barycentric[there],
+            "age": torch.as_tensor(self.cache.age.copy()),
+        }, {"credit": self._credit}  # fmt: skip
+
+    def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+        """The inverse of `state`."""
+        changed = tensors["changed"].numpy()
+        self._changed[changed] = True
+        for table, name in zip(self._tables(), ("faces", "barycentric")):
+            held = torch.as_tensor(table)  # shares memory
+            held[torch.as_tensor(changed, device=held.device)] = tensors[name].to(held.device)
+        self.cache.age[:] = tensors["age"].numpy()
+        self._credit = facts["credit"]

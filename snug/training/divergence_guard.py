@@ -1,0 +1,155 @@
+"""What happens when a batch is not finite or far too high: it is named, and good weights come back.
+
+Three cases, from harmless to grave:
+- a window is above the recipe's `spike`: the gradient of its step is clipped;
+- a window, or the gradient of a batch, is not finite: the update is left out;
+- `PATIENCE` batches in a row are not finite, or above `RUNAWAY` times the usual energy with a window above
+  `spike`: the network is lost. Weights and Adam's moments go back to the last ones seen to be good, and the
+  learning rate is halved.
+A recipe with a spike beyond all energies, as the paper's, is left alone until something is not finite.
+No decision comes from a clock, so a run with incidents repeats as exactly as one without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from torch import Tensor, nn, optim
+
+from snug.training.training_set import TrainingError
+
+NAMED_WINDOWS = 50  # incidents that are named one by one; all are counted
+SETTLING = 50  # steps before which a high window is no cause for a remark
+PATIENCE = 3  # bad batches in a row, after which good weights come back
+GIVE_UP = 100  # updates left out in a row, after which training stops
+RUNAWAY = 10.0  # times the usual energy of a batch
+MEMORY = 0.98  # of the usual energy, per step
+SNAPSHOT_EVERY = 100  # steps between two copies of good weights
+
+
+class DivergenceGuard:
+    """Judges each batch before its update. spike [J]: see Recipe; None where the loss is no energy."""
+
+    def __init__(self, network: nn.Module, optimiser: optim.Optimizer, *, spike: float | None) -> None:
+        self.network, self.optimiser, self.spike = network, optimiser, spike
+        self.rate = 1.0  # factor on the learning rate, halved by each return to good weights
+        self.summary: dict[str, Any] = {
+            "high_windows": 0, "skipped_updates": 0, "restored": 0, "named_windows": [],
+        }  # fmt: skip
+        self._usual: float | None = None
+        self._bad_in_a_row = self._skipped_in_a_row = 0
+        self._good_step = -1
+        self._good: dict[str, Tensor] = {}
+
+    def judge(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> str:
+        """What to do after windows (N,) [J a frame]; name(row) tells a window in words.
+
+        `update`; `clip` the gradient; `distrust`: clip it, and learn nothing else from what was predicted;
+        `leave out`.
+        Raises TrainingError after GIVE_UP updates left out in a row.
+        """
+        bad = ~np.isfinite(joules)
+        if bad.any():
+            self._leave_out(number, bad, joules, name, "update left out")
+            return "leave out"
+        judged = self.spike is not None and number >= SETTLING
+        mean = float(joules.mean(dtype=np.float64))
+        peaks = joules > self.spike if judged else np.zeros(len(joules), bool)
+        runaway = bool(peaks.any()) and self._usual is not None and mean > RUNAWAY * self._usual
+        if runaway:
+            if self._count_bad(number, joules, name):
+                return "leave out"
+        else:
+            self._usual = mean if self._usual is None else MEMORY * self._usual + (1 - MEMORY) * mean
+        if peaks.any():
+            self._remark(number, peaks, joules, name, "gradient clipped")
+        return "distrust" if runaway else "clip" if peaks.any() else "update"
+
+    def accepts(
+        self, number: int, verdict: str, gradient_norm: float, joules: np.ndarray, name: Callable[[int], str]
+    ) -> bool:
+        """Whether the gradient of a batch judged so may be followed. One that is not finite would ruin the
+        weights, whatever the energies; the highest window is named. Raises TrainingError as `judge` does.
+        """
+        if np.isfinite(gradient_norm):
+            self._skipped_in_a_row = 0
+            if verdict != "distrust":
+                self._bad_in_a_row = 0
+                if number - self._good_step >= SNAPSHOT_EVERY or not self._good:
+                    self._good, self._good_step = self._copied(), number
+            return True
+        first = np.arange(len(joules)) == np.argmax(joules)
+        self._leave_out(number, first, joules, name, "gradient not finite, update left out")
+        return False
+
+    def _leave_out(
+        self, number: int, which: np.ndarray, joules: np.ndarray, name: Callable[[int], str], action: str
+    ) -> None:
+        self._remark(number, which, joules, name, action)
+        self.summary["skipped_updates"] += 1
+        self._skipped_in_a_row += 1
+        if self._skipped_in_a_row >= GIVE_UP:
+            last = name(int(np.argmax(which)))
+            raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {last}")
+        self._count_bad(number, joules, name)
+
+    def _count_bad(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> bool:
+        """One more bad batch; whether that brought good weights back."""
+        self._bad_in_a_row += 1
+        if self._bad_in_a_row < PATIENCE or not self._good:
+            return False
+        worst = np.nan_to_num(joules, nan=np.inf) == np.nan_to_num(joules, nan=np.inf).max()
+        first = np.arange(len(joules)) == np.argmax(worst)
+        self._remark(number, first, joules, name, f"weights of step {self._good_step} restored, rate halved")
+        self._put(self._good)
+        if self._skipped_in_a_row <= PATIENCE:  # data that is not finite would halve it again and again
+            self.rate *= 0.5
+        self.summary["restored"] += 1
+        self._bad_in_a_row = 0
+        return True
+
+    def _remark(
+        self, number: int, which: np.ndarray, joules: np.ndarray, name: Callable[[int], str], action: str
+    ) -> None:
+        for row in np.flatnonzero(which):
+            self.summary["high_windows"] += not action.startswith("weights")
+            if len(self.summary["named_windows"]) < NAMED_WINDOWS:
+                window, value = name(int(row)), repr(float(joules[row]))
+                named = {"step": number, "window": window, "joules": value, "action": action}
+                self.summary["named_windows"].append(named)
+
+    def _copied(self) -> dict[str, Tensor]:
+        return {name: tensor.detach().clone() for name, tensor in live_tensors(self.network, self.optimiser)}
+
+    def _put(self, tensors: dict[str, Tensor]) -> None:
+        for name, tensor in live_tensors(self.network, self.optimiser):
+            if name in tensors:
+                tensor.detach().copy_(tensors[name])
+            else:  # a moment that the optimiser did not have yet when the copy was made
+                tensor.detach().zero_()
+
+    def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
+        """Everything that a resumed run needs: tensors and plain facts."""
+        facts = {
+            "rate": self.rate, "summary": self.summary, "usual": self._usual, "good_step": self._good_step,
+            "bad_in_a_row": self._bad_in_a_row, "skipped_in_a_row": self._skipped_in_a_row,
+        }  # fmt: skip
+        return dict(self._good), facts
+
+    def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+        """The inverse of `state`."""
+        device = next(self.network.parameters()).device
+        self._good = {name: tensor.to(device) for name, tensor in tensors.items()}
+        self.rate, self.summary, self._usual = facts["rate"], facts["summary"], facts["usual"]
+        self._good_step, self._bad_in_a_row = facts["good_step"], facts["bad_in_a_row"]
+        self._skipped_in_a_row = facts["skipped_in_a_row"]
+
+
+def live_tensors(network: nn.Module, optimiser: optim.Optimizer) -> list[tuple[str, Tensor]]:
+    """The weights and Adam's state, by name, as they are held: what is written into them counts."""
+    found = [(f"network.{name}", tensor) for name, tensor in network.state_dict(keep_vars=True).items()]
+    for name, parameter in network.named_parameters():
+        found += [(f"adam.{name}.{key}", tensor) for key, tensor in optimiser.state[parameter].items()]
+    return found

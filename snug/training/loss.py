@@ -1,0 +1,211 @@
+"""The loss: the very energies that the simulator minimises, summed without weights (paper, eq. 5 to 7).
+
+For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
+
+    [ sum_t  strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)  +  sum_{t >= 3} inertia(x_t) ] / T
+
+in joules a frame: a frame without two frames before it in the window has no inertia term, so a window of
+three holds three static terms and one inertia, whose gradient reaches all three frames.
+
+Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
+kernels (snug.kernels.energies, or those beside the definition) give the same values and gradients in a small
+part of the time, so autograd uses those. On a GPU the definitions run as they are, and on a CPU that of an
+energy that has no kernel. A recipe may name any energy of the simulator (snug.recipes.energies).
+The contact planes are the one difference: training keeps an anchor for each sample, which walks along, and
+takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the
+closest point.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from reference_sim.cloth import Cloth
+from reference_sim.energies import (
+    BendHinge,
+    ContactPenalty,
+    Energy,
+    Gravity,
+    Inertia,
+    StretchSpring,
+    StretchStVK,
+)
+from snug.kernels.energies import KERNELS, Kernel, batched_kernel, inertia_kernel
+from snug.kernels.lanes import LANES, laid, unlaid
+from snug.recipes.energies import find_energy
+from snug.recipes.recipe import TERMS, Recipe
+from snug.training.device import CPU
+from snug.training.pbns_material import SquaredContact, spring_terms
+
+STATIC = ("strain", "bending", "gravity")
+Planes = tuple[Any, Any] | Kernel
+
+MEMBRANES = {"stvk": StretchStVK, "springs": StretchSpring}
+
+
+def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
+    """The recipe's terms of single frames without contact, by name: those of its material, then any other
+    energy of the simulator that it names.
+    """
+    of_material = dict(zip(STATIC, _terms_of_material(cloth, recipe)))
+    terms = {name: of_material[name] for name in STATIC if name in recipe.terms}
+    return terms | {name: find_energy(name)(cloth) for name in recipe.terms if name not in TERMS}
+
+
+def _terms_of_material(cloth: Cloth, recipe: Recipe) -> Sequence[Energy]:
+    """What the terms STATIC are."""
+    if recipe.material == "pbns":
+        return spring_terms(cloth)
+    membrane = MEMBRANES[recipe.material](cloth)
+    return membrane, BendHinge(cloth, scaling=recipe.bending), Gravity(cloth)
+
+
+def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
+    """The recipe's contact term; options it leaves open are the simulator's own."""
+    if recipe.material == "pbns":
+        return SquaredContact(cloth)
+    options: dict[str, Any] = {"samples": recipe.contact_samples}
+    if recipe.contact_margin is not None:
+        options["margin"] = recipe.contact_margin
+    if recipe.contact_stiffness is not None:
+        options["per_sample_stiffness"] = recipe.contact_stiffness
+    return ContactPenalty(cloth, **options)
+
+
+class ClosedForms(torch.autograd.Function):
+    """Energies of each configuration of a batch by kernels in lanes, which all add to one gradient.
+
+    apply(x (N, T, V, 3) float32, *kernels) -> as many (N, T) [J]. Differentiable once, by x alone, and only
+    in their plain sum times a number: raises ValueError for energies that are weighed against each other.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, *kernels: Kernel) -> tuple[Tensor, ...]:
+        lanes = laid(x)
+        gradient = np.zeros_like(lanes)
+        values = tuple(unlaid(kernel(lanes, gradient), *x.shape[:2]) for kernel in kernels)
+        ctx.gradient = unlaid(gradient, *x.shape[:2])
+        return values
+
+    @staticmethod
+    def backward(ctx: Any, *above: Tensor) -> Any:
+        factors = torch.stack(above)
+        if (factors != factors.flatten()[0]).any():
+            raise ValueError("kernels give the gradient of the sum of all energies of a batch: weigh none")
+        return ctx.gradient * factors.flatten()[0], *([None] * len(above))
+
+
+class ClosedForm(torch.autograd.Function):
+    """An energy of each configuration of a batch by its own closed form, one configuration after the other.
+
+    apply(x (..., V, 3), energy, *frame data (..., S, 3) numpy) -> (...) [J]. Differentiable once, by x alone.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, energy: Any, *frame_data: np.ndarray) -> Tensor:
+        flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
+        rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
+        values, gradients = np.empty(len(flat), flat.dtype), np.empty_like(flat)
+        for n in range(len(flat)):
+            values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
+        ctx.gradients = torch.from_numpy(gradients).reshape(x.shape)
+        ctx.extra = len(frame_data)
+        return torch.from_numpy(values).reshape(x.shape[:-2])
+
+    @staticmethod
+    def backward(ctx: Any, *above: Tensor) -> Any:
+        return above[0][..., None, None] * ctx.gradients, None, *([None] * ctx.extra)
+
+
+def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Tensor:
+    """Energy of each configuration, (..., V, 3) -> (...) [J]: by kernel from frame data in numpy, or by its
+    definition from tensors.
+    """
+    if kernels:
+        return ClosedForm.apply(x, energy, *frame_data)
+    return energy.energy(x, *frame_data).sum(-1)
+
+
+def has_kernel(energy: Energy) -> bool:
+    """Whether its gradient is known in closed form; automatic differentiation gives that of the others."""
+    return type(energy) in KERNELS or type(energy).value_and_gradient is not Energy.value_and_gradient
+
+
+def on_device(energy: Any, device: torch.device) -> Any:
+    """The same energy with its arrays as tensors on a device: evaluating its definition copies nothing."""
+    twin = copy.copy(energy)
+    for name, value in vars(energy).items():
+        if isinstance(value, np.ndarray):
+            tensor = torch.as_tensor(value, device=device)
+            setattr(twin, name, tensor.float() if tensor.is_floating_point() else tensor)
+    return twin
+
+
+class PhysicsLoss:
+    """Energies of sub-sequences, by term. dt: seconds between frames [s].
+
+    kernels: by closed forms on a CPU (in numpy and numba) where there are any, else by the definitions on
+    `device`.
+    """
+
+    def __init__(
+        self, cloth: Cloth, recipe: Recipe, *, dt: float, device: torch.device = CPU, kernels: bool = True
+    ) -> None:
+        self.terms, self.kernels = recipe.terms, kernels
+        self.contact = make_contact(cloth, recipe)
+        self.inertia = Inertia(cloth, dt)
+        self.static = static_terms(cloth, recipe)
+        self._contact = self.contact
+        if not kernels:
+            self.inertia, self._contact = on_device(self.inertia, device), on_device(self.contact, device)
+        self.static = {
+            name: term if kernels and has_kernel(term) else on_device(term, device)
+            for name, term in self.static.items()
+        }
+
+    def __call__(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Tensor]:
+        """Joules of each window and frame, term -> (N, T).
+
+        x: (N, T, V, 3) [m], each frame relative to its own pelvis p. ahead: (N, T, 3) [m],
+        2 p_{t-1} - p_{t-2} - p_t: where the pelvis would be if it kept its velocity, seen from where it is.
+        planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors; or a
+        kernel in lanes that knows its planes.
+        """
+        closed: dict[str, Tensor] = {}
+        if self.kernels and x.dtype == torch.float32:
+            kernels = self._kernels(x, ahead, planes)
+            energies: Any = ClosedForms
+            closed = dict(zip(kernels, energies.apply(x, *kernels.values()) if kernels else ()))
+        terms = {}
+        for name, energy in self.static.items():
+            kernels_too = self.kernels and has_kernel(energy)
+            terms[name] = closed[name] if name in closed else summed(energy, x, kernels=kernels_too)
+        if "inertia" in self.terms and x.shape[1] >= 3:
+            terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead)
+        if "collision" in self.terms and planes is not None:
+            if "collision" in closed:
+                terms["collision"] = closed["collision"]
+            else:
+                assert isinstance(planes, tuple)
+                terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
+        return terms
+
+    def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Kernel]:
+        """Those terms that have a kernel in lanes."""
+        found: dict[str, Any] = {name: batched_kernel(energy) for name, energy in self.static.items()}
+        if "inertia" in self.terms and x.shape[1] >= 3 and len(x) % LANES == 0:
+            found["inertia"] = inertia_kernel(self.inertia, laid(ahead), len(x))
+        if "collision" in self.terms and callable(planes):
+            found["collision"] = planes
+        return {name: kernel for name, kernel in found.items() if kernel}
+
+    def _inertia(self, x: Tensor, ahead: Tensor) -> Tensor:
+        x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
+        inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
+        return torch.nn.functional.pad(inertia, (2, 0))

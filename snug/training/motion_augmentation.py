@@ -1,0 +1,188 @@
+"""New training motions from old ones: limbs of different clips put together, mirrored, and turned a little.
+
+Self-supervision needs no simulation, so a training set is not bound to what was recorded. Fourteen clips show
+a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
+clip takes the root, the spine, each leg and each arm from six random places of the training clips (mirrored
+half of the time), scales legs and spine, adds to each joint that carries cloth a slow turn about a random
+axis, lifts some thighs, hangs each arm at a random distance from the torso, and opens the hips where a thigh
+comes too near to it. Legs that always come as a pair show no lunge; a network that has met no thigh as high
+as in a squat lets it through the hem; and people, unlike tables of angles, let their arms hang close to the
+torso and turned in their sockets. Every part stays continuous in time, so velocities keep their meaning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from snug.body.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
+from snug.motion.motion import Motion, arm_clearance, mirrored
+from snug.recipes.recipe import DEFAULT, Recipe
+
+PARTS: tuple[tuple[str, ...], ...] = (
+    ("pelvis",),
+    ("left_hip", "left_knee", "left_ankle", "left_foot"),
+    ("right_hip", "right_knee", "right_ankle", "right_foot"),
+    ("spine1", "spine2", "spine3", "neck", "head"),
+    ("left_collar", "left_shoulder", "left_elbow", "left_wrist", "left_hand"),
+    ("right_collar", "right_shoulder", "right_elbow", "right_wrist", "right_hand"),
+)
+SCALE = dict.fromkeys((1, 2, 3), (0.6, 1.3))  # of legs and spine; an arm swung further might enter the torso
+# Degrees between upper arm and spine where an arm of a clip comes nearest. The lower end is where recorded
+# arms are spread to (snug.motion.motion.ARMS_CLEAR): nearer, a sleeve is pinched and no shape is good.
+HANGING = (25.0, 50.0)
+# Degrees between thigh and spine: a hip bends by about 120 and no further. At 40, as a squat under the spine
+# of a bow has it, thighs enter the belly, and no hem between them is free.
+LAP = 60.0
+LIFT = 90.0  # degrees, at most: a lifted thigh comes up and goes down again by a random part of it
+# Turn of each joint, relative to the recipe's; the collar bone turns little, the shoulder most.
+TURNED = {
+    "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,
+    "left_shoulder": 2.0, "right_shoulder": 2.0, "left_collar": 0.4, "right_collar": 0.4, "neck": 1.0,
+    "head": 1.0,
+}  # fmt: skip
+RATE = (0.2, 1.0)  # Hz, of the slow turns and lifts
+FRAMES = 60  # of a mixed clip
+MOST_MIXED = 20_000  # frames: each keeps its body and its anchors
+SHARED_SEED = 0  # of clips that are simulated: once, whatever the seed of the training
+MOST_ANCHORS = 2e9  # bytes, of those of mixed frames
+ANCHORS = 24  # bytes of a frame's for each vertex: six samples, four bytes each
+HIPS, SIDEWAYS = (JOINT["left_hip"], JOINT["right_hip"]), np.array([1.0, 0.0, 0.0])
+SHOULDERS, FRONT = (JOINT["left_shoulder"], JOINT["right_shoulder"]), np.array([0.0, 0.0, 1.0])
+SHAPES = 1  # stream of random numbers beside that of the clips
+OPENINGS = 5  # leave less than a degree missing, almost always
+
+
+def mixed_for(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed: int) -> list[Motion]:
+    """The clips that a recipe asks for beside those motions, for a garment of so many vertices."""
+    given = sum(motion.frames for motion in motions)
+    frames = min(round(recipe.mixed * given), MOST_MIXED, int(MOST_ANCHORS / (ANCHORS * vertices)))
+    return mixed_motions(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
+
+
+def shared_clips(
+    motions: Sequence[Motion], share: int, *, vertices: int, swinging: bool = False
+) -> list[Motion]:
+    """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
+    recipe does. Fewer are the first of more. swinging: those of each share, and pieces of the given motions,
+    as one snug.training.swinging_clips.
+    """
+    from snug.training.swinging_clips import swinging_motion
+
+    clips = mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    if not swinging:
+        return clips
+    given = sum(motion.frames for motion in motions)
+    ends = [round(part * given / FRAMES) for part in range(share + 1)]
+    parts = [clips[first:end] for first, end in pairwise(ends)]
+    return [
+        swinging_motion(part, f"swinging_{number}", seed=number, given=motions)
+        for number, part in enumerate(parts)
+        if part
+    ]
+
+
+def shapes_of_mixed(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:
+    """Shape numbers (count, coefficients) of the bodies of mixed clips, where each has its own: those of the
+    recipe's share from its U(-r, r), the others zero.
+    """
+    random = np.random.default_rng([seed, SHAPES])
+    drawn = recipe.shape_range * random.uniform(-1.0, 1.0, (count, coefficients))
+    drawn[random.random(count) >= recipe.shape_share] = 0.0
+    return drawn
+
+
+def mixed_motions(
+    motions: Sequence[Motion], frames: int, *, turn: float, lifted: float, seed: int
+) -> list[Motion]:
+    """About `frames` frames of mixed clips, named mixed_0, mixed_1, ...; deterministic for a seed.
+
+    turn: standard deviation of the added turns, per axis [rad]; half of it stays, half comes and goes.
+    lifted: share of the thighs that are lifted.
+    """
+    random = np.random.default_rng(seed)
+    count = max(1, round(frames / FRAMES)) if frames > 0 else 0
+    return [_mixed(motions, random, turn, lifted, f"mixed_{number}") for number in range(count)]
+
+
+def _mixed(
+    motions: Sequence[Motion], random: np.random.Generator, turn: float, lifted: float, name: str
+) -> Motion:
+    poses = np.zeros((FRAMES, len(JOINT), 3))
+    translations = np.zeros((FRAMES, 3))
+    fps = motions[0].fps
+    for number, part in enumerate(PARTS):
+        source = motions[int(random.integers(len(motions)))]
+        if random.random() < 0.5:
+            source = mirrored(source)
+        start = random.integers(max(1, source.frames - FRAMES + 1))
+        # A clip that is too short rests at its end.
+        taken = np.minimum(np.arange(start, start + FRAMES), source.frames - 1)
+        scale = random.uniform(*SCALE.get(number, (1.0, 1.0)))
+        joints = [JOINT[joint] for joint in part]
+        poses[:, joints] = scale * source.poses[taken][:, joints]
+        if number == 0:
+            translations = source.translations[taken]
+    seconds = np.arange(FRAMES)[:, None] / fps
+    for joint, share in TURNED.items():
+        stays, swings = random.normal(0.0, share * turn, (2, 3))
+        phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
+        added = rotation_matrices(stays + swings * np.sin(phase))
+        poses[:, JOINT[joint]] = axis_angles(rotation_matrices(poses[:, JOINT[joint]]) @ added)
+    for hip in HIPS:
+        height = random.uniform(0.0, np.deg2rad(LIFT)) * (random.random() < lifted)
+        phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
+        forward = rotation_matrices(-0.5 * height * (1 + np.sin(phase)) * SIDEWAYS)
+        poses[:, hip] = axis_angles(forward @ rotation_matrices(poses[:, hip]))
+    mixed = opened_hips(Motion(name, poses, translations, fps=fps, kind="mixed"))
+    return hung_arms(mixed, np.deg2rad(random.uniform(*HANGING, 2)))
+
+
+def hung_arms(motion: Motion, nearest: np.ndarray) -> Motion:
+    """Each shoulder turned about the chest's front axis, by one angle in all frames, until its upper arm
+    comes as near to the downward spine as `nearest` says: (2,) [rad], left and right.
+
+    An arm held forward, which is not square to that axis, is moved less.
+    """
+    poses = motion.poses.copy()
+    outward = (nearest - arm_clearance(motion).min(axis=0)) * [1.0, -1.0]
+    for shoulder, angle in zip(SHOULDERS, outward):
+        poses[:, shoulder] = axis_angles(
+            rotation_matrices(angle * FRONT) @ rotation_matrices(poses[:, shoulder])
+        )
+    return replace(motion, poses=poses)
+
+
+def lap_clearance(motion: Motion) -> np.ndarray:
+    """Angle between each thigh and the upward spine: small when the thigh lies on the belly.
+
+    -> (T, 2) [rad], left and right.
+    """
+    joints = joint_positions(motion.poses, motion.translations)
+    up = joints[:, JOINT["spine3"]] - joints[:, JOINT["spine1"]]
+    thighs = [
+        joints[:, JOINT[f"{side}_knee"]] - joints[:, JOINT[f"{side}_hip"]] for side in ("left", "right")
+    ]
+    cosines = [
+        (thigh * up).sum(-1) / np.linalg.norm(thigh, axis=-1) / np.linalg.norm(up, axis=-1)
+        for thigh in thighs
+    ]
+    return np.arccos(np.clip(np.stack(cosines, axis=1), -1.0, 1.0))
+
+
+def opened_hips(motion: Motion) -> Motion:
+    """Each thigh turned back, in the frames where it is nearer to the spine than LAP, until it is not.
+
+    It turns about the axis through the hips, which a thigh to the side is not square to: hence repeatedly.
+    """
+    for _ in range(OPENINGS):
+        missing = np.maximum(0.0, np.deg2rad(LAP) - lap_clearance(motion))
+        poses = motion.poses.copy()
+        for hip, angles in zip(HIPS, missing.T):
+            back = rotation_matrices(angles[:, None] * SIDEWAYS)
+            poses[:, hip] = axis_angles(back @ rotation_matrices(poses[:, hip]))
+        motion = replace(motion, poses=poses)
+    return motion

@@ -1,0 +1,108 @@
+"""The words of `python -m snug.train`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Sequence
+
+from reference_sim.command.command_line import Parser
+from snug.garments.options import add_garment_options
+from snug.motion.options import add_motion_options
+from snug.recipes.named import RECIPES, TRAININGS
+
+MODELS = ("snug", "pbns", "supervised", "santesteban2019", "tailornet")
+EXAMPLES = """examples:
+  python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
+  python -m snug.train --garment tshirt --garment tunic  one network for each garment
+  python -m snug.train --garment shirt.obj --body mine.npz    for a garment of your own (see snug.check)
+  python -m snug.train --model pbns --steps 8000         the static baseline
+  python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
+  python -m snug.train --validation kick --patience 10   stop when a validation motion gets no better
+  python -m snug.train --recipe paper --vertices 4400    the paper's text (but see snug.recipes.named on contact)
+  python -m snug.train --dataset data/walks --model supervised    taught by the simulations of a data set
+  python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
+  torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
+
+supervised, santesteban2019 and tailornet are taught by simulated motions, which python -m benchmarks.dataset
+makes; python -m benchmarks.run makes its own. With --dataset, --garment, --vertices and --body are those that
+it was built with."""
+
+
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    parser = Parser(
+        prog="python -m snug.train",
+        description="Train a garment network on a dressed body and write it to one file.",
+        epilog=EXAMPLES,
+    )
+    add = parser.add_argument_group("what").add_argument
+    add("--model", choices=MODELS, default="snug", help="network and loss (default: %(default)s)")
+    add("--recipe", choices=tuple(RECIPES), help="named options (default: the model's own)")
+    add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
+    add("--garment", metavar="NAME|FILE", action="append", default=[],
+        help="tshirt, tunic, skirt, tank_top, long_sleeves, trousers, shorts, dress, or a mesh made for the "
+        "body; repeat for one model each (default: tshirt)")  # fmt: skip
+    add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
+    add("--body", metavar="FILE", help="an own body of SMPL's family, .npz or .pkl (default: the package's)")
+    add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
+    add("--dataset", metavar="DIR",
+        help="motions and simulations of a data set, read from its files a few frames at a time")  # fmt: skip
+    add_motion_options(add)
+    add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
+    add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
+    add("-o", "--out", metavar="FILE",
+        help="file to write; of several garments each adds its name (default: by --model)")  # fmt: skip
+    add = parser.add_argument_group("early stop").add_argument
+    add("--validation", metavar="NAME", action="append", default=[],
+        help="roll this motion out now and then, held out of training, or one of the library's validation "
+        "motions; may be repeated. The weights that do best are kept")  # fmt: skip
+    add("--validate-every", metavar="STEPS", type=int, default=200, help="(default: %(default)s)")
+    add("--patience", metavar="N", type=int, default=0,
+        help="validations without a better value, after which training stops (default: never)")  # fmt: skip
+    add = parser.add_argument_group("where and how long").add_argument
+    add("--device", default="cpu", metavar="cpu|cuda", help="where the whole step runs (default: cpu)")
+    add("--threads", type=int, default=1, help="of torch on the CPU (default: %(default)s)")
+    add(
+        "--checkpoint-minutes", metavar="M", type=float, default=5.0, help="0 for none (default: %(default)s)"
+    )
+    add("--checkpoint-steps", metavar="N", type=int, default=0, help="a checkpoint every N steps as well")
+    add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
+    add("--tensorboard", metavar="DIR", help="write curves for TensorBoard (extra: tensorboard)")
+    add_garment_options(parser)
+    options = parser.parse_args(arguments)
+    options.out = options.out or f"{options.model}.safetensors"
+    return options
+
+
+LEAST = {
+    "seed": 0,
+    "threads": 1,
+    "validate_every": 1,
+    "patience": 0,
+    "checkpoint_minutes": 0,
+    "checkpoint_steps": 0,
+    "steps": 1,
+    "vertices": 1,
+}
+
+
+def _most(name: str) -> int:
+    """More threads than cores only wait for each other; a seed has 63 bits."""
+    return {"seed": (1 << 63) - 1, "threads": os.cpu_count() or 1}.get(name, 10**9)
+
+
+def check(options: argparse.Namespace) -> None:
+    """Raises ValueError for a word that is out of range, or means nothing without another."""
+    for name, least in LEAST.items():
+        value, most = getattr(options, name), _most(name)
+        if not least <= value <= most:
+            wanted = f"at most {most}" if value > most else f"at least {least}"
+            raise ValueError(f"--{name.replace('_', '-')} {str(value)[:40]}: {wanted}")
+    if options.dataset and options.motions:
+        raise ValueError(f"--dataset {options.dataset}: has motions of its own; leave out --motions")
+    if TRAININGS[options.model].simulated and not options.dataset:
+        raise ValueError(f"--model {options.model}: is taught by simulations; add --dataset DIR")
+    if options.recipe and TRAININGS[options.model].simulated:
+        raise ValueError(f"--recipe {options.recipe}: {options.model} has its own; leave out --recipe")
+    if options.patience and not options.validation:
+        raise ValueError(f"--patience {options.patience}: add --validation NAME, a motion to stop by")

@@ -1,0 +1,326 @@
+"""One step of training: draw sub-sequences, predict, sum energies, update, requery contact anchors.
+
+`snug.training.run` repeats it, and writes down what happens between steps.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from snug.body.skinning import skin
+from snug.kernels.skinning import FastSkin
+from snug.networks.dressed_body import DressedBody
+from snug.networks.trained_model import find_kind, make_network
+from snug.recipes.recipe import Recipe
+from snug.training.contact.planes import Posed, TrainingContact
+from snug.training.device import CPU
+from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
+from snug.training.hidden_state_cache import HiddenStateCache
+from snug.training.loss import PhysicsLoss
+from snug.training.motion_augmentation import mixed_for, shapes_of_mixed
+from snug.training.process_group import ALONE, Group, GroupError
+from snug.training.simulated_past import SimulatedPast
+from snug.training.stopwatch import Stopwatch
+from snug.training.training_set import Batch, TrainingError, TrainingSet
+from snug.training.vertex_targets import Targets, VertexTargets
+
+DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
+MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
+
+
+class Trainer:
+    """See `snug.training.train.train` for the arguments. Everything random comes from `seed`; no decision from a
+    clock. Random numbers are drawn on the CPU whatever the device, so that every device sees the same.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        dressed: DressedBody,
+        motions: Sequence[Any],
+        *,
+        steps: int,
+        seed: int,
+        recipe: Recipe,
+        trajectories: Mapping[str, Targets] | None = None,
+        device: torch.device = CPU,
+        kernels: bool | None = None,
+        group: Group = ALONE,
+    ) -> None:
+        if steps < 1:
+            raise TrainingError(f"steps={steps}: training needs at least one step")
+        if not motions:
+            raise TrainingError("no motions to train on")
+        if kernels and device.type != "cpu":
+            raise TrainingError(f"kernels=True, device={device}: the kernels run on a CPU alone")
+        how = find_kind(kind)
+        self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
+        self.device, self.group, self.clock = device, group, Stopwatch(device)
+        self.kernels = device.type == "cpu" if kernels is None else kernels
+        self.posed_by = FastSkin.apply if self.kernels else skin
+        mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
+        drawn = recipe.shape_range and dressed.body.shape_count and how.features == "motion" and how.physics
+        self.shaped = bool(drawn) and recipe.shape_of == "window"
+        shapes = None
+        if drawn and recipe.shape_of == "clip":
+            mean = np.zeros((len(motions), dressed.body.shape_count))
+            of_mixed = shapes_of_mixed(len(mixed), dressed.body.shape_count, recipe, seed=seed)
+            shapes = np.concatenate([mean, of_mixed])
+        self.data = TrainingSet(
+            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences,
+            device=device, shapes=shapes,
+        )  # fmt: skip
+        self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
+        pins = dressed.garment.pins
+        network = make_network(
+            kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins
+        )
+        network.normalise_by(*self.data.input_statistics())
+        self.network = network.to(device)
+        if how.closed_form:
+            network.closed_form = self.kernels
+        self.optimiser = torch.optim.AdamW(
+            self.network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay, fused=True
+        )
+        self.random = np.random.default_rng(seed)
+        self.noise = torch.Generator().manual_seed(seed)
+        self.windows = recipe.batch if how.sequences else recipe.batch * recipe.window
+        self.order = np.empty(0, np.int64)
+        self.epoch = 0
+        self.loss: PhysicsLoss | None = None
+        self.contact: TrainingContact | None = None
+        self.targets: VertexTargets | None = None
+        self.past: SimulatedPast | None = None
+        self.pretraining_seconds = 0.0  # s
+        self._set_up_supervision(motions, trajectories)
+        self.hidden_states = self._hidden_state_cache()
+        self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
+        self._callable = group.wrapped(self.network)
+
+    def _set_up_supervision(self, motions: Sequence[Any], trajectories: Mapping[str, Targets] | None) -> None:
+        """By simulated vertices, or by the energies, and then perhaps about a simulated past."""
+        how, recipe, data = self.how, self.recipe, self.data
+        if how.targets:
+            if self.group.size > 1:
+                raise GroupError(
+                    f"{self.kind} is trained by one process: only the energies are shared by several"
+                )
+            on_cpu = (self.dressed.weights(recipe.smoothing), data.transforms.cpu())
+            self.targets = how.targets(self.dressed, motions, trajectories, *on_cpu).to(self.device)
+            return
+        self.loss = PhysicsLoss(
+            self.dressed.cloth, recipe, dt=data.dt, device=self.device, kernels=self.kernels
+        )
+        self.contact = self.contact_of(data)
+        if self.contact:
+            self.contact.search_first(self.weights)
+        if how.past and "inertia" in recipe.terms:
+            self.past = SimulatedPast(data, motions, trajectories)
+            if recipe.pretraining:
+                begun = time.perf_counter()
+                self.past.pretrain(self.network, self.weights, steps=recipe.pretraining, seed=self.seed)
+                self.pretraining_seconds = time.perf_counter() - begun
+
+    def _hidden_state_cache(self) -> HiddenStateCache | None:
+        start = self.network.random_state(1, 0.0, torch.Generator())
+        remembered = self.recipe.remembered and not self.shaped  # a state belongs to one body
+        if not (self.loss and remembered and isinstance(start, Tensor)):
+            return None
+        return HiddenStateCache(self.data.first, (start.shape[0], start.shape[-1]), self.device)
+
+    def contact_of(self, data: TrainingSet) -> TrainingContact | None:
+        """Anchors for the frames of a set; None where the recipe has no collision."""
+        if self.loss is None or "collision" not in self.recipe.terms:
+            return None
+        return TrainingContact(
+            data,
+            self.loss.contact,
+            refresh=self.recipe.contact_refresh,
+            kept=not self.shaped,
+            kernels=self.kernels,
+            group=self.group if data is self.data else ALONE,
+        )
+
+    def draw(self) -> np.ndarray:
+        """The next windows: every sub-sequence once, in random order, before any comes again."""
+        even = self.recipe.even
+        while len(self.order) < self.windows:
+            parts = [
+                self.random.permutation(np.arange(offset, len(self.data.starts), even))
+                for offset in self.random.permutation(even)
+            ]
+            self.order = np.concatenate([self.order, *parts])
+            self.epoch += 1
+        drawn, self.order = self.order[: self.windows], self.order[self.windows :]
+        return drawn
+
+    def step(self, number: int) -> dict[str, float]:
+        """One update; mean joules a frame by term (cm^2 or cm for what simulated vertices teach)."""
+        self.clock.step_begins(number)
+        with self.clock.part("draw"):
+            self._set_rate(number)
+            windows = self.draw()
+            betas = None
+            if self.shaped:
+                shapes = self.dressed.body.shape_count
+                betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
+            mine = self.group.part(len(windows))
+            batch = self.data.batch(windows[mine], None if betas is None else betas[mine])
+            state = self.start_state(len(windows), mine, batch)
+        if self.loss is None:
+            assert self.targets is not None
+            with self.clock.part("forward"):
+                terms = self.targets.terms(self.network, batch, state, self.posed_by)
+            means, _ = self._update(number, windows, terms)
+        else:
+            frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
+            means = self._physics_step(number, windows, frames, batch, state)
+        return {"loss": sum(means.values()), **means}
+
+    def _physics_step(
+        self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Any
+    ) -> dict[str, float]:
+        """windows (N,), frames (N, T): of all processes; batch: of this one."""
+        assert self.loss is not None
+        x, after = self.predict(batch, state)
+        planes = posed = None
+        if self.contact:
+            with self.clock.part("contact"):
+                posed = self.contact.posed(batch)
+                planes = self.contact.planes(batch, posed, x)
+        with self.clock.part("energies"):
+            terms = self.loss(x, batch.ahead, planes)
+            if self.contact and posed and self._searched_for_high(number, frames, posed, x, terms):
+                terms = self.loss(x, batch.ahead, self.contact.planes(batch, posed))
+            if self.past:
+                terms |= self.past.terms(x, batch)
+        means, trusted = self._update(number, windows, terms)
+        if trusted and self.hidden_states:
+            self.hidden_states.keep(batch.frames[:, -1], after, self.group)
+        if self.contact and posed:
+            with self.clock.part("requery"):
+                self.contact.settle(frames, trusted=trusted)
+                if trusted:
+                    self.contact.requery(frames, posed, x)
+        return means
+
+    def _searched_for_high(
+        self, number: int, frames: np.ndarray, posed: Posed, x: Tensor, terms: dict[str, Tensor]
+    ) -> bool:
+        """Search the anchors of windows (N, T) above the spike limit at once; whether there were any.
+
+        An anchor of another frame, or of a garment that has moved on, can claim a contact that is none; so
+        can one that stood for being roughly right, hence the search is exact. Not where most windows are
+        high: then it is the network that is lost, and its vertices are no guide.
+        """
+        assert self.contact is not None
+        if number < SETTLING:
+            return False
+        joules = torch.stack(list(terms.values())).detach().sum(0).mean(1)
+        high = np.flatnonzero(self.group.gathered(joules > self.recipe.spike).cpu().numpy())
+        if not 0 < len(high) <= MOSTLY_FINE * len(frames):
+            return False
+        places = (high[:, None] * self.data.window + np.arange(self.data.window)).ravel()
+        self.contact.search(places, frames, posed, x, exact=True)
+        return True
+
+    def start_state(self, count: int, mine: slice, batch: Batch) -> Any:
+        """What the windows of a batch start from: noise of the recipe's sigma, added to the cached state,
+        or a network's own masks.
+
+        Noise is drawn for all `count` windows of the step; only that of this process is kept.
+        """
+        state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
+        if state is None:
+            return None
+        state = state[:, mine].contiguous()  # as cuDNN wants it
+        return state + self.hidden_states.at(batch.frames[:, 0]) if self.hidden_states else state
+
+    def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Any]:
+        """Vertices relative to the pelvis (N, T, V, 3) [m], and the state after them."""
+        with self.clock.part("forward"):
+            offsets, after = self._callable(batch.features, state)
+        with self.clock.part("skinning"):
+            # Offsets first: the sum then lies in memory as they do.
+            return self.posed_by(offsets + batch.rest, self.weights, batch.transforms), after
+
+    def _set_rate(self, number: int) -> None:
+        recipe, share = self.recipe, 1.0
+        if recipe.schedule == "epochs" and self.epoch > recipe.drop_after_epochs:
+            share = DROPPED
+        elif recipe.schedule == "cosine":
+            share = LEAST_SHARE + (1 - LEAST_SHARE) * 0.5 * (1 + math.cos(math.pi * number / self.steps))
+        for group in self.optimiser.param_groups:
+            group["lr"] = self.guard.rate * recipe.learning_rate * share
+
+    def _update(
+        self, number: int, windows: np.ndarray, terms: dict[str, Tensor]
+    ) -> tuple[dict[str, float], bool]:
+        """Descend by the mean joules a frame, unless the guard leaves it out.
+
+        Means by term; whether the prediction is good enough to search contact anchors with.
+        """
+        stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
+        whole = self.group.gathered(stacked.detach())
+        joules = whole.sum(1).mean(1).cpu().numpy()
+        means = dict(zip(terms, whole.mean((0, 2)).tolist()))
+
+        def name(row: int) -> str:
+            return self.data.where(self.data.starts[windows[row]])
+
+        verdict = self.guard.judge(number, joules, name)
+        if verdict == "leave out":
+            return means, False
+        with self.clock.part("backward"):
+            self.optimiser.zero_grad(set_to_none=True)
+            stacked.sum(1).mean().backward()
+        with self.clock.part("optimiser"):
+            parameters = [p for p in self.network.parameters() if p.grad is not None]
+            norm = nn.utils.get_total_norm([p.grad for p in parameters])
+            if not self.guard.accepts(number, verdict, float(norm), joules, name):
+                return means, False
+            if verdict != "update":
+                nn.utils.clip_grads_with_norm_(parameters, self.recipe.gradient_limit, norm)
+            self.optimiser.step()
+        return means, verdict != "distrust"
+
+    def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
+        """Everything that the next step depends on: tensors, and plain facts for a JSON header."""
+        tensors = {name: tensor.detach() for name, tensor in live_tensors(self.network, self.optimiser)}
+        tensors["order"], tensors["noise"] = torch.as_tensor(self.order.copy()), self.noise.get_state()
+        if self.hidden_states:
+            tensors["hidden_states"] = self.hidden_states.states
+        facts: dict[str, Any] = {"epoch": self.epoch, "random": self.random.bit_generator.state}
+        for name, part in (("guard", self.guard), ("contact", self.contact)):
+            if part is not None:
+                held, facts[name] = part.state()
+                tensors.update({f"{name}.{key}": tensor for key, tensor in held.items()})
+        return tensors, facts
+
+    def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+        """The inverse of `state`."""
+        self.epoch, self.random.bit_generator.state = facts["epoch"], facts["random"]
+        self.order = tensors["order"].numpy()
+        self.noise.set_state(tensors["noise"])
+        for name, parameter in self.network.named_parameters():
+            prefix = f"adam.{name}."
+            found = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
+            self.optimiser.state[parameter] = {key: tensor.to(self.device) for key, tensor in found.items()}
+        self.network.load_state_dict(part_of(tensors, "network"))
+        if self.hidden_states:
+            self.hidden_states.states.copy_(tensors["hidden_states"])
+        self.guard.resume(part_of(tensors, "guard"), facts["guard"])
+        if self.contact is not None:
+            self.contact.resume(part_of(tensors, "contact"), facts["contact"])
+
+
+def part_of(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:
+    """The tensors called `name.*`, under what follows the dot."""
+    return {key.removeprefix(f"{name}."): t for key, t in tensors.items() if key.startswith(f"{name}.")}

@@ -1,0 +1,165 @@
+"""All frames of the training motions in a row, and the sub-sequences cut from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from snug.body.skinning import joint_transforms
+from snug.networks.dressed_body import DressedBody
+from snug.recipes.recipe import Recipe
+from snug.training.device import CPU
+
+# Spread below which an input's is not taken for a scale: rotations are numbers up to 1 in size, and one that
+# hardly moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
+STD_FLOOR = 0.2
+CONSTANT = 1e-5  # spread below which an input did not move at all, but for rounding
+
+
+class TrainingError(ValueError):
+    """Training that cannot start or go on; the message names the cause."""
+
+
+@dataclass
+class Batch:
+    """Sub-sequences of one step. frames (N, T) are row numbers of the training set."""
+
+    frames: np.ndarray
+    features: Tensor  # (N, T, D)
+    rest: Tensor  # (N, 1, V, 3) or (V, 3) [m], the unposed garment
+    transforms: Tensor  # (N, T, 24, 3, 4)
+    ahead: Tensor  # (N, T, 3) [m]
+    betas: Tensor | None = None  # (N, S) shape numbers, None on the mean body
+
+
+class TrainingSet:
+    """Motions made ready for one recipe. Raises TrainingError when no motion is long enough for a window.
+
+    Everything that a batch is made of lies on `device`; only row numbers are kept in numpy.
+    """
+
+    def __init__(
+        self,
+        dressed: DressedBody,
+        motions: Sequence[Any],
+        recipe: Recipe,
+        *,
+        features: str,
+        sequences: bool,
+        device: torch.device = CPU,
+        shapes: np.ndarray | None = None,
+    ) -> None:
+        """features: see DressedBody.features; sequences: False for a static network, whose frames need no
+        past. shapes: (M, S) shape numbers, one row for each motion; None: all on the mean body.
+        """
+        rates = {float(motion.fps) for motion in motions}
+        if len(rates) != 1:
+            raise TrainingError(
+                f"training motions need one frame rate, these have {sorted(rates)}: resample them"
+            )
+        self.dt = 1.0 / rates.pop()
+        self.dressed, self.recipe, self.device = dressed, recipe, device
+        self._ends_in_shape = features == "motion"
+        self.names = [motion.name for motion in motions]
+        self.first = np.cumsum([0, *(len(motion.poses) for motion in motions)])
+        self.shapes = shapes
+        worn = list(zip(motions, [None] * len(motions) if shapes is None else shapes))
+        inputs = [dressed.features(motion, recipe, betas, kind=features) for motion, betas in worn]
+        self.features = torch.cat(inputs).to(device)
+        self.transforms = torch.cat([dressed.transforms(m.poses, betas) for m, betas in worn]).to(device)
+        self.ahead = torch.cat([_ahead(dressed.pelvis(m)) for m in motions]).to(device)
+        self.rest = dressed.rest().to(device)
+        self._rest_directions: Tensor | None = None
+        self.window = recipe.window if sequences else 1
+        self.starts = np.concatenate(
+            [
+                np.arange(first, first + len(motion.poses) - self.window + 1, recipe.window_stride)
+                for first, motion in zip(self.first, motions)
+            ]
+        )
+        if len(self.starts) == 0:
+            raise TrainingError(f"no training motion has {self.window} frames: give longer motions")
+
+    @property
+    def frames(self) -> int:
+        return int(self.first[-1])
+
+    def motion_of(self, frames: Any) -> Any:
+        """Places of the motions that row numbers belong to."""
+        return np.searchsorted(self.first, frames, side="right") - 1
+
+    def where(self, frame: int) -> str:
+        """A row number in words a user can look up."""
+        motion = int(self.motion_of(frame))
+        return f"motion {self.names[motion]!r} frame {frame - self.first[motion]}"
+
+    def input_statistics(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and spread (D,) of the inputs; of the shape numbers those of the recipe's U(-r, r).
+
+        An input that never varies gets an infinite spread: the network then never reads it, for the weights
+        behind it stay as random as they began.
+        """
+        mean = self.features.mean(0).cpu().numpy()
+        std = self.features.std(0, correction=0).cpu().numpy()
+        std = np.where(std < CONSTANT, np.inf, np.maximum(std, STD_FLOOR))
+        shapes = self.dressed.body.shape_count
+        if shapes and self.recipe.shape_range and self._ends_in_shape:
+            mean[-shapes:], std[-shapes:] = 0.0, self.recipe.shape_range / np.sqrt(3.0)
+        return mean, std
+
+    def at(self, frames: np.ndarray) -> Batch:
+        """Rows (N, T), those of a line from one motion, as tensors; each motion on its own body."""
+        rows = torch.as_tensor(frames, device=self.device)
+        batch = Batch(frames, self.features[rows], self.rest, self.transforms[rows], self.ahead[rows])
+        if self.shapes is None:
+            return batch
+        return self._dressed(batch, self.shapes[self.motion_of(frames[:, 0])])
+
+    def batch(self, windows: np.ndarray, betas: np.ndarray | None = None) -> Batch:
+        """Windows (N,) as tensors, each on the body of its motion, or of a shape of its own, betas (N, S)."""
+        batch = self.at(self.starts[windows][:, None] + np.arange(self.window))
+        if betas is None:
+            return batch
+        reposed = _reposed(self.dressed, batch.transforms, torch.as_tensor(betas, device=self.device))
+        batch = self._dressed(replace(batch, transforms=reposed), betas)
+        assert batch.betas is not None
+        repeated = batch.betas[:, None].expand(-1, self.window, -1)
+        inputs = torch.cat([batch.features[..., : -betas.shape[1]], repeated], -1)
+        return replace(batch, features=inputs)
+
+    def _dressed(self, batch: Batch, betas: np.ndarray) -> Batch:
+        """With the unposed garments of shapes (N, S)."""
+        shapes = torch.as_tensor(betas, dtype=torch.float32, device=self.device)
+        if self._rest_directions is None:
+            self._rest_directions = self.dressed.rest_directions().to(self.device)
+        rest = self.rest + torch.einsum("ns,svi->nvi", shapes, self._rest_directions)
+        return replace(batch, rest=rest[:, None], betas=shapes)
+
+
+def _reposed(dressed: DressedBody, transforms: Tensor, betas: Tensor) -> Tensor:
+    """The same poses on other skeletons: rotations are read back from the transforms of the mean body.
+
+    transforms (N, T, 24, 3, 4) float32, betas (N, 10) float64.
+    """
+    body, device = dressed.body, betas.device
+    template = torch.as_tensor(body.joint_template, device=device)  # float64 until the chain is done
+    directions = torch.as_tensor(body.joint_directions, device=device)  # (24, 3, 10)
+    joints = (template + torch.einsum("jis,ns->nji", directions, betas))[:, None]
+    world = transforms[..., :3].double()
+    relative = world[:, :, [max(parent, 0) for parent in dressed.parents]].transpose(-1, -2) @ world
+    relative[:, :, 0] = world[:, :, 0]
+    home = (-joints[..., 0, :]).expand(*transforms.shape[:2], 3)
+    joints = joints.expand(*transforms.shape[:2], *joints.shape[-2:])
+    return joint_transforms(relative, joints, dressed.parents, home).float()
+
+
+def _ahead(pelvis: np.ndarray) -> Tensor:
+    """2 p_{t-1} - p_{t-2} - p_t of each frame, (T, 3) [m]; zero where two earlier frames are missing."""
+    ahead = np.zeros_like(pelvis)
+    ahead[2:] = 2 * pelvis[1:-1] - pelvis[:-2] - pelvis[2:]
+    return torch.as_tensor(ahead, dtype=torch.float32)

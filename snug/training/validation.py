@@ -1,0 +1,87 @@
+"""How well a network does on motions held out of its training: full roll-outs from a state of zero.
+
+Windows see three frames at a time; what a user sees is a roll-out. So held-out motions are
+rolled out whole, and their mean energy a frame is the value that early stopping watches. Contact anchors are
+searched anew at every validation: those of an earlier one claim contacts that are none, by up to a fifth of
+the value, and the first validation, which has none, would look best. Nothing is random.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from snug.body.skinning import skin
+from snug.training.training_set import Batch, TrainingError, TrainingSet
+
+if TYPE_CHECKING:
+    from snug.training.trainer import Trainer
+    from snug.training.vertex_targets import Targets
+
+
+@dataclass(frozen=True, kw_only=True)
+class Validation:
+    """motions: none of them may be a training motion, and none a test motion. every: steps between two
+    validations. patience: validations without a better value, after which training stops; 0 never stops.
+    trajectories: as for training, for the kinds that simulated vertices teach.
+    """
+
+    motions: Sequence[Any]
+    every: int = 200
+    patience: int = 10
+    trajectories: Mapping[str, Targets] | None = None
+
+
+class Validator:
+    """Values of one trainer's network. Raises TrainingError where the motions are of no use for it."""
+
+    def __init__(self, trainer: Trainer, validation: Validation) -> None:
+        names = {motion.name for motion in validation.motions} & set(trainer.data.names)
+        if names:
+            raise TrainingError(f"motion {sorted(names)[0]!r} cannot both train and validate: leave it out")
+        if validation.every < 1 or validation.patience < 0:
+            raise TrainingError("validation needs every >= 1 step and patience >= 0")
+        self.trainer = trainer
+        how, motions = trainer.how, validation.motions
+        self.data = TrainingSet(
+            trainer.dressed, motions, trainer.recipe, features=how.features, sequences=how.sequences,
+            device=trainer.device,
+        )  # fmt: skip
+        if self.data.dt != trainer.data.dt:
+            here, there = 1 / self.data.dt, 1 / trainer.data.dt
+            raise TrainingError(f"validation has {here:g} frames a second, training {there:g}: resample them")
+        self.contact = trainer.contact_of(self.data)
+        self.targets = None
+        if how.targets:
+            on_cpu = (trainer.weights.cpu(), self.data.transforms.cpu())
+            targets = how.targets(trainer.dressed, motions, validation.trajectories, *on_cpu)
+            self.targets = targets.to(trainer.device)
+
+    @torch.no_grad()
+    def value(self) -> float:
+        """Mean over all frames of the sum of the loss's terms [J], or what the simulated vertices give."""
+        total = 0.0
+        for first, end in zip(self.data.first[:-1], self.data.first[1:]):
+            # One long window, or, for a static network, windows of one frame: it has no inertia.
+            rows = np.arange(first, end).reshape((1, -1) if self.trainer.how.sequences else (-1, 1))
+            total += float(torch.stack(list(self._terms(self.data.at(rows)).values())).sum())
+        return self.trainer.group.agreed(total / self.data.frames)
+
+    def _terms(self, batch: Batch) -> dict[str, Tensor]:
+        trainer = self.trainer
+        if self.targets:
+            return self.targets.terms(trainer.network, batch, None)
+        assert trainer.loss is not None
+        offsets, _ = trainer.network(batch.features, None)
+        x = skin(batch.rest + offsets, trainer.weights, batch.transforms)
+        planes = None
+        if self.contact:
+            posed = self.contact.posed(batch)
+            self.contact.search(np.arange(batch.frames.size), batch.frames, posed, x, exact=True)
+            planes = self.contact.planes(batch, posed)
+        return trainer.loss(x, batch.ahead, planes)

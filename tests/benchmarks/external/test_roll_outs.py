@@ -1,0 +1,307 @@
+"""Roll-outs of others: read from what the field writes, judged only where they belong to the scene."""
+
+from __future__ import annotations
+
+import pickle
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.external import roll_out_files as files
+from benchmarks.external.roll_out_files import read_roll_out
+from benchmarks.external.roll_out_option import RollOutError, RollOutOption, Stated, parse
+from benchmarks.external.vertex_correspondence import same_topology
+from benchmarks.methods import find_method
+from benchmarks.methods.outside.stored_roll_out import Stored, entry_of
+from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.scenes.from_roll_out import declared
+from benchmarks.tasks.metric_task import measured
+from benchmarks.validation.meshes import torus
+from reference_sim import Trajectory
+from reference_sim.trajectory.point_cache import HEADER, SIGNATURE, read_point_cache, write_point_cache
+from tests.benchmarks.runner.tasks_by_hand import small_scene
+
+SCENE = small_scene("hanging_sheet", cells=6, frames=8)
+FACES = SCENE.cloth.faces
+RANDOM = np.random.default_rng(7)
+# Falls, sways and crumples a little: some numbers in every row.
+TIME = np.arange(SCENE.frames)[:, None, None] * SCENE.dt
+X = SCENE.start + [0.0, -1.0, 0.3] * TIME**2 + 2e-4 * TIME * RANDOM.normal(size=(SCENE.frames, 49, 3))
+
+
+def write(kind: str, folder: Path, positions: np.ndarray = X, faces: np.ndarray = FACES) -> str:
+    """A roll-out in a format of the field; the path to name."""
+    path = folder / f"mine.{kind}"
+    trajectory = Trajectory(positions, faces, np.arange(len(positions)) * SCENE.dt)
+    if kind == "vtkhdf":
+        trajectory.save(path)
+    elif kind == "npz":
+        np.savez(path, positions=positions, faces=faces, fps=30.0)
+    elif kind == "pkl":
+        held = {
+            "pred": positions,
+            "cloth_faces": faces,
+            "obstacle": np.zeros((len(positions), 4, 3)),
+            "meta": 1,
+        }
+        path.write_bytes(pickle.dumps(held))
+    elif kind == "pc2":
+        write_point_cache(path, trajectory)
+    elif kind == "pc16":
+        header = (
+            SIGNATURE + np.array([1, positions.shape[1]], "<i4").tobytes() + np.array([0, 1], "<f4").tobytes()
+        )
+        path.write_bytes(
+            header + np.array([len(positions)], "<i4").tobytes() + positions.astype("<f2").tobytes()
+        )
+    else:
+        path = folder / kind
+        path.mkdir()
+        for frame, x in enumerate(positions):
+            lines = [f"v {a!r} {b!r} {c!r}" for a, b, c in x.tolist()]
+            lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+            (path / f"cloth_{frame}.obj").write_text("\n".join(lines))
+    return str(path)
+
+
+def rows(path: str, **stated) -> dict:
+    """Every number that is measured of the file, in suite speed."""
+    option = RollOutOption("mine", path, Stated(**stated))
+    entry = entry_of(option, SCENE.name)
+    method = entry.make(models=Path(), seed=0)
+    method.prepare(SCENE)
+    return rows_of(method.run(), entry)
+
+
+def rows_of(trajectory: Trajectory, entry) -> dict:
+    group = SceneRollOuts(SCENE, gap_samples=2)
+    group.roll_outs.append(RollOut(group, entry, trajectory, suites=("speed",)))
+    return measured(group.roll_outs[0])[0]
+
+
+def direct(positions: np.ndarray) -> dict:
+    """The numbers of positions that were in no file."""
+    trajectory = Trajectory(positions, FACES, np.arange(len(positions)) * SCENE.dt)
+    return rows_of(trajectory, find_method("skinning"))
+
+
+# --- one set of positions, many formats ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["vtkhdf", "npz", "pkl", "obj"])
+def test_formats_of_float64_give_the_rows_of_the_positions_to_the_last_digit(kind, tmp_path):
+    expected = direct(X)
+    assert rows(write(kind, tmp_path)) == expected
+    assert {
+        "energy/strain",
+        "energy/bending",
+        "energy/bending_printed",
+        "gap/energy",
+        "curvature/mean",
+    } <= set(expected)
+
+
+def test_formats_of_less_precision_give_the_rows_of_the_rounded_positions(tmp_path):
+    narrow = X.astype(np.float32)
+    expected = direct(narrow.astype(np.float64))
+    assert rows(write("pc2", tmp_path)) == rows(write("npz", tmp_path, narrow)) == expected
+    assert rows(write("pkl", tmp_path, narrow)) == expected != direct(X)
+    assert read_roll_out(tmp_path / "mine.pc2").dtype == "float32"
+    half = read_point_cache(write("pc16", tmp_path))
+    assert half.dtype == np.float16 and np.array_equal(half, X.astype(np.float16))
+
+
+@pytest.mark.parametrize("kept", ["obstacle", "obstacle_faces"])
+def test_half_an_obstacle_is_refused(kept, tmp_path):
+    held = {"obstacle": X, "obstacle_faces": FACES}
+    np.savez(tmp_path / "mine.npz", positions=X, faces=FACES, **{kept: held[kept]})
+    gone = next(name for name in held if name != kept)
+    with pytest.raises(RollOutError, match=rf"mine.npz: holds half a body: {gone} is absent"):
+        declared(RollOutOption("mine", str(tmp_path / "mine.npz"), Stated()), "rest.obj")
+
+
+def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
+    path, read = write("npz", tmp_path), []
+    reader = files._READERS[".npz"]
+    monkeypatch.setitem(files._READERS, ".npz", lambda path: read.append(path) or reader(path))
+    assert read_roll_out(path) is read_roll_out(path) and len(read) == 1
+    np.savez(path, positions=2.0 * X, faces=FACES)
+    assert np.array_equal(read_roll_out(path).positions, 2.0 * X) and len(read) == 2
+
+
+def test_hinges_as_printed_are_those_of_the_unscaled_energy():
+    from reference_sim.energies import BendHinge
+
+    unscaled = BendHinge(SCENE.cloth, scaling="none")
+    mean = np.mean([unscaled.value_and_gradient(x)[0] for x in X[SCENE.warm_up :]])
+    found = direct(X)
+    assert found["energy/bending_printed"] == pytest.approx(mean, rel=1e-14)
+    assert found["energy/bending_printed"] > 2.0 * found["energy/bending"]
+
+
+# --- what does not belong to the scene -------------------------------------------------------------------
+
+ORDER = RANDOM.permutation(49)
+PLACE = np.argsort(ORDER)
+Z_UP = 100.0 * X[..., [0, 2, 1]] * [1.0, -1.0, 1.0]  # (x, -z, y) in centimetres
+WRONG = {
+    "centimetres, z up": (Z_UP, FACES, {}, "give --units cm --up z"),
+    "z up": (Z_UP, FACES, {"units": "cm"}, "give --up z"),
+    "metres called cm": (X, FACES, {"units": "cm"}, "give --units m"),
+    "reordered": (X[:, ORDER], PLACE[FACES], {}, "give --match-vertices"),
+    "reordered, without faces": (X[:, ORDER], None, {}, "give --match-vertices"),
+    "another mesh": (X, np.roll(FACES, 1) % 49, {"match_vertices": True}, "no vertex can be matched"),
+    "a vertex less": (X[:, 1:], None, {}, "has 48 vertices, the cloth of hanging_sheet 49"),
+    "a frame less": (X[1:], None, {}, "has 7 frames, .* the scene has 8"),
+    "twice the frames": (np.repeat(X, 2, axis=0)[1:], None, {}, "give --fps 60"),
+    "feet": (X / 0.3048, FACES, {}, "write metres"),
+    "elsewhere": (X + np.array([0.0, 1.0, 0.0]), FACES, {}, "world coordinates"),
+    "no start": (np.where(TIME == 0.0, np.nan, X), FACES, {}, "is not finite"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_does_not_belong_to_the_scene_is_refused_with_the_remedy(name, tmp_path):
+    positions, faces, stated, remedy = WRONG[name]
+    given = {} if faces is None else {"faces": faces}
+    np.savez(tmp_path / "mine.npz", positions=positions, **given)
+    with pytest.raises(RollOutError, match=remedy) as refused:
+        rows(str(tmp_path / "mine.npz"), **stated)
+    assert str(refused.value).count("mine.npz") == 1 and "\n" not in str(refused.value)
+
+
+def test_units_axes_and_order_are_mended_when_they_are_given(tmp_path):
+    expected = direct(X)
+    path = write("npz", tmp_path, Z_UP[:, ORDER], PLACE[FACES])
+    found = rows(path, units="cm", up="z", match_vertices=True)
+    assert found.keys() == expected.keys()
+    for name in expected:
+        ours, theirs = ([*of[name][:2], *dict(of[name].moved).values()] if isinstance(of[name], Estimate)
+                        else of[name] for of in (found, expected))  # fmt: skip
+        np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-12)
+
+
+def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):
+    halves = np.stack([X[:-1], (X[:-1] + X[1:]) / 2], axis=1).reshape(-1, 49, 3)
+    fine = np.concatenate([halves, X[-1:]])
+    path = str(tmp_path / "mine.npz")
+    np.savez(path, positions=fine, fps=60.0)
+    with pytest.raises(RollOutError, match=r"states 60 .* give --fps 60"):
+        rows(path)
+    assert rows(path, fps=60.0) == direct(X)  # every second frame, as it is
+    np.savez(path, positions=X[::2])
+    with pytest.raises(RollOutError, match="has 4 frames"):
+        rows(path)
+    method = Stored(path, Stated(fps=15.0))
+    with pytest.raises(RollOutError, match="scene has 8"):
+        method.prepare(SCENE)  # its last frame comes before the scene's
+    np.savez(path, positions=np.concatenate([X[::2], 2 * X[-1:] - X[-2:-1]]))
+    method.prepare(SCENE)
+    assert np.allclose(method.stored.positions[1], (X[0] + X[2]) / 2) and "linear" in method.run().reason
+    assert np.array_equal(method.stored.positions[::2], X[::2])
+
+
+def test_vertices_without_triangles_are_matched_by_the_start_alone(tmp_path):
+    at_rest = np.concatenate([SCENE.start[None], X[1:]])
+    path = str(tmp_path / "mine.npz")
+    np.savez(path, positions=at_rest[:, ORDER])
+    assert rows(path, match_vertices=True) == direct(at_rest)
+    np.savez(path, positions=at_rest[:, ORDER] + 0.1)
+    with pytest.raises(RollOutError, match="add its triangles"):
+        rows(path, match_vertices=True)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+def test_a_symmetric_mesh_is_laid_on_itself_where_it_is_nearest(flip):
+    i, j = np.meshgrid(np.arange(6), np.arange(6), indexing="ij")
+    points = np.stack([i, j, 0 * i], axis=-1).reshape(-1, 3).astype(float)
+    a = (i[:-1, :-1] * 6 + j[:-1, :-1]).ravel()
+    faces = np.concatenate([np.stack([a, a + 6, a + 7], 1), np.stack([a, a + 7, a + 1], 1)])
+    two = np.concatenate([faces, faces + 36])  # two pieces of the same form
+    both = np.concatenate([points, points + np.array([9.0, 0.0, 0.0])])
+    order = RANDOM.permutation(72)
+    theirs = np.argsort(order)[two][RANDOM.permutation(len(two))]
+    found = same_topology(theirs[:, ::-1] if flip else theirs, two, both[order], both)
+    assert np.array_equal(order[found], np.arange(72))
+    theirs[0] = theirs[0, [1, 0, 2]]
+    assert same_topology(theirs[:-1], two, both[order], both) is None
+
+
+def test_a_mesh_with_a_thousand_symmetries_is_laid_on_itself_in_a_moment():
+    points, faces, _ = torus(24, 0.3, 0.1)
+    order = RANDOM.permutation(len(points))
+    clock = time.perf_counter()
+    found = same_topology(np.argsort(order)[faces], faces, points[order] + 0.01, points)
+    assert np.array_equal(order[found], np.arange(len(points)))
+    assert time.perf_counter() - clock < 10.0
+
+
+# --- damaged files ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["vtkhdf", "npz", "pkl", "pc2", "obj"])
+def test_a_damaged_file_is_one_line(kind, tmp_path):
+    path = Path(write(kind, tmp_path))
+    target = path / "cloth_3.obj" if path.is_dir() else path
+    whole, refused = target.read_bytes(), 0
+    for _ in range(40):
+        data = bytearray(whole[: RANDOM.integers(1, len(whole))] if RANDOM.random() < 0.3 else whole)
+        for place in RANDOM.integers(0, len(data), 6):
+            data[place] = RANDOM.integers(0, 256)
+        target.write_bytes(bytes(data))
+        try:
+            read_roll_out(path)
+        except RollOutError as error:
+            refused += 1
+            assert "\n" not in str(error) and str(tmp_path) in str(error)
+    assert refused > 5
+
+
+def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_path):
+    path = tmp_path / "mine.pc2"
+    head = np.array([1, 2**30], "<i4").tobytes() + np.array([0, 1], "<f4").tobytes()
+    path.write_bytes(SIGNATURE + head + np.array([2**30], "<i4").tobytes() + bytes(36))
+    assert HEADER == 32
+    with pytest.raises(RollOutError, match="the file has 68"):
+        read_roll_out(path)
+    import h5py
+
+    with h5py.File(tmp_path / "a.vtkhdf", "w") as file:
+        file.create_dataset("VTKHDF/Points", (10**12, 3), chunks=(10**4, 3), dtype="f8")
+    with pytest.raises(RollOutError, match="declares 24000000000000 bytes"):
+        read_roll_out(tmp_path / "a.vtkhdf")
+
+
+def test_a_pickle_that_would_run_code_does_not(tmp_path):
+    class Wicked:
+        def __reduce__(self):
+            return (Path.touch, (tmp_path / "ran",))
+
+    (tmp_path / "mine.pkl").write_bytes(pickle.dumps({"pred": Wicked()}))
+    with pytest.raises(RollOutError, match=r"mine\.pkl"):
+        read_roll_out(tmp_path / "mine.pkl")
+    assert not (tmp_path / "ran").exists()
+
+
+# --- the option ------------------------------------------------------------------------------------------
+
+
+def test_an_option_says_everything_of_a_roll_out():
+    option = parse("mine=out/{scene}.pc2,units=cm,up=z,fps=60,match-vertices,ms=2.2")
+    assert option == RollOutOption("mine", "out/{scene}.pc2", Stated("cm", "z", 60.0, True), 2.2)
+    assert option.path_for("tshirt/kick") == "out/tshirt-kick.pc2"
+    assert entry_of(option, "tshirt/kick") is None  # there is no file for that scene
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [("mine", "NAME=FILE"), ("=a.npz", "NAME=FILE"), ("a b=a.npz", "letters"), ("m=a.npz,x", "unknown word"),
+     ("m=a.npz,units=inch", "choose from m, cm, mm"), ("m=a.npz,fps=fast", "no number"),
+     ("m=a.npz,fps=-1", "positive"), ("m=a.npz,ms=0", "positive")],
+)  # fmt: skip
+def test_a_wrong_option_is_one_line(text, hint):
+    with pytest.raises(RollOutError, match=hint) as refused:
+        parse(text)
+    assert "\n" not in str(refused.value)

@@ -1,0 +1,136 @@
+"""Further baselines and ablations run when they are named or at a preset that holds them, never unasked."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.learned import LEARNED
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import make_parser
+from benchmarks.plan.suites import SUITES
+from benchmarks.presets import PRESETS, find_preset
+from benchmarks.results.run_folder import RunFolder, model_path
+from snug.networks.trained_model import TrainedModel
+from snug.recipes.named import ABLATIONS, RECIPES, TRAININGS
+from snug.recipes.recipe import TERMS
+from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
+from tests.snug.training.dressing import swaying, tube_dress
+
+
+def plan(*words):
+    return make_plan(make_parser().parse_args(["--suite", "garments", *words]), words)
+
+
+def methods(*words):
+    return {cell.method for cell in plan(*words).cells}
+
+
+def test_they_run_when_named_and_not_otherwise(tmp_path):
+    further = {entry.name for entry in LEARNED}
+    out = ("-o", str(tmp_path))
+    assert further <= set(SUITES[0].more_methods) and not further & methods(*out)
+    assert further < methods(*out, "--methods", "*")
+    named = methods(*out, "--methods", "snug-no-*")
+    assert named == {
+        "snug-no-bending",
+        "snug-no-strain",
+        "snug-no-gravity",
+        "snug-no-inertia",
+        "snug-no-noise",
+    }
+    assert further < methods(*out, "--preset", "paper")
+
+
+@pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])
+def test_every_trained_method_has_a_training_and_steps_in_each_preset(entry):
+    kind = (entry.training or TRAININGS[entry.trained]).kind
+    assert entry.seeded and entry.pairing_group
+    assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
+
+
+def test_an_ablation_trains_as_long_as_the_whole():
+    quick = find_preset("quick")
+
+    def steps(name: str) -> int:
+        return quick.steps_of(name, TRAININGS[name].kind if name in TRAININGS else name)
+
+    assert steps("snug-no-bending") == steps("snug-springs") == quick.steps["snug"]
+    # A network of its own: more swing and less strain both come with steps.
+    assert steps("snug-dynamic") == quick.steps["dynamic"] > quick.steps["snug"]
+    assert steps("pbns-springs") == quick.steps["pbns"] and steps("untrained") == 0
+
+
+def test_what_is_cleaned_up_is_a_row_of_its_own_over_the_same_network(tmp_path):
+    cleaned = find_method("snug+cleanup")
+    assert cleaned.trained == find_method("snug").trained
+    chosen = plan("-o", str(tmp_path), "--methods", "snug,snug+cleanup", "--seeds", "0,1")
+    assert [(n.name, n.seed) for n in chosen.networks] == [("snug", 0), ("snug", 1)]
+
+
+CHECKPOINT = ".snug-seed0.checkpoint.safetensors"
+
+
+def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmarks.tasks.training.CHECKPOINT_MINUTES", 1e-9)
+    dressed, motion = tube_dress(), swaying(30)
+    assets = assets_of(dressed, motion)
+
+    def trained(folder, key, tell):
+        task = training("snug", motion.name, steps=60, key=key)
+        task.clear(RunFolder(folder))
+        return task.run(context(folder, assets, tell=tell), {})
+
+    def killed(steps):
+        told.append(steps)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    told, went_on = [], []
+    models = RunFolder(tmp_path).models
+    for key in ("before", "now"):  # the first is another training: of other inputs, or of other code
+        told.clear()
+        with pytest.raises(KeyboardInterrupt):
+            trained(tmp_path, key, killed)
+        assert told == [20, 20] and [path.name for path in models.iterdir()] == [CHECKPOINT]
+    result = trained(tmp_path, "now", went_on.append).result
+    assert sum(went_on) == result["steps"] == 60 and len(went_on) < 3  # of three reports
+    (tmp_path / "damaged" / "models").mkdir(parents=True)
+    (tmp_path / "damaged" / "models" / CHECKPOINT).write_bytes(b"half")
+    trained(tmp_path / "damaged", "now", print)
+    one, other = (
+        TrainedModel.load(model_path(RunFolder(folder).models, "snug", 0)).network.state_dict()
+        for folder in (tmp_path, tmp_path / "damaged")
+    )
+    assert all(torch.equal(one[name], other[name]) for name in one)
+    assert [path.name for path in models.iterdir()] == ["snug-seed0.safetensors"]
+
+
+def test_a_training_that_fails_leaves_no_earlier_model_behind(tmp_path):
+    path = model_path(RunFolder(tmp_path).models, "snug", 0)
+    path.parent.mkdir()
+    path.touch()
+    task = training("snug", "sway", steps=2)
+    task.clear(RunFolder(tmp_path))  # as the runner does before it runs a task
+    with pytest.raises(AssertionError):
+        task.run(context(tmp_path), {})  # there is no body to dress
+    assert not path.exists()
+
+
+def test_each_ablation_differs_from_the_default_in_what_its_name_says():
+    changes = {
+        recipe.name: {
+            name: value for name, value in recipe.as_dict().items()
+            if value != RECIPES["default"].as_dict()[name] and name != "name"
+        }
+        for recipe in ABLATIONS
+    }  # fmt: skip
+    assert changes["no-noise"] == {"h0_sigma": 0.0, "remembered": False} and changes["springs"] == {
+        "material": "springs"
+    }
+    for term in ("bending", "strain", "gravity", "inertia"):
+        assert set(TERMS) - set(changes[f"no-{term}"]["terms"]) == {term}
+    for frames in (6, 12):
+        changed = changes[f"window{frames}"]
+        assert changed == {"window": frames, "batch": 48 // frames}

@@ -1,0 +1,343 @@
+"""Every method on every scene, tiny: a whole trajectory or an explained skip; and what metrics make of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import itertools
+
+import numpy as np
+import pytest
+
+from benchmarks import timing
+from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.method import Method
+from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.learned import LEARNED
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.plan.plan import Motions
+from benchmarks.presets import find_preset
+from benchmarks.results import frame_energies
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.rows import rows_of
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.schedule import tasks_of
+from benchmarks.scenes import SCENES
+from benchmarks.tasks.cell_task import Cell, built
+from benchmarks.tasks.metric_task import measured
+from reference_sim import Trajectory
+from reference_sim.files.array_file import read_arrays
+from snug.recipes.named import RECIPES
+from snug.training.loss import static_terms
+from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, small_scene
+from tests.benchmarks.tasks.test_cell_tasks import NoLog, plan_of
+
+SIZES = {"frames": 16, "settle_frames": 4, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
+SIZES["least_seconds"] = 0.01
+TRAIN, TEST = "arm_raise", "kick"
+KINDS = ("untrained", "snug", "supervised", "pbns")
+TINY = dataclasses.replace(
+    find_preset("smoke"), **SIZES, repeats=1, steps=dict.fromkeys(("snug", "supervised", "pbns"), 2)
+)
+# Further learned methods have tests of their own. Beyond the first scene the coarsest speaks for each family.
+SMALL_METHODS = [e for e in METHODS if e not in LEARNED and (e.trained is None or e.trained in KINDS)]
+# One moved start speaks for all.
+SMALL_METHODS = [e for e in SMALL_METHODS if e.family != "simulation-perturbed" or e.level == 1e-9]
+BY_LEVEL = sorted(SMALL_METHODS, key=lambda entry: (entry.family, entry.level or 0.0))
+COARSEST = [next(own) for family, own in itertools.groupby(BY_LEVEL, lambda e: e.family) if family]
+COARSEST += [find_method("simulation-1e-2")]
+FINER = [e for e in SMALL_METHODS if e.level is not None and e not in COARSEST] + [
+    find_method("simulation-1e-8")
+]
+FEWER_METHODS = [entry for entry in SMALL_METHODS if entry not in FINER]
+BODY = f"tshirt/{TEST}"
+EXTERNAL = {entry.name for entry in METHODS if entry.package or entry.needs_no_obstacle}
+NAMES = [*(scene.name for scene in SCENES), BODY]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A whole run in this process."""
+    folder = RunFolder(tmp_path_factory.mktemp("run"))
+    scenes = [*(scene.at(TINY) for scene in SCENES), dressed_scene(TEST, preset=TINY)]
+    cells = tuple(
+        Cell(scene, entry, 0, ("garments", "speed"))
+        for scene in scenes
+        for entry in (SMALL_METHODS if scene is scenes[0] else FEWER_METHODS)
+    )
+    plan = dataclasses.replace(
+        plan_of(folder.path), preset=TINY, cells=cells, motions=Motions((TRAIN,), (TEST,))
+    )
+    assets = open_assets(TINY, embedded_motions([TRAIN, TEST]), ["tshirt"])
+    gc.freeze()  # each timed run collects first, and all that pytest holds is no garbage of it
+    runner = Runner(tasks_of(plan), Cache(folder))
+    executor = InProcess(folder, assets)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(timing, "AFTER", 0.005)  # [s] that each run is watched after its end
+        runner.run(executor, NoLog())
+    return plan, runner, executor
+
+
+@pytest.fixture(scope="module")
+def rows(run):
+    plan, runner, _ = run
+    return rows_of(plan, runner.tasks, runner.outcomes)
+
+
+@pytest.fixture(scope="module")
+def scenes(run):
+    """Name -> built scene."""
+    plan, _, executor = run
+    return {scene.name: built(scene, executor.context()) for scene in plan.scenes}
+
+
+def outcomes_of(run, name):
+    plan, runner, _ = run
+    return {c.method: runner.outcomes["cell", c.name] for c in plan.cells if c.scene.name == name}
+
+
+def trajectory_of(run, name, method) -> Trajectory:
+    return Trajectory.load(run[1].cache.folder.trajectory_path(name, method))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
+    scene, found = scenes[name], outcomes_of(run, name)
+    for method, outcome in found.items():
+        if outcome.status == "skipped":
+            assert outcome.reason and (scene.dressed is None or method in EXTERNAL)
+            continue
+        assert outcome.status == "ok", f"{name} x {method}: {outcome.reason}"
+        trajectory = trajectory_of(run, name, method)
+        assert trajectory.positions.shape == (scene.frames, *scene.cloth.rest_positions.shape)
+        assert np.isfinite(trajectory.positions).all() and np.array_equal(trajectory.faces, scene.cloth.faces)
+        seconds, result = trajectory.frame_seconds[1:], outcome.result  # as the method says
+        told = bool(np.isfinite(seconds).all())
+        assert told == (method != "direct-optimisation")
+        timed = find_method(method).timed
+        assert ("frame_p95" in result) == (told and timed) and ("inputs" in result) == timed
+        if told and timed:
+            assert 0.0 < result["frame_p50"] <= result["frame_p95"] <= result["frame_worst"]
+            assert result["frame_p50"] * len(seconds) / 2 <= result["seconds"] and (seconds > 0).all()
+        if timed:
+            assert result["runs"] > 1 or result["seconds"] >= TINY.least_seconds
+            assert (result["inputs"] > 0.0) == (scene.dressed is not None)
+        assert trajectory.provenance["scene"] == name
+        given = 0 if find_method(method).gives_first_frame else 1
+        assert outcome.result["frames"] == scene.frames - given
+    skipped = {method for method, outcome in found.items() if not outcome.files}
+    bound = {entry.name for entry in METHODS if entry.needs_body}
+    assert skipped <= bound | EXTERNAL and (scene.dressed is None or skipped <= EXTERNAL)
+
+
+def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows, scenes):
+    costs = {"cost/frame", "cost/whole", "cost/peak"}
+    expected = {
+        "curvature/mean", "energy/total", "gap/relative", "gap/local", "gradient/norm", "deformation/edges",
+        "deformation/areas", "dihedral/mean", "intersections/triangles",
+    }  # fmt: skip
+    against = {"distance/rms", "distance/p95", "curvature/error", "curvature/histogram"}
+    for name, scene in scenes.items():
+        for method, outcome in outcomes_of(run, name).items():
+            if outcome.status == "skipped":
+                continue
+            own = [r for r in rows if (r.suite, r.scene, r.method) == ("speed", name, method)]
+            values = {row.metric: row.value for row in own}
+            entry, on_body = find_method(method), scene.dressed is not None
+            assert costs & set(values) == (costs if entry.timed else set())
+            assert not entry.timed or (values["cost/whole"] > values["cost/frame"]) == on_body
+            assert {f"energy/{term}" for term in scene.terms} | expected <= set(values)
+            assert ("penetration/vertices" in values) == (scene.obstacle is not None)
+            assert len(against & set(values)) == (0 if method == "simulation" else len(against))
+            ladder = method == "simulation" and "simulation-dt/8" in outcomes_of(run, name)
+            # Where their order is not one, the difference to dt/8 takes the place of the error.
+            told = {name.replace("/eighth", "") for name in values if name.startswith("time_error/")}
+            assert ({"time_error/total", "time_error/curvature"} <= told) == ladder
+            network = method in KINDS
+            assert ("cost/train" in values) == (entry.trained is not None)
+            assert ("cost/batch" in values) == (network and entry.timed)
+            # What has an answer to poses held still: networks, skinning, and the simulator on a body.
+            still = network or (on_body and method in ("skinning", "simulation"))
+            assert ("dynamics/quasi_static_difference" in values) == still
+            # Of a solver that starts from a network's frame nobody knows what it answers to poses held still.
+            assert ("dynamics/amplitude" in values) == (
+                on_body and entry.role not in ("warm-started", "bound")
+            )
+            assert ("dynamics/common_amplitude" in values) == on_body
+            bounds = ("simulation", "skinning")
+            asked = method in bounds or (network and method != "untrained") or "fast-lbfgs" in method
+            asked = asked and on_body
+            assert ("conservation/momentum" in values) == asked
+            if method == "simulation" and on_body:
+                assert values["dynamics/amplitude"] == pytest.approx(1.0)
+                assert values["conservation/momentum_worst"] < 2e-6
+            if method == "skinning":
+                assert values["dynamics/amplitude"] == values["dynamics/quasi_static_difference"] == 0.0
+            if network:
+                assert (values["cost/data"] > 0.0) == (method == "supervised")
+            assert all(row.status == "ok" for row in own), (name, method, values)
+        by_method = {r.method: r.value for r in rows if r.scene == name and r.metric == "gap/local"}
+        assert by_method["simulation"] == pytest.approx(0.0, abs=1e-12)
+        errors = [r for r in rows if r.scene == name and r.metric == "distance/rms" and r.suite == "speed"]
+        twins = {r.method: r.value for r in errors if r.family == "simulation-perturbed"}
+        # So few frames do not drive two runs apart [mm]; as little is what a distance to the reference means.
+        assert 0.0 < twins["simulation-perturbed-1e-9"] < 1e-3
+        unsure = {r.method: r.uncertainty for r in errors}
+        assert all(0.0 <= u < 10.0 for u in unsure.values()), (name, unsure)
+        assert unsure["newton-1"] > 0.0
+
+
+def test_the_settled_shirt_is_at_rest_outside_of_the_body(scenes):
+    scene = scenes[BODY]
+    distance = scene.obstacle.signed_distance(scene.start, 0)
+    assert (distance < -0.002).mean() < 0.02 and np.median(distance) < 0.1
+    assert np.abs(scene.origin_heights - 0.9).max() < 0.4
+
+
+def test_skinning_is_the_network_that_starts_at_zero_offsets(run):
+    """PBNS after two steps has moved by little from skinning, its start: both stand on one skinning."""
+    skinned, pbns = (trajectory_of(run, BODY, method).positions for method in ("skinning", "pbns"))
+    assert 0.0 < np.linalg.norm(pbns - skinned, axis=2).max() < 0.01
+
+
+def test_all_solvers_start_where_the_scene_starts(run, scenes):
+    for name, scene in scenes.items():
+        for method, outcome in outcomes_of(run, name).items():
+            if outcome.files and find_method(method).dtype == "float64":
+                first = trajectory_of(run, name, method).positions[0]
+                shift = find_method(method).options.get("shift", 0.0)
+                assert np.abs(first - scene.start).max() <= 1.01 * shift, f"{name} x {method}"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["simulation", "newton-1", "vbd-5", "xpbd-10", "skinning", "snug", "skinning+lbfgs-1", "snug+newton-1"],
+)
+def test_a_run_that_is_done_again_gives_the_same_and_inputs_are_what_it_takes_as_ready(name, run, scenes):
+    plan, _, executor = run
+    scene = scenes[BODY]
+    cell = next(cell for cell in plan.cells if (cell.scene.name, cell.method) == (BODY, name))
+    method = cell.entry.make(models=executor.folder.models_of(cell.scene.garment), seed=0)
+    method.prepare(scene)
+    first, again = method.run().positions, method.run().positions
+    assert np.array_equal(first, again) and np.array_equal(first, trajectory_of(run, BODY, name).positions)
+    last = scene.frames - 1
+    made = method.inputs(scene)(last)
+    own, body = made if "+" in name else (made, made)
+    if name not in ("skinning", "snug"):
+        assert np.abs(body[0] - scene.obstacle.positions[last]).max() < 1e-12
+    if name.startswith(("skinning", "snug")):
+        features, transforms, pelvis = own
+        assert (features is None) == name.startswith("skinning") and transforms.shape == (24, 3, 4)
+        rest, shifts = scene.dressed.body.joints()[0], scene.dressed.motion.translations
+        assert np.array_equal(pelvis, rest + shifts[last])
+    assert Method().inputs(scenes["hanging_sheet"]) is None
+
+
+def test_a_warm_started_solver_goes_on_from_skinning_and_has_its_time_on_the_clock(run, scenes):
+    skinned, warm = (trajectory_of(run, BODY, method) for method in ("skinning", "skinning+lbfgs-1"))
+    moved = np.linalg.norm(warm.positions - skinned.positions, axis=2).max(axis=1)
+    assert np.array_equal(warm.positions[0], scenes[BODY].start) and moved[1:].min() > 1e-4
+    seconds = {m: o.result["seconds"] for m, o in outcomes_of(run, BODY).items() if o.files}
+    assert seconds["skinning+lbfgs-1"] > seconds["skinning"]
+    assert warm.frame_fields["iterations"].tolist() == [0] + [1] * (scenes[BODY].frames - 1)
+
+
+@pytest.mark.parametrize(
+    ("exchange", "places"), [("springs", [0]), ("printed-bending", [1]), ("pbns-springs", [0, 1])]
+)
+def test_another_material_is_simulated_and_judged_by_the_scenes_own(exchange, places):
+    scene = small_scene("hanging_sheet", cells=4, frames=5)
+    entry = find_method(f"simulation-{exchange}")
+    made = entry.make(models=None, seed=0)
+    made.prepare(scene)
+    own, declared = made.scene.energies, scene.energies
+    assert [term.name for term in declared] == ["strain", "bending", "gravity"]
+    assert [mine is theirs for mine, theirs in zip(own, declared)] == [k not in places for k in range(3)]
+    trained = list(static_terms(scene.cloth, RECIPES[exchange]).values())
+    for place in places:  # the very energies that the recipe of that name trains on
+        assert type(own[place]) is type(trained[place])
+        assert np.array_equal(own[place].stiffness, trained[place].stiffness)
+    if exchange == "printed-bending":
+        k = scene.cloth.material.bending_stiffness
+        assert (own[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
+    assert np.array_equal(made.scene.start, scene.start)
+    group, trajectory = SceneRollOuts(scene), made.run()
+    assert trajectory.status == "converged"
+    group.roll_outs.append(RollOut(group, entry, trajectory, suites=("validation",)))
+    values = measured(group.roll_outs[0], ("energy",))[0]
+    term = declared[places[0]]
+    judged = np.mean([term.value_and_gradient(frame)[0] for frame in trajectory.positions[2:]])
+    assert values[f"energy/{term.name}"] == pytest.approx(judged, rel=1e-9)
+    # No uncertainty of the reference and no approximation of it: a variant that stands beside its base.
+    assert group.reference is None and group.find(role="reference-variant") is None
+    assert (entry.role, entry.base) == ("ablation", "simulation")
+
+
+def test_every_method_has_the_whole_protocol(tmp_path):
+    for entry in METHODS:
+        if entry.package is None:
+            assert isinstance(entry.make(models=tmp_path, seed=0), Method)
+            assert entry.label and entry.role
+    assert Method().quasi_static() is None
+    with pytest.raises(NotImplementedError):
+        Method().batch(2)
+
+
+def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks(run, rows, scenes, tmp_path):
+    folder, scene = run[1].cache.folder, scenes[BODY]
+    assert not folder.frame_energies_path.is_file()
+    frame_energies.write(folder, rows)
+    columns, lines = frame_energies.read(folder.frame_energies_path)
+    assert columns == ["scene", "method", "seed", "seconds", *scene.terms, "total"]
+    kept = {entry.name for entry in FEWER_METHODS if entry.role in ("reference", "baseline", "network")}
+    assert {line[1] for line in lines} == kept and {line[0] for line in lines} == {BODY}
+    means = {
+        (row.method, row.metric): row.value for row in rows if (row.suite, row.scene) == ("garments", BODY)
+    }
+    for method in kept:
+        own = np.array([line[3:] for line in lines if line[1] == method])
+        assert own[:, 0] == pytest.approx(scene.dt * np.arange(scene.warm_up, scene.frames), abs=1e-4)
+        for place, term in enumerate(columns[4:], start=1):
+            assert own[:, place].mean() == pytest.approx(means[method, f"energy/{term}"], rel=1e-4, abs=1e-9)
+    other = dataclasses.replace(rows[0], suite="speed")
+    frame_energies.write(folder, [other])  # nothing takes part any more
+    assert not folder.frame_energies_path.is_file()
+
+
+def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_metrics():
+    scene = small_scene("hanging_sheet", cells=4, frames=5)
+    falling = np.asarray(scene.start) + 0.001 * np.arange(scene.frames)[:, None, None]
+    lost = {"simulation": (9, 0.0), "newton-1": (3, np.nan), "newton-4": (0, np.inf), "newton-8": (4, 1e200)}
+    lost |= {"simulation-dt/2": (9, 0.0), "simulation-dt/4": (9, 0.0), "simulation-dt/8": (3, np.nan)}
+    group = SceneRollOuts(scene, gap_samples=3)
+    for method, (first, value) in lost.items():
+        x = falling.copy()
+        x[first:] = value
+        trajectory = Trajectory(
+            positions=x, faces=scene.cloth.faces, times=scene.dt * np.arange(len(x)),
+            frame_seconds=np.full(len(x), 1e-3), status="ok",
+        )  # fmt: skip
+        status = "ok" if first > len(x) else "diverged"
+        entry = find_method(method)
+        group.roll_outs.append(RollOut(group, entry, trajectory, status=status, suites=("speed",)))
+    with np.errstate(all="ignore"):
+        found, curves, _ = zip(*(measured(roll_out) for roll_out in group.roll_outs))
+    found, curves = dict(zip(lost, found)), dict(zip(lost, curves))
+    plain = {m: {n: getattr(v, "value", v) for n, v in values.items()} for m, values in found.items()}
+    assert np.isfinite(list(plain["simulation"].values())).all() and found["newton-4"] == {}
+    assert plain["newton-1"]["distance/rms"] == 0.0 and np.isfinite(plain["newton-1"]["gap/energy"])
+    assert np.isnan(plain["newton-8"]["gap/energy"])
+    assert (
+        len(curves["newton-1"]["energy/total"]) == 3 and np.isfinite(curves["newton-1"]["energy/total"]).all()
+    )
+    assert not any(name.startswith("time_error") for name in found["simulation"])  # dt/8 was not whole
+
+
+def test_curves_of_a_roll_out_that_was_lost_end_where_it_did(tmp_path):
+    from benchmarks.tasks.metric_task import write_curves
+
+    write_curves(tmp_path / "lost.npz", {"energy/total": np.ones(3)}, 5)
+    curves = read_arrays(tmp_path / "lost.npz")
+    assert np.isfinite(curves["energy/total"]).tolist() == [True] * 3 + [False] * 2

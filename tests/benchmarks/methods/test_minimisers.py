@@ -1,0 +1,244 @@
+"""Sweeps over our own energies: their derivatives are the potential's, and they find what they promise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
+from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, weights
+from benchmarks.methods.minimisers.kernels import block, depth, fold, strain
+from benchmarks.methods.minimisers.xpbd import XPBD
+from benchmarks.methods.solvers.warm_started import FromElsewhere, WarmStarted
+from benchmarks.metrics.energies.time_step import first_guess
+from benchmarks.scenes.free_fall import exact_fall
+from benchmarks.scenes.sheet import square_sheet
+from benchmarks.scenes.sheet_on_sphere import sphere
+from reference_sim import Cloth, Material, Obstacle, Potential, simulate
+from reference_sim.energies import (
+    BendHinge,
+    ContactBarrier,
+    ContactPenalty,
+    Gravity,
+    Inertia,
+    Step,
+    StretchStVK,
+)
+from reference_sim.energies.term_kinds import terms_of
+from reference_sim.minimise import Newton, make_minimiser
+from tests.benchmarks.runner.tasks_by_hand import small_scene
+
+DT = 1 / 30
+
+
+@pytest.fixture(scope="module")
+def touching():
+    """A potential of all terms in the midst of a step, a pinned sheet pressed into a sphere; its guess."""
+    positions, faces = square_sheet(6, 0.3)
+    positions[:, 1] += 0.098
+    cloth = Cloth(positions, faces, Material(), pins=(0, 6))
+    terms = [StretchStVK(cloth), BendHinge(cloth, rest_angles=0.1), Gravity(cloth), ContactPenalty(cloth)]
+    potential = Potential([*terms, Inertia(cloth, DT)])
+    velocity = np.random.default_rng(1).normal(0, 0.2, positions.shape)
+    velocity[cloth.pins] = 0.0
+    guess = positions + DT * velocity
+    potential.prepare(Step(positions, velocity, guess, DT, Obstacle(*sphere(0.1, 12))))
+    return potential, guess
+
+
+def test_the_block_of_a_vertex_is_that_of_the_potential(touching):
+    potential, guess = touching
+    x = guess + np.random.default_rng(2).normal(0, 2e-3, guess.shape)
+    assert potential.terms(x)["collision"] > 0.0
+    terms, descent = terms_of(potential, "test"), VertexBlockDescent(potential, max_iterations=1)
+    inertia = terms.inertia.masses / terms.inertia.dt**2, terms.inertia.x_hat, weights(terms)
+    pattern = potential.pattern(np.ones(len(x), dtype=bool))
+    convex = pattern.symmetric(pattern.assemble(x, convexity=1.0)).toarray()
+    gradient, free = potential.gradient(x), np.empty(3)
+    g, H = np.empty(3), np.empty((3, 3))
+    for v in range(len(x)):
+        block(
+            x, v, inertia, membrane(terms.strain), hinges(terms.bending), contacts(terms.contact),
+            descent._around, g, H, free, np.empty(3), np.empty((4, 3)),
+        )  # fmt: skip
+        assert g == pytest.approx(gradient[v], abs=1e-12 * np.abs(gradient).max())
+        rows = slice(3 * v, 3 * v + 3)
+        assert np.abs(H - convex[rows, rows]).max() < 1e-12 * np.abs(convex).max()
+
+
+def test_the_constraints_of_xpbd_carry_our_energies(touching):
+    potential, guess = touching
+    x = guess + np.random.default_rng(3).normal(0, 2e-3, guess.shape)
+    terms, energies = terms_of(potential, "test"), potential.terms(x)
+    faces, inverse, areas, lam, mu = membrane(terms.strain)
+    stiffness = np.array([[lam + 2 * mu, lam, 0], [lam, lam + 2 * mu, 0], [0, 0, 4 * mu]])
+    C = np.array([strain(x, face, D, np.empty(3), np.empty(3)) for face, D in zip(faces, inverse)])
+    quadratic = np.einsum("fi,ij,fj->f", C, stiffness, C)
+    assert 0.5 * areas @ quadratic == pytest.approx(energies["strain"], rel=1e-12)
+    folds = [fold(x, h, rest, np.empty((4, 3))) for h, _, rest in zip(*hinges(terms.bending))]
+    k = hinges(terms.bending)[1]
+    assert 0.5 * k @ np.square(folds) == pytest.approx(energies["bending"], rel=1e-12)
+    stencils, shares, k, margin, points, normals = contacts(terms.contact)
+    planes = zip(stencils, shares, points, normals)
+    C = np.array([depth(x, s, w, margin, c, n) ** 1.5 for s, w, c, n in planes])
+    assert 0.5 * (2 * k) @ C**2 == pytest.approx(energies["collision"], rel=1e-12)
+
+
+def test_block_descent_falls_with_every_sweep_to_the_minimum_and_stays_there(touching):
+    potential, guess = touching
+    best = Newton(potential).minimise(guess)
+    values = [potential.value(guess)]
+    for sweeps in (1, 2, 4, 16, 64, 1024):
+        result = VertexBlockDescent(potential, max_iterations=sweeps).minimise(guess)
+        assert result.status == "max_iterations" and result.iterations == sweeps
+        assert np.array_equal(result.positions[potential.cloth.pins], guess[potential.cloth.pins])
+        values.append(result.energy)
+    gaps = (np.array(values) - best.energy) / (values[0] - best.energy)
+    assert (np.diff(gaps) < 0).all() and gaps[1] > 0.05 and abs(gaps[-1]) < 1e-6
+    again = VertexBlockDescent(potential, max_iterations=5).minimise(best.positions)
+    assert np.abs(again.positions - best.positions).max() < 1e-8
+
+
+@pytest.mark.parametrize("name", ["hanging_sheet", "sheet_on_sphere"])
+def test_the_reference_is_where_another_solver_ends_from_another_start(name):
+    """Block descent shares neither derivatives nor steps with the simulator; its start is 1 mm away."""
+    scene = small_scene(name)
+    run = simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=8, obstacle=scene.obstacle, start=scene.start
+    )
+    potential = Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
+    for frame in (4, 7):
+        before, previous, x = run.positions[frame - 2 : frame + 1]
+        velocity = (previous - before) / scene.dt
+        guess = first_guess(scene, previous, velocity, frame)
+        potential.prepare(Step(previous, velocity, guess, scene.dt, scene.obstacle, frame))
+        noise = np.random.default_rng(frame).normal(0, 1e-3, x.shape) * scene.cloth.free[:, None]
+        found = VertexBlockDescent(potential, max_iterations=1500).minimise(x + noise)
+        here, to_gain = potential.value(x), potential.value(guess) - potential.value(x)
+        assert potential.value(x + noise) - here > 0.1 * to_gain > 0
+        assert abs(found.energy - here) < 1e-6 * to_gain
+        assert np.abs(found.positions - x).max() < 1e-5
+
+
+def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_elsewhere(touching):
+    positions, faces = square_sheet(4, 0.2)
+    cloth = Cloth(positions, faces, Material(), pins=(0, 4))
+    potential = Potential([StretchStVK(cloth), Inertia(cloth, DT)])
+    velocity = 1e-6 * np.random.default_rng(4).normal(size=positions.shape) * [1, 0, 1]  # in the plane, tiny
+    velocity[cloth.pins] = 0.0
+    guess = positions + DT * velocity
+    potential.prepare(Step(positions, velocity, guess, DT))
+    best = Newton(potential, tolerance=1e-12).minimise(guess).positions
+    found = XPBD(potential, max_iterations=3000).minimise(guess).positions
+    assert np.abs(best - guess).max() > 1e-8  # there was something to do
+    assert np.abs(found - best).max() < 1e-4 * np.abs(best - guess).max()
+
+    potential, guess = touching
+    best = Newton(potential).minimise(guess).energy
+    to_gain = potential.value(guess) - best
+    found = [XPBD(potential, max_iterations=n).minimise(guess).energy for n in (10, 100, 3000)]
+    gaps = [(energy - best) / to_gain for energy in found]
+    assert gaps[0] > gaps[1] > gaps[2] and 1e-6 < gaps[2] < 0.2
+
+
+@pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
+def test_hinges_without_stiffness_are_no_hinges(method):
+    positions, faces = square_sheet(4, 0.2)
+    cloth = Cloth(positions, faces, Material(bending_stiffness=0.0), pins=(0, 4))
+    ends = []
+    for bending in ([], [BendHinge(cloth)]):
+        potential = Potential([StretchStVK(cloth), *bending, Gravity(cloth), Inertia(cloth, DT)])
+        potential.prepare(Step(positions, np.zeros_like(positions), positions, DT))
+        found = method(potential, max_iterations=20).minimise(positions)
+        assert found.status == "max_iterations"
+        ends.append(found.positions)
+    np.testing.assert_array_equal(*ends)
+
+
+@pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
+def test_weight_alone_is_one_sweep_to_the_exact_fall(method):
+    positions, faces = square_sheet(3, 0.2)
+    cloth = Cloth(positions, faces, Material())
+    run = simulate(cloth, [Gravity(cloth)], dt=DT, frames=6, method=method, max_iterations=1)
+    assert run.positions == pytest.approx(exact_fall(positions, np.zeros(3), DT, 6), abs=1e-12)
+
+
+@pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
+def test_what_a_sweep_cannot_do_is_refused_and_a_runaway_is_a_status(method, touching):
+    potential, guess = touching
+    cloth = potential.cloth
+    with pytest.raises(ValueError, match="no kernel for the term"):
+        method(Potential([ContactBarrier(cloth), Inertia(cloth, DT)]), max_iterations=1)
+    with pytest.raises(ValueError, match="needs inertia"):
+        method(Potential([Gravity(cloth)]), max_iterations=1)
+    nowhere = guess.copy()
+    nowhere[10] = np.nan
+    if method is XPBD:  # which starts from the prediction
+        inertia = next(energy for energy in potential.energies if isinstance(energy, Inertia))
+        inertia.x_hat, whole = nowhere, inertia.x_hat
+        result = method(potential, max_iterations=3).minimise(guess)
+        inertia.x_hat = whole
+    else:
+        result = method(potential, max_iterations=3).minimise(nowhere)
+    assert result.status == "diverged" and result.reason
+
+
+def test_simulate_takes_a_minimiser_of_its_callers_and_says_which():
+    positions, faces = square_sheet(4, 0.2)
+    cloth = Cloth(positions, faces, Material(), pins=(0, 4))
+    run = simulate(
+        cloth, [StretchStVK(cloth), Gravity(cloth)], frames=3, method=VertexBlockDescent, max_iterations=5
+    )
+    assert run.status == "max_iterations" and run.provenance["options"]["method"] == "VertexBlockDescent"
+    assert run.frame_fields["iterations"].tolist() == [0, 5, 5]
+
+
+def test_a_hybrid_starts_each_step_from_the_next_frame_with_the_pins_of_the_step(touching):
+    potential, guess = touching
+    starts = [guess + 0.01, guess - 0.02]
+    seen = []
+
+    class Looking:
+        def minimise(self, x0):
+            seen.append(x0.copy())
+            return make_minimiser(potential, max_iterations=1).minimise(x0)
+
+    pins = potential.cloth.pins
+    warm_started = FromElsewhere(Looking(), iter([start.copy() for start in starts]), pins)
+    for start in starts:
+        result = warm_started.minimise(guess)
+        free = potential.cloth.free
+        assert np.array_equal(seen[-1][free], start[free]) and np.array_equal(seen[-1][pins], guess[pins])
+        assert np.array_equal(result.positions[pins], guess[pins])
+
+
+def test_a_warm_started_solver_has_no_starts_for_steps_between_frames(tmp_path):
+    scene = small_scene("hanging_sheet")
+    method = WarmStarted("skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1})
+    with pytest.raises(ValueError, match="2 steps a frame"):
+        method.prepare(replace(scene, substeps=2))
+
+
+def test_a_warm_started_solver_has_its_first_guesses_ready_before_the_clock_starts(monkeypatch, tmp_path):
+    scene = small_scene("hanging_sheet")
+    made, begun = [], []
+
+    def ready(scene):
+        made.append("on the clock" if warm_started.prepared else "before")
+        return frames
+
+    def frames():
+        begun.append(True)
+        return (scene.start.copy() for _ in range(scene.frames))
+
+    warm_started = WarmStarted(
+        "skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1, "finish": False}
+    )
+    warm_started.prepared = False
+    monkeypatch.setattr(warm_started, "_frames", ready)
+    warm_started.prepare(scene)
+    warm_started.prepared, warm = True, len(begun)
+    assert warm_started.run().frames == warm_started.run().frames == scene.frames
+    assert made == ["before"] and len(begun) == warm + 2  # each run begins them anew

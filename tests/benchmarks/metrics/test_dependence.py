@@ -1,0 +1,122 @@
+"""Dependence on mesh and time step: the same measures for each, and which scenes a preset asks for."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.assets.assets import Assets
+from benchmarks.methods import METHODS, find_method
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.plan.plan import Motions
+from benchmarks.plan.selection import Request, choose
+from benchmarks.presets import PRESETS, Dependence, find_preset
+from benchmarks.scenes import dependence as module
+from benchmarks.scenes import find_scene
+from benchmarks.scenes.variations import DRAPES
+from benchmarks.tasks.metric_task import measured
+from snug.body.parametric_body import Body
+
+SIZES = Dependence((200,), 200, (1, 2), 4, 4)
+SCENES = ("dependence/mesh/200", "dependence/dt/60")
+
+
+@pytest.fixture(scope="module")
+def assets():
+    """A body; nothing of the run's own garments and motions is looked at."""
+    return Assets(Body.load(), {}, {}, {})
+
+
+def built(name, assets):
+    preset = dataclasses.replace(find_preset("smoke"), dependence=SIZES)
+    return find_scene(name).at(preset).build(assets)
+
+
+def test_each_mesh_and_time_step_is_measured_the_same_way(assets):
+    value = {}
+    for name in SCENES:
+        scene = built(name, assets)
+        group = SceneRollOuts(scene)
+        for method in ("simulation", "skinning", "newton-1"):
+            made = find_method(method).make(models=None, seed=0)
+            made.prepare(scene)
+            group.roll_outs.append(RollOut(group, find_method(method), made.run(), suites=("validation",)))
+        for roll_out in group.roll_outs:
+            found, _, ended = measured(roll_out, find_scene(name).metrics)
+            assert ended == ("ok", "") and not any(metric.startswith("cost/") for metric in found)
+            value |= {(name, roll_out.entry.name, metric): number for metric, number in found.items()}
+    for name in SCENES:
+        assert abs(value[name, "simulation", "mesh/vertices"] - 200) < 40
+        assert value[name, "newton-1", "curvature/error"] > 0
+        assert (name, "simulation", "curvature/error") not in value
+        assert (name, "skinning", "mesh/vertices") not in value
+    # Skinning knows no time step; the simulation does.
+    for metric in ("energy/strain", "energy/inertia", "curvature/mean"):
+        here, there = (value[name, "skinning", metric] for name in SCENES)
+        assert here == there
+    own = [value[name, "simulation", "energy/strain"] for name in SCENES]
+    assert own[0] != own[1]
+
+
+def test_time_steps_of_a_frame_are_taken_from_the_scene(assets, monkeypatch):
+    taken, scene = [], built("dependence/dt/60", assets)
+    scene = dataclasses.replace(scene, settle=lambda: np.zeros_like(scene.cloth.rest_positions))
+    monkeypatch.setattr(
+        "benchmarks.methods.solvers.simulation.simulate", lambda *_, substeps, **__: taken.append(substeps)
+    )
+    for method in ("simulation", "newton-1", "simulation-dt/4"):
+        made = find_method(method).make(models=None, seed=0)
+        made.prepare(scene)
+    assert taken == [2, 2, 8]  # so many for each of those that a method takes by itself
+
+
+def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
+    class Tailor:
+        def tailor(self, body, *, vertices):
+            raise ValueError(f"{vertices} vertices on a body of {len(body.template)}")
+
+    monkeypatch.setattr(module, "find_template", lambda name: Tailor())
+    mine = dataclasses.replace(assets.body, template=np.zeros((7, 3)))
+    with pytest.raises(ValueError, match="200 vertices on a body of 7"):
+        built("dependence/dt/60", dataclasses.replace(assets, body=mine))
+
+
+@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
+def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
+    request = Request(suites=("validation",), preset=preset, motions=Motions())
+    found = choose(dataclasses.replace(request, full=True))[0]
+    sizes = preset.dependence
+    assert {cell.scene.name for cell in found} == {
+        *(f"dependence/mesh/{count}" for count in sizes.meshes),
+        *(f"dependence/dt/{30 * count}" for count in sizes.substeps[1:]),
+        *(scene.name for scene in DRAPES if preset.further),
+    }
+    printed = {"simulation-printed-bending"} if preset.further else set()
+    assert {cell.method for cell in found} == {"simulation", "skinning", "newton-1"} | printed
+    assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
+    assert choose(request)[0] == (() if preset.name == "quick" else found)  # where no suite is named
+
+
+def test_drapes_of_each_size_and_family_run_where_they_are_named():
+    words = {"suites": ("validation",), "preset": find_preset("quick"), "motions": Motions()}
+    methods = ("simulation", "simulation-printed-bending")
+    found = choose(Request(**words, scenes=("dependence/drape/*",), methods=methods))[0]
+    assert {(cell.scene.name, cell.method) for cell in found} == {
+        (scene.name, method) for scene in DRAPES for method in methods
+    }
+    for scene in DRAPES[::4]:
+        made = scene.at(find_preset("smoke")).build()
+        x, faces = made.cloth.rest_positions, made.cloth.faces
+        assert abs(len(x) - int(scene.name.rpartition("/")[2])) < 0.05 * len(x)
+        normals = np.cross(x[faces[:, 1]] - x[faces[:, 0]], x[faces[:, 2]] - x[faces[:, 0]])
+        assert (normals[:, 1] > 0).all() and made.cloth.areas.sum() == pytest.approx(0.25)
+        inner = np.ptp(made.cloth.areas)
+        assert (inner < 1e-12) == ("union_jack" in scene.name)
+
+
+def test_no_network_meets_a_garment_that_it_was_not_trained_for():
+    scene = find_scene("dependence/mesh/500")
+    assert not any(entry.meant_for(scene) for entry in METHODS if entry.trained)
+    assert all(entry.meant_for(scene) for entry in METHODS if not entry.trained)

@@ -1,0 +1,231 @@
+"""Dynamic metrics on hems whose motion is known: a sine of known gain and lag, a damped ring, a walk."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.methods import find_method
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metrics.motion import dynamics
+from benchmarks.metrics.motion.hem import (
+    AFTER,
+    HELD,
+    HemMotion,
+    acceleration_spectrum,
+    amplitude,
+    correlation,
+    dynamic_part,
+    gain_and_lag,
+    hem_yaw,
+    in_root_frame,
+    response,
+    ringing,
+    spectrum_distance,
+    stop_frame,
+)
+from benchmarks.scene import BuiltScene, Dressed
+from reference_sim import Trajectory
+from tests.snug.training.dressing import AROUND, swaying, tube_dress
+
+DT = 1 / 30
+FRAMES = 120
+TIME = np.arange(FRAMES) * DT
+STILL = np.tile(np.eye(3), (FRAMES, 1, 1))
+
+
+def about_y(angle):
+    """(T,) [rad] -> (T,3,3)."""
+    c, s, o, i = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    return np.stack([np.stack([c, o, s], -1), np.stack([o, i, o], -1), np.stack([-s, o, c], -1)], axis=1)
+
+
+def ring(yaw=None, radius=0.25, count=40):
+    """A hem (T,H,3): a slightly oval ring below the root, turned by yaw (T,)."""
+    angle = 2 * np.pi * np.arange(count) / count
+    shape = np.stack([1.2 * radius * np.sin(angle), np.full(count, -0.2), radius * np.cos(angle)], axis=1)
+    return np.einsum("tij,vj->tvi", about_y(np.zeros(FRAMES) if yaw is None else yaw), shape)
+
+
+@pytest.mark.parametrize(("gain", "lag"), [(1.4, 1.4), (0.5, 0.0), (1.0, 5.25), (0.8, -2.0)])
+def test_a_sine_of_known_gain_and_lag_is_found(gain, lag):
+    static = 0.7 * np.sin(2 * np.pi * 1.0 * TIME)
+    moving = gain * 0.7 * np.sin(2 * np.pi * 1.0 * (TIME - lag * DT)) + 0.3
+    found = gain_and_lag(moving, static)
+    # The lagging signal does not rest before its first frame, as the fit supposes: that costs a few percent.
+    assert found[0] == pytest.approx(gain, rel=0.05)
+    assert found[1] == pytest.approx(lag, abs=0.15)
+
+
+def test_a_signal_that_starts_at_rest_is_fitted_to_the_last_digit():
+    static = np.where(TIME > 1.0, np.sin(2 * np.pi * (TIME - 1.0)), 0.0)
+    moving = 1.3 * np.interp(np.arange(FRAMES) - 2.0, np.arange(FRAMES), static)
+    assert gain_and_lag(moving, static) == pytest.approx((1.3, 2.0), abs=1e-9)
+    assert gain_and_lag(static, static)[1] == 0.0  # and not a round-off of it
+
+
+def test_yaw_of_a_turning_hem_wherever_the_root_turns():
+    yaw = 0.8 * np.sin(2 * np.pi * 0.7 * TIME)
+    np.testing.assert_allclose(hem_yaw(ring(yaw), STILL), yaw - yaw[0], atol=1e-12)
+    root = about_y(0.4 * TIME)
+    seen_from_root = np.einsum("tji,tvj->tvi", root, ring(yaw))
+    np.testing.assert_allclose(hem_yaw(seen_from_root, root), yaw, atol=1e-12)
+    half_turns = hem_yaw(ring(4.0 * TIME), STILL)
+    np.testing.assert_allclose(half_turns, 4.0 * TIME, atol=1e-9)  # no jump at pi
+
+
+def test_response_takes_the_yaw_where_it_turns_and_the_displacement_where_it_shifts():
+    lag = 2.0
+    yaw = 0.6 * np.sin(2 * np.pi * TIME)
+    late = 1.5 * 0.6 * np.sin(2 * np.pi * (TIME - lag * DT))
+    assert response(ring(late), ring(yaw), STILL) == pytest.approx((1.5, lag), abs=0.1)
+    along = np.array([0.6, 0.0, 0.8])
+    shift = 0.05 * np.sin(2 * np.pi * TIME)[:, None, None] * along
+    late = 1.5 * 0.05 * np.sin(2 * np.pi * (TIME - lag * DT))[:, None, None] * along
+    assert response(ring() + late, ring() + shift, STILL) == pytest.approx((1.5, lag), abs=0.1)
+    assert np.isnan(response(ring() + late, ring(), STILL)).all()
+
+
+def test_a_hem_that_goes_along_with_the_root_rests_in_its_frame():
+    axes, origins, _, quiet = a_scene()
+    np.testing.assert_allclose(in_root_frame(quiet, axes, origins), ring(), atol=1e-12)
+
+
+def test_amplitude_and_correlation_of_phase_shifted_parts():
+    whole = 2 * np.pi * 3 * np.arange(FRAMES) / FRAMES  # three whole periods: sine and cosine are orthogonal
+    one = np.sin(whole)[:, None, None] * np.array([1.0, 0.0, 0.0]) * np.ones((1, 7, 1))
+    other = 0.5 * np.sin(whole - 0.6)[:, None, None] * np.array([1.0, 0.0, 0.0]) * np.ones((1, 7, 1))
+    assert amplitude(other, one) == pytest.approx(0.5)
+    assert correlation(other, one) == pytest.approx(np.cos(0.6))
+    assert correlation(-one, one) == pytest.approx(-1.0)
+    assert np.isnan(correlation(0 * one, one))
+    assert np.isnan(amplitude(one, 0 * one))
+
+
+def test_a_constant_difference_is_no_dynamics():
+    moving = ring(0.3 * np.sin(TIME))
+    assert np.abs(dynamic_part(moving + np.array([0.01, 0.02, 0.0]), moving)).max() < 1e-15
+
+
+def test_a_damped_ring_gives_back_its_envelope():
+    stop, size, decay, frequency = 40, 0.06, 0.35, 1.5
+    after = np.maximum(TIME - stop * DT, 0.0)
+    swing = size * np.exp(-after / decay) * np.cos(2 * np.pi * frequency * after)
+    hem = ring() + swing[:, None, None] * np.array([0.0, 0.0, 1.0])
+    expected = [abs(swing[stop + k] - swing[-1]) for k in AFTER]
+    np.testing.assert_allclose(ringing(hem, stop), expected, rtol=1e-9)
+    # Overshoot: at a half period it is on the other side, further out than in between.
+    assert ringing(hem, stop)[0] == pytest.approx(size, rel=0.05)
+    assert ringing(hem, stop)[AFTER.index(8)] > 1.5 * ringing(hem, stop)[AFTER.index(4)]
+
+
+def test_the_spectrum_peaks_at_the_frequency_of_the_motion():
+    frequency = np.fft.rfftfreq(FRAMES - 2, DT)[12]
+    hem = ring() + 0.03 * np.sin(2 * np.pi * frequency * TIME)[:, None, None] * np.array([0.6, 0.8, 0.0])
+    spectrum = acceleration_spectrum(hem, DT)
+    assert spectrum.argmax() == 12
+    # Second differences of a sine; the mean of a Hann window is one half, and half goes to each sign of f.
+    size = 0.03 * (2 * np.sin(np.pi * frequency * DT) / DT) ** 2
+    assert spectrum[12] == pytest.approx(size * 0.5 * (FRAMES - 1) / 2, rel=1e-3)
+    assert spectrum_distance(hem, hem, DT) == 0.0
+    assert spectrum_distance(ring(), hem, DT) == pytest.approx(1.0)
+    assert spectrum_distance(2 * hem, hem, DT) == pytest.approx(1.0)
+
+
+def test_the_stop_is_the_first_frame_of_the_last_pose():
+    poses, translations = np.zeros((60, 24, 3)), np.zeros((60, 3))
+    poses[:20, 3, 1] = 0.3 - 0.01 * np.arange(20)
+    assert stop_frame(poses, translations) == 20
+    translations[:30, 2] = np.arange(30) - 30.0
+    assert stop_frame(poses, translations) == 30
+    translations[: 60 - HELD, 2] = np.arange(60 - HELD) - 60.0
+    assert stop_frame(poses, translations) is None  # not held for long enough
+    assert stop_frame(0 * poses, 0 * translations) is None  # never moved
+
+
+def a_scene(dynamic=1.0):
+    """A hem that turns with the root and lags behind; the root walks, turns, then stops at frame 60."""
+    time = np.minimum(TIME, 60 * DT)
+    yaw = 0.6 * np.sin(2 * np.pi * time)
+    origins = np.stack([0 * time, 0.9 + 0 * time, 1.2 * time], axis=1)
+    axes = about_y(yaw)
+    after = TIME - 60 * DT
+    ringing_yaw = 0.2 * np.exp(-np.maximum(after, 0) / 0.3) * np.cos(2 * np.pi * 1.5 * after) * (after >= 0)
+    lag = dynamic * np.where(after < 0, -0.3 * np.cos(2 * np.pi * TIME), ringing_yaw)
+    world = ring(yaw + lag) + origins[:, None]
+    quiet = ring(yaw) + origins[:, None]
+    return axes, origins, world, quiet
+
+
+def measured(positions, static=None):
+    axes, origins, world, quiet = a_scene()
+    motion = HemMotion(
+        axes=axes, origins=origins, stop=60, hem=np.arange(40), simulated=world, quasi_static=quiet, dt=DT
+    )
+    return motion.measure(positions, static)
+
+
+def test_the_simulation_has_all_of_its_own_dynamics():
+    found = measured(a_scene()[2])
+    assert found["dynamics/amplitude"] == pytest.approx(1.0)
+    assert found["dynamics/correlation"] == pytest.approx(1.0)
+    assert found["dynamics/spectrum"] == 0.0
+    assert found["dynamics/ringing/0"] > found["dynamics/ringing/16"] > 0
+    assert found["dynamics/ringing"] == pytest.approx(
+        np.mean([found[f"dynamics/ringing/{k}"] for k in AFTER])
+    )
+
+
+def test_curves_show_the_hem_against_the_root():
+    axes, origins, world, quiet = a_scene()
+    motion = HemMotion(
+        axes=axes, origins=origins, stop=60, hem=np.arange(40), simulated=world, quasi_static=quiet, dt=DT
+    )
+    still, moving = motion.curves(quiet), motion.curves(world)
+    assert np.abs(still["hem/yaw"]).max() < 1e-12 and np.abs(still["hem/from_end"]).max() < 1e-12
+    # After the stop it swings to one side and to the other: 0.2 rad at first, then a third of a second later.
+    after = moving["hem/yaw"][60:] - moving["hem/yaw"][-1]
+    assert after[0] == pytest.approx(0.2, abs=0.02) and after.min() < -0.05
+    assert moving["hem/from_end"][-1] == 0
+
+
+def test_half_of_the_dynamics_is_half_the_amplitude():
+    found = measured(a_scene(dynamic=0.5)[2])
+    assert found["dynamics/amplitude"] == pytest.approx(0.5, abs=0.02)
+    assert found["dynamics/correlation"] > 0.99
+
+
+def test_a_dresser_without_memory_has_none():
+    quiet = a_scene()[3]
+    shifted = quiet + np.array([0.03, 0.0, 0.0])
+    found = measured(shifted, static=shifted)
+    assert found["dynamics/amplitude"] == 0.0
+    assert "dynamics/correlation" not in found
+    assert measured(shifted[:5]) == {}  # too short to say anything
+    assert (found["dynamics/gain"], found["dynamics/lag"]) == pytest.approx((1.0, 0.0), abs=1e-9)
+    assert found["dynamics/ringing"] == pytest.approx(0.0, abs=1e-9)
+    assert found["dynamics/spectrum"] > 0.1
+
+
+@pytest.mark.parametrize("names", [("hem",), ("left_leg", "right_leg")])
+def test_the_hem_of_a_garment_with_legs_is_both_cuffs(names):
+    dressed, motion = tube_dress(), swaying(40)
+    loops = dict(zip(names, np.array_split(np.arange(AROUND), len(names))))
+    garment = replace(dressed.garment, loops=loops)
+    still = dressed.skinned(motion)
+    own = 0.02 * np.sin(2 * np.pi * np.arange(40) / 15)[:, None, None] * still[:1]
+    scene = BuiltScene(
+        name="legs", cloth=garment.cloth(), energies=(), dt=1 / 30, frames=40, settle=lambda: still[0],
+        dressed=Dressed(dressed.body, garment, motion),
+    )  # fmt: skip
+    group = SceneRollOuts(scene)
+    group.quasi_static = still
+    for name, x in (("simulation", still + own), ("fast-lbfgs-10", still + 0.5 * own)):
+        trajectory = Trajectory(positions=x, faces=garment.faces, times=np.arange(40) / 30)
+        group.roll_outs.append(RollOut(group, find_method(name), trajectory))
+    reference, method = group.roll_outs
+    found = dynamics.compare(method, reference)
+    assert found["dynamics/amplitude"] == pytest.approx(0.5)
+    assert dynamics.series(method)["hem/yaw"].shape == (40,)

@@ -1,0 +1,402 @@
+"""The metrics on surfaces whose answers are known: sphere, cylinder, plane, and energies by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.methods import METHODS, find_method
+from benchmarks.metric import RollOut
+from benchmarks.metrics import declared, find_metric
+from benchmarks.metrics.cost import training_distance
+from benchmarks.metrics.energies.energy import accelerations, correlation_with_body, energy_series
+from benchmarks.metrics.motion.time_step_error import time_errors
+from benchmarks.metrics.surface import body_intersections as body_metrics
+from benchmarks.metrics.surface.body_intersections import inside_itself
+from benchmarks.metrics.surface.curvature import (
+    CurvatureSeries,
+    boundary_mask,
+    curvature_change,
+    curvature_error,
+    curvature_series,
+    histogram_distance,
+    mean_curvature,
+)
+from benchmarks.metrics.surface.distances import distance_rms, hem_drift, own_part_depth, penetration
+from benchmarks.metrics.surface.intersections import intersecting, intersecting_share
+from benchmarks.metrics.surface.rest_shape import area_change, dihedral_angle, edge_change
+from benchmarks.results.run_folder import Row
+from benchmarks.rows import remarked
+from benchmarks.validation.meshes import cylinder_patch, icosphere, right_grid, torus
+from reference_sim import Obstacle, Trajectory, simulate
+from snug.body.skeleton import JOINT
+from tests.benchmarks.runner.tasks_by_hand import small_scene
+
+
+def test_curvature_of_a_sphere_holds_at_its_five_valent_vertices_too():
+    x, faces = icosphere(3, 0.25)
+    assert not boundary_mask(faces, len(x)).any()
+    curvature, area = mean_curvature(x, faces)
+    assert area.sum() == pytest.approx(4 * np.pi * 0.25**2, rel=0.02)
+    assert np.abs(curvature * 0.25 - 1.0).max() < 1e-4
+
+
+def test_curvature_of_a_torus_converges_at_second_order():
+    errors = []
+    for cells in (16, 32, 64):
+        x, faces, exact = torus(cells, 0.3, 0.1)
+        errors.append(np.abs(mean_curvature(x, faces)[0] - exact).max())
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders.min() > 1.9 and errors[-1] < 0.02
+
+
+def test_curvature_of_a_cylinder():
+    x, faces = cylinder_patch(40, 0.1)
+    curvature, _ = mean_curvature(x, faces)
+    inside = ~boundary_mask(faces, len(x))
+    assert np.abs(curvature[inside] - 5.0).max() < 2e-3  # 1/(2 R)
+
+
+def test_curvature_of_a_plane_is_zero_and_noise_gives_the_published_floor():
+    random = np.random.default_rng(3)
+    cells, h = 40, 0.015
+    i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
+    flat = np.stack([h * i, 0.0 * i, h * j], -1).reshape(-1, 3)
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
+    inside = ~boundary_mask(faces, len(flat))
+    assert mean_curvature(flat, faces)[0][inside].max() < 1e-10
+    noisy = flat + random.normal(0, 0.5e-3, flat.shape)
+    series = curvature_series(noisy[None], faces)
+    assert 3.0 < series.means()[0] < 5.0  # 3.8 on an even mesh; right triangles lie near it
+
+
+def test_area_is_shared_out_whole_also_by_obtuse_triangles():
+    x = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.2, 0], [0.5, 1, 0.3]], float)
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 0, 2]])
+    corners = x[faces]
+    exact = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    assert mean_curvature(x, faces)[1].sum() == pytest.approx(exact.sum(), rel=1e-12)
+
+
+def test_curvature_is_blind_to_rigid_motion_and_scales_as_one_over_length():
+    x, faces = cylinder_patch(12, 0.3)
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    inside = ~boundary_mask(faces, len(x))
+    first = mean_curvature(x, faces)[0][inside]
+    assert mean_curvature(x @ turn.T + 5.0, faces)[0][inside] == pytest.approx(first, rel=1e-9)
+    assert mean_curvature(2 * x, faces)[0][inside] == pytest.approx(first / 2, rel=1e-12)
+
+
+def test_curvature_error_sees_moved_wrinkles_where_the_difference_of_means_does_not():
+    cells = 30
+    i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
+
+    def waves(phase: float) -> np.ndarray:
+        return np.stack([0.01 * i, 0.004 * np.sin(0.8 * i + phase), 0.01 * j], -1).reshape(1, -1, 3)
+
+    still, moved = curvature_series(waves(0.0), faces), curvature_series(waves(2.0), faces)
+    assert curvature_error(still, still)[0] == 0.0
+    difference = abs(moved.means() - still.means())[0]
+    assert curvature_error(moved, still)[0] > 5.0 * difference
+    flat = curvature_series(waves(0.0) * [1, 0, 1], faces)
+    assert curvature_error(flat, still)[0] == pytest.approx(still.means()[0], rel=1e-9)
+
+
+def test_wrinkles_that_stay_have_no_change_and_those_that_travel_have_nearly_all_of_it():
+    cells, frames = 40, 20
+    i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
+
+    def waves(phases: np.ndarray, depth: float) -> np.ndarray:
+        height = depth * np.sin(0.2 * np.pi * i + phases[:, None, None])
+        frames = np.broadcast_arrays(0.01 * i, height, 0.01 * j)
+        return np.stack(frames, -1).reshape(len(phases), -1, 3)
+
+    def change(positions: np.ndarray) -> float:
+        return curvature_change(curvature_series(positions, faces))
+
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    fixed = waves(np.zeros(frames), 0.004)
+    fixed[1::2] = fixed[1::2] @ turn.T + 3.0
+    assert change(fixed) < 1e-9
+    phases = 2.0 * np.pi * np.arange(frames) / frames
+    travelling = change(waves(phases, 0.004))
+    assert 0.9 < travelling <= 1.0 + 1e-9
+    assert change(waves(phases, 0.002)) == pytest.approx(travelling, abs=0.02)  # how deep is not asked
+    assert change(waves(phases, 0.0)) is None  # flat
+
+
+def test_change_of_wrinkles_is_the_part_of_all_deviations_that_is_in_time():
+    # Two vertices keep 1 and 3, two of twice their area swap: of 1 + 1 + 2 + 2 about the mean of 2 the last.
+    h = np.array([[1.0, 3.0, 1.0, 3.0], [1.0, 3.0, 3.0, 1.0]])
+    area = np.array([1.0, 1.0, 2.0, 2.0]) * [[0.5], [1.5]]
+    assert curvature_change(CurvatureSeries(h, area)) == pytest.approx(4.0 / 6.0)
+
+
+def test_distance_is_the_length_of_a_shift():
+    x = np.random.default_rng(0).normal(size=(4, 7, 3))
+    shift = np.array([0.03, 0.0, 0.04]) * np.arange(4)[:, None, None]
+    assert distance_rms(x + shift, x) == pytest.approx([0.0, 0.05, 0.10, 0.15])
+
+
+class Slab:
+    """Everything below y = frame is inside."""
+
+    def signed_distance(self, points, frame):
+        return points[:, 1] - frame
+
+
+def test_penetration_counts_every_vertex_and_measures_depth():
+    x = np.zeros((2, 4, 3))
+    x[:, :, 1] = [0.5, -0.25, 2.0, -0.5]
+    shorter, found = penetration([x[:1], x], Slab())
+    assert shorter.share == pytest.approx([0.5])
+    assert found.share == pytest.approx([0.5, 0.75])
+    assert found.depth[0] == pytest.approx([0, 0.25, 0, 0.5])
+    assert found.depth[1] == pytest.approx([0.5, 1.25, 0, 1.5])
+
+
+def test_inertia_follows_the_body_where_the_cloth_is_shaken_as_the_body_is():
+    random, masses = np.random.default_rng(2), np.array([1.0, 3.0, 1.0, 2.0])
+    jumps, others = np.abs(random.normal(size=(2, 30)))
+
+    def shaken(sizes):
+        """(T,V,3) of a cloth that moves as one, by second differences of these sizes."""
+        path = np.concatenate([[0.0, 0.0], np.cumsum(np.cumsum(sizes))])
+        return path[:, None, None] * [0.6, 0.0, 0.8] + np.arange(4.0)[:, None]
+
+    def correlation(positions, **scene):
+        cloth = SimpleNamespace(masses=masses)
+        scene = SimpleNamespace(**{"dt": 0.1, "cloth": cloth, "warm_up": 2, "kept": None} | scene)
+        group = SimpleNamespace(scene=scene, kept=lambda make: shaken(jumps))
+        roll_out = RollOut(
+            group, None, Trajectory(positions, np.zeros((0, 3), int), np.arange(len(positions)) * 0.1)
+        )
+        return correlation_with_body(roll_out)
+
+    assert accelerations(shaken(jumps), masses, 0.1)[2:] == pytest.approx(100.0 * jumps)
+    assert correlation(shaken(3.0 * jumps + 0.2)) == pytest.approx(1.0)
+    assert correlation(shaken(4.0 - jumps)) == pytest.approx(-1.0)
+    assert correlation(shaken(others)[:20]) == pytest.approx(np.corrcoef(others[:18], jumps[:18])[0, 1])
+    assert correlation(shaken(0.0 * jumps)) is None and correlation(shaken(jumps)[:4]) is None
+    assert correlation(shaken(jumps), kept=np.arange(3)) is None  # frames are left out: no second difference
+
+
+def test_energies_of_a_rigid_acceleration_are_known_by_hand():
+    scene = small_scene("hanging_sheet")
+    heights = np.array([0.5, 0.6, 0.7, 0.8, 0.9])
+    scene = dataclasses.replace(scene, origin_heights=heights)
+    rest, acceleration = scene.cloth.rest_positions, np.array([3.0, 0.0, -4.0])
+    times = scene.dt * np.arange(5)[:, None, None]
+    positions = rest + 0.5 * times**2 * acceleration
+    longer, shorter = energy_series(scene, [positions, positions[:3]])
+    mass = scene.cloth.masses.sum()
+    inertia = 0.5 * mass * 25.0 * scene.dt**2
+    assert accelerations(positions, scene.cloth.masses, scene.dt)[2:] == pytest.approx([5.0] * 3, rel=1e-9)
+    assert longer["inertia"] == pytest.approx([0, 0, inertia, inertia, inertia], rel=1e-9)
+    height = (scene.cloth.masses * rest[:, 1]).sum() / mass
+    assert longer["gravity"] == pytest.approx(mass * 9.81 * (height - heights), rel=1e-12)
+    assert np.abs(longer["strain"]).max() < 1e-20 and set(longer) == {*scene.terms, "total"}
+    assert longer["total"] == pytest.approx(longer["gravity"] + longer["inertia"])
+    assert shorter["total"] == pytest.approx(longer["total"][:3])
+
+
+def test_energies_are_those_that_the_simulator_minimised():
+    scene = small_scene("sheet_on_sphere")
+    trajectory = simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=10, obstacle=scene.obstacle, start=scene.start
+    )
+    (series,) = energy_series(scene, [trajectory.positions])
+    own = trajectory.frame_fields
+    for term in ("strain", "bending", "gravity", "inertia"):
+        assert series[term][2:] == pytest.approx(own[f"energy/{term}"][2:], rel=1e-9, abs=1e-15)
+    # Planes of the simulator were searched at its initial guess, those of the metric where it ended.
+    assert series["collision"][-1] == pytest.approx(own["energy/collision"][-1], rel=0.3)
+    assert series["collision"][-1] > 0.0
+
+
+def test_own_part_depth_does_not_see_the_limb_beside():
+    """Two balls: a vertex that belongs to the left one lies deep in the right one, outside its own."""
+    points, faces = icosphere(3, 0.1)
+    body = np.concatenate([points, points + np.array([0.25, 0, 0])])
+    rest = np.concatenate([points, points + np.array([1.0, 0, 0])])  # far apart where the cloth was made
+    obstacle = Obstacle(body, np.concatenate([faces, faces + len(points)]), rest_positions=rest)
+    x = np.array([[[0.2, 0.0, 0.0], [0.09, 0.0, 0.0]]])  # 10 cm off the left ball; 1 cm inside it
+    belongs = np.array([[0.11, 0.0, 0.0], [0.101, 0.0, 0.0]])
+    # The ball is a mesh: its faces lie up to 1 % of the radius below the sphere.
+    assert own_part_depth(x, obstacle, belongs)[0] == pytest.approx([0.0, 0.01], abs=1e-3)
+    assert penetration([x], obstacle)[0].depth[0] == pytest.approx([0.05, 0.01], abs=1e-3)
+
+
+def test_hem_drift_follows_the_hem_against_the_pelvis():
+    x = np.zeros((3, 4, 3))
+    x[:, 2:, 1] = np.array([0.5, 0.6, 0.8])[:, None]
+    assert hem_drift(x, np.array([2, 3]), np.array([1.0, 1.1, 1.1])) == pytest.approx(0.2, abs=1e-15)
+
+
+def test_training_distance_is_of_judged_frames_to_the_nearest_training_pose():
+    poses = np.zeros((23, 24, 3))
+    poses[:, JOINT["right_knee"], 0] = np.deg2rad(22.0 * np.arange(23) / 2)  # 0, .5, 1 ... 11 degrees / joint
+    scene = SimpleNamespace(dressed=SimpleNamespace(motion=SimpleNamespace(poses=poses)))
+    known = np.zeros((2, 24, 3))
+    known[1] = poses[22]
+    roll_out = SimpleNamespace(scene=scene, judged=slice(2, None), training_poses=known)
+    found = training_distance.measure(roll_out)
+    nearest = np.minimum(np.arange(2, 23), 22 - np.arange(2, 23)) / 2
+    assert found["training_distance/median"] == pytest.approx(np.median(nearest))
+    assert found["training_distance/p95"] == pytest.approx(np.percentile(nearest, 95))
+    roll_out.training_poses = None
+    assert training_distance.measure(roll_out) == {}
+
+
+def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places():
+    random = np.random.default_rng(5)
+    h, area = random.uniform(1.0, 9.0, (2, 50)), random.uniform(0.5, 1.5, (2, 50))
+    still = CurvatureSeries(h, area)
+    order = random.permutation(50)
+    shuffled = CurvatureSeries(h[:, order], area[:, order])
+    assert histogram_distance(shuffled, still) == pytest.approx(0, abs=1e-12)
+    assert histogram_distance(CurvatureSeries(h + 2.5, area), still) == pytest.approx([2.5, 2.5])
+    # Two heaps against one between them: all of the area moves by 3.
+    two = CurvatureSeries(np.array([[1.0, 7.0]]), np.array([[2.0, 2.0]]))
+    one = CurvatureSeries(np.array([[4.0, 99.0]]), np.array([[0.3, 0.0]]))  # boundary vertices weigh nothing
+    assert histogram_distance(two, one) == pytest.approx([3.0])
+    assert histogram_distance(CurvatureSeries(h, 0 * area), still) == pytest.approx([0.0, 0.0])
+
+
+def test_edges_areas_and_folds_of_known_deformations():
+    faces = np.array([[0, 1, 2], [1, 0, 3]])
+    flat = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -1, 0]], float)
+    edges = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3]])
+    lengths = np.linalg.norm(flat[edges[:, 1]] - flat[edges[:, 0]], axis=1)
+    hinge = np.array([[0, 1, 2, 3]])
+    angle = 0.7
+    folded = flat.copy()
+    folded[3] = [0.5, -np.cos(angle), np.sin(angle)]
+    x = np.stack([flat, 1.1 * flat, folded])
+    assert edge_change(x, edges, lengths) == pytest.approx([0.0, 0.1, 0.0], abs=1e-12)
+    assert area_change(x, faces, np.array([0.5, 0.5])) == pytest.approx([0.0, 0.21, 0.0], abs=1e-12)
+    assert dihedral_angle(x, hinge) == pytest.approx([0.0, 0.0, angle], abs=1e-12)
+    assert dihedral_angle(x, hinge[:0]) == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_intersections_are_those_of_two_crossing_strips():
+    plane, faces = right_grid(6, 6, 1.0, 1.0)
+    flat = np.column_stack([plane, 0.0 * plane[:, 0]])
+    upright = np.column_stack([0.0 * plane[:, 0], plane]) + np.array([0.47, 0.013, -0.47])
+    both = np.concatenate([faces, faces + len(flat)])
+    above = np.concatenate([flat, flat + np.array([0.0, 0.0, 0.01])])
+    same = np.concatenate([flat, flat])
+    assert intersecting_share(np.array([above, same]), both) == pytest.approx([0.0, 0.0])
+    crossing = np.concatenate([flat, upright])
+    corners = flat[faces]
+    through = (corners[:, :, 0].min(1) < 0.47) & (corners[:, :, 0].max(1) > 0.47)
+    hit = intersecting(crossing, both)
+    assert np.array_equal(hit[: len(faces)], through) and hit[len(faces) :].sum() == through.sum()
+    assert intersecting_share(crossing[None], both) == pytest.approx([hit.mean()])
+    tent = flat + np.abs(flat[:, [0]] - 0.5) * [0.0, 0.0, 2.0]  # folded, and nowhere through itself
+    assert not intersecting(tent, faces).any()
+
+
+def two_spheres(apart):
+    """Two spheres of radius 1 as one surface, their centres that far apart."""
+    x, faces = icosphere(4, 1.0)
+    return np.concatenate([x, x + np.array([apart, 0.0, 0.0])]), np.concatenate([faces, faces + len(x)])
+
+
+def test_a_body_in_itself_is_counted_by_its_vertices_in_its_other_parts():
+    # The cap of a sphere inside the other one has (1 - apart / 2) / 2 of its area.
+    for apart, share in ((2.5, 0.0), (1.5, 0.125), (0.5, 0.375)):
+        assert inside_itself(*two_spheres(apart)).mean() == pytest.approx(share, abs=0.012)
+
+
+def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_references_rows_alone():
+    faces = two_spheres(1.5)[1]
+    obstacle = Obstacle(np.stack([two_spheres(apart)[0] for apart in (0.2, 1.5, 0.5, 1.0)]), faces)
+    body = SimpleNamespace(shaped=lambda betas: two_spheres(1.5)[0])
+    scene = SimpleNamespace(obstacle=obstacle, dressed=SimpleNamespace(body=body, betas=None), warm_up=1)
+    roll_out = SimpleNamespace(
+        scene=scene, positions=np.zeros((4, 1, 3)), entry=SimpleNamespace(role="reference")
+    )
+    found = body_metrics.measure(roll_out)
+    assert found["body/self_intersection"] == pytest.approx(100 * (0.375 - 0.125), abs=2.0)
+    assert found["body/self_intersection_frame"] == 2.0
+    roll_out.entry.role = "learned"
+    assert body_metrics.measure(roll_out) == {}
+
+
+def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():
+    found = [
+        {"energy/total": 5.0 + 3.0 / n, "energy/strain": 1.0 - 2.0 / n, "curvature/mean": 7.0 + 1.0 / n}
+        for n in (1, 2, 4, 8)
+    ]
+    expected = {"total": 3.0, "strain": -2.0, "curvature": 1.0, "order": 1.0}
+    assert time_errors(found) == pytest.approx(
+        {f"time_error/{name}": value for name, value in expected.items()}
+    )
+
+
+@pytest.mark.parametrize(
+    ("of_halvings", "order"),
+    [
+        (lambda k: 0.028 + 0.0075 * k, 0.0),  # as much with each halving, as the strain of undamped cloth
+        (lambda k: 2.0 ** (-2 * k), 2.0),
+        (lambda k: (-0.5) ** k, None),  # to and fro
+        (lambda k: 4.0, None),
+    ],
+)
+def test_what_shows_no_first_order_has_no_limit(of_halvings, order):
+    names = {"energy/total": "total", "energy/strain": "strain", "curvature/mean": "curvature"}
+    found = time_errors([dict.fromkeys(names, of_halvings(k)) for k in range(4)])
+    expected = dict.fromkeys((f"eighth/{name}" for name in names.values()), of_halvings(0) - of_halvings(3))
+    if order is not None:
+        expected["order"] = order
+    assert found == pytest.approx({f"time_error/{name}": value for name, value in expected.items()}, abs=1e-9)
+    assert {find_metric(name).unit for name in found if name.endswith("curvature")} == {"1/m"}
+    assert find_metric("time_error/eighth/strain").unit == "J"
+
+
+def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
+    def row(method: str, gap: float, metric: str = "gap/energy", scene: str = "flag", seed: int = 0) -> Row:
+        entry = find_method(method)
+        return Row(
+            "speed", scene, method, seed, metric, "1", gap, role=entry.role, family=entry.family or method,
+            level=entry.level,
+        )  # fmt: skip
+
+    falling = [row("newton-1", 0.5), row("newton-4", 0.1), row("newton-8", 0.1), row("simulation", 0.0)]
+    assert remarked(falling) == falling
+    rising = [row("newton-8", 0.2), row("vbd-5", 0.2), row("snug+lbfgs-1", 0.3, seed=1)]
+    rising.append(row("simulation-1e-8", 1e-9))
+    elsewhere = [row("newton-1", 0.01, "curvature/error"), row("newton-4", 0.01, scene="sheet")]
+    elsewhere += [row("simulation-perturbed-1e-4", 1e-5), row("simulation-perturbed-1e-9", 1e-2)]  # no curve
+    found = remarked([*falling[:2], *rising, *elsewhere])
+    assert [r.method for r in found if r.reason] == ["newton-8"]
+    assert found[2].reason == "the error does not fall here: newton-4, the coarser one, has a gap of 0.1"
+    assert remarked([dataclasses.replace(rising[0], reason="kept"), *falling])[0].reason == "kept"
+    known_roughly = [dataclasses.replace(r, uncertainty=0.04) for r in (falling[1], rising[0])]
+    assert remarked(known_roughly) == known_roughly  # .1 and .2, by less than two standard errors of both
+
+
+def test_families_hold_every_level_from_coarse_to_fine():
+    families: dict[str, list[str]] = {}
+    for entry in sorted((e for e in METHODS if e.level is not None), key=lambda e: e.level):
+        families.setdefault(entry.family, []).append(entry.name)
+    assert families["lbfgs"] == ["lbfgs-5", "lbfgs-10", "lbfgs-20", "lbfgs-40"]
+    assert families["snug+newton"] == [f"snug+newton-{count}" for count in (1, 2, 4, 8)]
+    assert all(entry.level for entry in METHODS if entry.truncated)
+
+
+def test_every_metric_has_a_unit_a_title_and_a_definition_and_a_pattern_serves_a_new_term():
+    units = {metric.unit for metric in declared().values()}
+    known = {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1", "deg", "frames"}
+    assert known <= units <= known | {"N m", "% of weight", "weights", "vertex weights", "us", "h", "kB"}
+    assert all(metric.title and metric.definition for metric in declared().values())
+    own = find_metric("energy/my_term")
+    assert (own.name, own.unit, own.title, own.table) == ("energy/my_term", "J", "My term", "energies")
+    with pytest.raises(KeyError):
+        find_metric("nonsense/x")

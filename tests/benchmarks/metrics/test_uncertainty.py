@@ -1,0 +1,172 @@
+"""What differs by less than simulations that are as right as the reference: the column `uncertainty`."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.methods import METHODS, find_method
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metrics.energies import energy, excess
+from benchmarks.metrics.motion import dynamics
+from benchmarks.metrics.motion.hem import HemMotion
+from benchmarks.metrics.surface import curvature
+from benchmarks.metrics.surface import distances as geometry
+from benchmarks.results.run_folder import Row, as_right
+from benchmarks.rows import with_uncertainty
+from benchmarks.tasks.metric_task import compared, measured
+from reference_sim import Trajectory
+from tests.benchmarks.runner.tasks_by_hand import small_scene
+
+EAST = np.array([1.0, 0.0, 0.0])
+TWINS = ("simulation-perturbed-1e-9", "simulation-perturbed-1e-4", "simulation-refrozen")
+
+
+def group_of(scene, **positions):
+    """Roll-outs by the names of their methods, in which "_" stands for "-"."""
+    group = SceneRollOuts(scene, gap_samples=99)
+    for name, x in positions.items():
+        entry = find_method(name.replace("__", "/").replace("_", "-"))
+        times = scene.dt * np.arange(len(x))
+        trajectory = Trajectory(positions=x, faces=scene.cloth.faces, times=times)
+        group.roll_outs.append(RollOut(group, entry, trajectory, suites=("garments",)))
+    return group
+
+
+def swaying(scene, shift=0.0, frames=6):
+    x = np.repeat(scene.start[None], frames, axis=0)
+    x = x + 0.02 * np.sin(np.arange(frames) + 5.0 * scene.start[:, :1].sum())[:, None, None]
+    return x + np.array([shift, 0.0, 0.0])
+
+
+def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes():
+    scene = small_scene("hanging_sheet", cells=4)
+    x = swaying(scene)
+    group = group_of(
+        scene, simulation=x, simulation_perturbed_1e_9=x + 0.001 * EAST,
+        simulation_perturbed_1e_4=x - 0.004 * EAST, simulation_dt__2=x + 0.05 * EAST,
+        newton_1=x + 0.01 * EAST,
+    )  # fmt: skip
+    found = compared(group.roll_outs[-1], geometry.compare)
+    value, uncertainty, moved = found["distance/rms"]
+    assert (value, uncertainty) == pytest.approx((10.0, 4.0))
+    assert dict(moved) == pytest.approx({TWINS[0]: -1.0, "simulation-perturbed-1e-4": 4.0})
+    # A twin is compared with the others, not with itself; the reference with nobody.
+    value, uncertainty, moved = compared(group.roll_outs[1], geometry.compare)["distance/rms"]
+    assert (value, uncertainty) == pytest.approx((1.0, 4.0)) and [twin for twin, _ in moved] == [
+        "simulation-perturbed-1e-4"
+    ]
+    assert compared(group.roll_outs[0], geometry.compare) == {}
+    alone = group_of(scene, simulation=x, newton_1=x + 0.01 * EAST)
+    assert compared(alone.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(10.0)
+
+
+def test_simulations_of_another_step_are_not_as_right_and_all_others_are():
+    variants = [entry for entry in METHODS if entry.role == "reference-variant"]
+    others = {entry.name for entry in variants if not as_right(entry.family, entry.level)}
+    assert others == {f"simulation-{what}" for what in ("1e-2", "1e-4", "dt/2", "dt/4", "dt/8")}
+    perturbed = [entry for entry in METHODS if entry.family == "simulation-perturbed"]
+    assert len(perturbed) >= 8 and min(e.level for e in perturbed) == 1e-9
+    assert max(e.level for e in perturbed) == 1e-4 and not any(e.timed for e in perturbed)
+
+
+def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike(tmp_path):
+    scene = small_scene("hanging_sheet", cells=4)
+    starts = []
+    for name in TWINS[:2]:
+        entry = find_method(name)
+        method = entry.make(models=tmp_path, seed=0)
+        method.prepare(scene)
+        moved = method.scene.start - scene.start
+        lengths = np.linalg.norm(moved, axis=1)
+        assert lengths[scene.cloth.free] == pytest.approx(entry.level, rel=1e-6)
+        assert not lengths[scene.cloth.pins].any()
+        starts.append(moved / entry.level)
+    assert np.abs(starts[0] - starts[1]).max() > 0.1
+
+
+def test_numbers_of_the_reference_are_as_uncertain_as_right_simulations_differ():
+    def row(method, metric, value, uncertainty=None):
+        entry = find_method(method)
+        return Row(
+            "garments", "tshirt/x", method, 0, metric, "J", value, role=entry.role, family=entry.family,
+            uncertainty=uncertainty,
+        )  # fmt: skip
+
+    rows = [
+        row("simulation", "energy/total", 1.0), row("simulation", "cost/frame", 5.0),
+        row("simulation", "gap/energy", 0.1, 0.02), row("snug", "energy/total", 2.0),
+        row(TWINS[0], "energy/total", 1.01), row(TWINS[1], "energy/total", 0.97),
+        row(TWINS[0], "cost/frame", 9.0), row(TWINS[0], "gap/energy", 0.3),
+        row("simulation-dt/8", "energy/total", 7.0),
+    ]  # fmt: skip
+    told = with_uncertainty(rows)
+    found = {(r.method, r.metric): r.uncertainty for r in told}
+    assert found["simulation", "energy/total"] == pytest.approx(0.03)
+    assert dict(told[0].moved) == pytest.approx({TWINS[0]: 0.01, TWINS[1]: -0.03})
+    assert not any(r.moved for r in told[1:])
+    assert found["simulation", "cost/frame"] is None and found["snug", "energy/total"] is None
+    assert found["simulation", "gap/energy"] == 0.02
+
+
+def test_means_are_over_the_judged_frames_alone():
+    scene = dataclasses.replace(small_scene("hanging_sheet", cells=4), warm_up=3)
+    x = swaying(scene)
+    wild = x.copy()
+    wild[:1] += np.random.default_rng(0).normal(size=x[:1].shape)  # no inertia of frame 3 hangs on it
+    one, other = (group_of(scene, simulation=x, newton_1=y).roll_outs[1] for y in (x, wild))
+    for module in (energy, curvature, geometry):
+        assert module.measure(one) == pytest.approx(module.measure(other)), module.__name__
+    for module in (curvature, geometry):
+        pair = [module.compare(roll_out, roll_out.reference) for roll_out in (one, other)]
+        assert pair[0] == pytest.approx(pair[1]), module.__name__
+    late = x.copy()
+    late[-1] += 0.1 * np.random.default_rng(0).normal(size=x[0].shape)
+    last = group_of(scene, simulation=x, newton_1=late).roll_outs[1]
+    assert energy.measure(last)["energy/strain"] > 2.0 * energy.measure(one)["energy/strain"]
+    # What ended in the warm-up has no number.
+    assert measured(group_of(scene, newton_1=x[:3]).roll_outs[0]) == ({}, {}, ("ok", ""))
+
+
+def test_an_excess_is_a_difference_of_sums_and_the_zero_of_gravity_is_no_part_of_it():
+    scene = small_scene("hanging_sheet", cells=4)
+    x = swaying(scene)
+    stretched = x * [1.05, 1.0, 1.0] + [0.0, 0.01, 0.0]
+    for heights in (None, np.full(scene.frames, 7.0)):
+        group = group_of(
+            dataclasses.replace(scene, origin_heights=heights), simulation=stretched, direct_optimisation=x
+        )
+        ours, bound = group.roll_outs
+        found = excess.measure(ours)
+        terms = [{k: v[2:].mean() for k, v in energy.energies(r).items()} for r in (ours, bound)]
+        assert found["excess/total"] == pytest.approx(terms[0]["total"] - terms[1]["total"])
+        kept = ("strain", "bending", "inertia")
+        without = sum(terms[0][k] - terms[1][k] for k in kept)
+        assert found["excess/without_gravity"] == pytest.approx(without) and without > 1e-3
+        assert excess.measure(bound) == {}
+    assert excess.measure(group_of(scene, simulation=x).roll_outs[0]) == {}
+
+
+def test_dynamics_are_told_by_the_own_static_answer_and_by_the_simulators(monkeypatch):
+    """A method whose static answer moves with it has no dynamics of its own, and half of the simulator's."""
+    scene, frames = small_scene("hanging_sheet", cells=4), 40
+    time = np.arange(frames)[:, None, None] * scene.dt
+    still = np.repeat(scene.start[None], frames, axis=0)
+    swing = 0.02 * np.sin(9.0 * time) * scene.start[None, :, :1]
+    group = group_of(scene, simulation=still + swing, snug=still + 0.5 * swing)
+    reference, own = group.roll_outs
+    own.quasi_static = own.positions
+    hem = HemMotion(
+        axes=np.tile(np.eye(3), (frames, 1, 1)), origins=np.zeros((frames, 3)), stop=None,
+        hem=np.arange(5), simulated=reference.positions, quasi_static=still, dt=scene.dt, first=2,
+    )  # fmt: skip
+    monkeypatch.setattr(dynamics, "hem_motion", lambda roll_out: hem)
+    found = dynamics.compare(own, reference)
+    assert found["dynamics/amplitude"] == 0.0
+    assert found["dynamics/common_amplitude"] == pytest.approx(0.5)
+    assert found["dynamics/common_correlation"] == pytest.approx(1.0)
+    own.quasi_static = None  # as of a solver: its static answer is the simulator's
+    found = dynamics.compare(own, reference)
+    assert found["dynamics/amplitude"] == found["dynamics/common_amplitude"] == pytest.approx(0.5)

@@ -1,0 +1,141 @@
+"""What a scene does not need is left out of it: not imported, not built, not evaluated."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.presets import find_preset
+from benchmarks.scenes import SCENES, of_garment
+from reference_sim import Cloth, Material, Potential, minimise, simulate
+from reference_sim.energies import BendHinge, ContactPenalty, Inertia, StretchStVK
+from tests.reference_sim.meshes import patch
+
+ROOT = Path(__file__).resolve().parents[3]
+CELL = """
+import sys
+from pathlib import Path
+from benchmarks.methods import find_method
+from benchmarks.presets import find_preset
+from benchmarks.scenes import SCENES
+scene = next(scene for scene in SCENES if scene.name == sys.argv[1]).at(find_preset("smoke")).build()
+for name in sys.argv[2].split(","):
+    method = find_method(name).make(models=Path("."), seed=0)
+    method.prepare(scene)
+    assert method.run().frames == scene.frames
+print(*sys.modules)
+"""
+DRESSED = """
+import dataclasses, pickle, sys
+from pathlib import Path
+from benchmarks.methods import find_method
+from benchmarks.presets import find_preset
+from benchmarks.scenes import of_garment
+assets, body, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
+assets = dataclasses.replace(assets, motions={"kick": motion}, bodies={"kick": body})
+scene = of_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets)
+method = find_method("lbfgs-5").make(models=Path("."), seed=0)
+method.prepare(dataclasses.replace(scene, settle=lambda: start))
+assert method.run().frames == 4
+print(*sys.modules)
+"""
+STATIC = """
+import sys
+import numpy as np
+from reference_sim import Cloth, Material, Potential, minimise
+from reference_sim.energies import Gravity, StretchStVK
+x = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1], [0.1, 0.0, 0.1]])
+cloth = Cloth(x, np.array([[0, 1, 2], [1, 3, 2]]), Material(), pins=[0, 1])
+result = minimise(Potential([StretchStVK(cloth), Gravity(cloth)]), x - [0.0, 0.05, 0.0])
+assert result.status == "converged", result.reason
+print(*sys.modules)
+"""
+BODY = (
+    "snug.body.parametric_body", "snug.networks.dressed_body", "snug.networks.regressor", "igl", "reference_sim.obstacle",
+    "reference_sim.contact.closest_point", "reference_sim.contact.collisions",
+)  # fmt: skip
+CONTACT = ("reference_sim.energies.contact_penalty", "reference_sim.energies.contact_barrier")
+MATERIAL = ("reference_sim.energies.stretch_stvk", "reference_sim.energies.bend_hinge")
+
+
+def loaded(code: str, *arguments: str) -> set[str]:
+    answer = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        capture_output=True, text=True, timeout=120, cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert answer.returncode == 0, answer.stderr[-2000:]
+    return set(answer.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("scene", "present", "absent"),
+    [
+        ("hanging_sheet", MATERIAL, (*BODY, *CONTACT, "torch")),
+        (
+            "sheet_on_sphere",
+            (*MATERIAL, CONTACT[0], BODY[4]),
+            ("snug.body.parametric_body", "torch", CONTACT[1]),
+        ),
+        ("free_fall", ("reference_sim.energies.gravity",), (*MATERIAL, *BODY, *CONTACT, "torch")),
+    ],
+)
+def test_a_scene_loads_what_it_declares_and_no_more_whoever_solves_it(scene, present, absent):
+    modules = loaded(CELL, scene, "simulation,lbfgs-5,vbd-5,xpbd-10")
+    assert set(present) <= modules
+    assert not modules & set(absent), modules & set(absent)
+
+
+def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
+    """Whoever poses the joints needs torch; a cell is given the posed body."""
+    assets = open_assets(find_preset("smoke"), embedded_motions(["kick"]), ["tshirt"])
+    scene = of_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets)
+    motion, path = assets.motions["kick"], tmp_path / "given"
+    given = (assets, assets.posed_body(motion)[:4], scene.start, motion.cut(0, 4))
+    path.write_bytes(pickle.dumps(given))
+    modules = loaded(DRESSED, str(path))
+    assert {"reference_sim.obstacle", CONTACT[0], *MATERIAL} <= modules
+    assert not modules & {
+        "torch",
+        "snug.body.skinning",
+        "snug.networks.dressed_body",
+        "snug.networks.regressor",
+    }
+
+
+def test_a_static_problem_loads_no_time_step():
+    modules = loaded(STATIC)
+    assert "reference_sim.energies.stretch_stvk" in modules
+    assert not modules & {"reference_sim.energies.inertia", *BODY}
+
+
+def test_what_is_not_declared_is_not_evaluated(monkeypatch):
+    """Hinges, contact and inertia would raise if anything asked them for a number."""
+
+    def asked(*_: object) -> None:
+        raise AssertionError("a term was evaluated that the scene does not have")
+
+    points, faces = patch(0)
+    rim = np.flatnonzero((np.abs(points[:, :2] - 0.5) > 0.499).any(axis=1))
+    cloth = Cloth(points, faces, Material(), pins=rim)
+    for term in (BendHinge, ContactPenalty):
+        for name in ("__init__", "prepare", "value_and_gradient", "active_hessian_blocks", "add_hessian"):
+            monkeypatch.setattr(term, name, asked)
+    assert simulate(cloth, [StretchStVK(cloth)], frames=3).status == "converged"
+    monkeypatch.setattr(Inertia, "value_and_gradient", asked)
+    assert minimise(Potential([StretchStVK(cloth)]), 1.1 * points).status == "converged"
+
+
+def test_no_scene_declares_what_it_has_no_use_for():
+    without_body = [scene for scene in SCENES if not scene.dressed]
+    assert len(without_body) >= 5
+    for scene in without_body:
+        built = scene.at(find_preset("smoke")).build()
+        assert ("collision" in built.terms) == (built.obstacle is not None) == scene.obstacle
+        assert built.dressed is None

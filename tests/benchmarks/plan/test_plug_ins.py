@@ -1,0 +1,377 @@
+"""Methods, scenes, metrics, energies and programs from outside: by path and by entry point."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import metric, run
+from benchmarks.method import MethodEntry
+from benchmarks.methods import METHODS
+from benchmarks.methods.outside.program import program
+from benchmarks.plan import plug_ins as outside
+from benchmarks.plan import selection
+from benchmarks.plan.plan import Motions, Plan
+from benchmarks.registry import DeclarationError
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.schedule import Schedule
+from benchmarks.runner.source import code_of, digest
+from benchmarks.runner.task_inputs import declared
+from benchmarks.scenes import of_garment
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.tasks.metric_task import measured
+from reference_sim import Trajectory
+from snug.recipes.named import Training
+from snug.recipes.recipe import DEFAULT, RecipeError
+from tests.benchmarks.plan.outside_files import (
+    HELPER,
+    METHOD,
+    METRIC_FILE,
+    PROGRAM,
+    PROGRAM_FILE,
+    SCENE,
+    SCENE_FILE,
+    TINY,
+    as_before,
+    installed,
+)
+from tests.benchmarks.runner.test_source import forget
+
+_as_before = pytest.fixture(autouse=True)(as_before)
+
+
+# --- a run -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory) -> Path:
+    """A user's folder, with a package installed beside."""
+    folder = tmp_path_factory.mktemp("user")
+    (folder / "a.txt").write_text("weights")
+    (folder / "mine.py").write_text(METHOD.format(helper="mine_helper", name="mine", label="Mine"))
+    (folder / "mine_helper.py").write_text(HELPER.format(shift=0.0))
+    (folder / "lift.py").write_text(SCENE_FILE)
+    (folder / "height.py").write_text(METRIC_FILE)
+    (folder / "theirs.py").write_text(PROGRAM_FILE)
+    (folder / "theirs_run.py").write_text(PROGRAM)
+    site = folder / "site"
+    installed(site, "packed_method")
+    (site / "packed_method.py").write_text(
+        METHOD.format(helper="packed_helper", name="packed-1", label="Packed")
+    )
+    (site / "packed_helper.py").write_text(HELPER.format(shift=0.001))
+    (site / "a.txt").write_text("weights")
+    return folder
+
+
+WORDS = ["--preset", "smoke", "--suite", "speed", "--scenes", "lift.py", "--metrics", "height.py"]
+WORDS += ["--methods", "simulation,./mine.py,packed,theirs.py", "-o", "out"]
+
+
+def command(files: Path, *more: str) -> int:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(files)
+        patch.syspath_prepend(files / "site")
+        return run.main([*WORDS, *more])
+
+
+@pytest.fixture(scope="module")
+def done(files) -> RunFolder:
+    assert command(files) == 0
+    return RunFolder(files / "out")
+
+
+def test_entries_by_path_by_entry_point_and_as_a_program_are_rows_like_others(done):
+    rows = {(row.method, row.metric): row for row in done.read_rows()}
+    assert {method for method, _ in rows} == {"simulation", "mine", "packed-1", "theirs"}
+    assert {row.scene for row in rows.values()} == {"lift"}
+    off = {
+        method: rows[method, "exact/distance"].value
+        for method in ("simulation", "mine", "packed-1", "theirs")
+    }
+    assert max(off["simulation"], off["mine"], off["theirs"]) < 1e-9
+    assert off["packed-1"] == pytest.approx(0.001 * 3**0.5)
+    assert all((method, "energy/lift") in rows and (method, "height/highest") in rows for method in off)
+    assert rows["mine", "height/highest"].unit == "m" and rows["mine", "height/highest"].value > 0.4
+
+
+def test_they_stand_in_tables_and_plots(done):
+    table = (done.tables / "height_by_scene.csv").read_text()
+    assert table.startswith("suite,scene,method,height/highest [m],")
+    assert all(f"\nspeed,lift,{method}," in table for method in ("mine", "packed-1", "theirs"))
+    config = done.read_config()
+    assert config["metrics"]["height/highest"]["definition"] == "of all vertices"
+    assert config["methods"]["mine"]["label"] == "Mine"
+    figures = {path.name for path in done.figures.glob("*.svg")}
+    assert "error_against_time_lift.svg" in figures
+
+
+def test_a_program_is_not_timed_and_its_own_time_is_marked(done):
+    costs = {
+        row.metric: row
+        for row in done.read_rows()
+        if row.method == "theirs" and row.metric.startswith("cost")
+    }
+    assert set(costs) == {"cost/frame"} and costs["cost/frame"].value == pytest.approx(2.0)
+    assert costs["cost/frame"].reason == "declared by its author, not measured"
+    assert done.read_config()["methods"]["theirs"]["label"] == "theirs (declared time)"
+    measured = [row for row in done.read_rows() if row.method == "mine" and row.metric == "cost/frame"]
+    assert [row.reason for row in measured] == [""] and measured[0].value > 0.0
+
+
+def test_what_is_unchanged_is_cached_and_what_is_edited_is_done_again(done, files, capsys):
+    def stale() -> set[str]:
+        forget()
+        assert command(files, "--dry-run") == 0
+        lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  cell")]
+        return {line.split(":")[0].split()[-1] for line in lines if not line.endswith(": cached")}
+
+    (files / "mine_helper.py").write_text(HELPER.format(shift=0.0) + "# a remark\n")
+    assert stale() == set()
+    (files / "mine_helper.py").write_text(HELPER.format(shift=0.5))
+    (files / "theirs_run.py").write_text(PROGRAM + "# of what is run elsewhere every byte counts\n")
+    assert stale() == {"mine", "theirs"}
+    (files / "mine_helper.py").write_text(HELPER.format(shift=0.0))
+    (files / "theirs_run.py").write_text(PROGRAM)
+    (files / "a.txt").write_text("other weights")
+    (files / "site" / "packed_helper.py").write_text(HELPER.format(shift=0.5))
+    assert stale() == {"mine", "packed-1"}
+
+
+def test_installed_packages_are_listed(files, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(files / "site")
+    assert run.main(["--list"]) == 0
+    assert "packed  package packed_method 1.0, module packed_method" in capsys.readouterr().out
+
+
+# --- refusals ----------------------------------------------------------------------------------------------
+
+HEAD = "from benchmarks.method import MethodEntry\n"
+ENTRY = "METHODS = (MethodEntry({}),)\n"
+MAKE = "def make(**options): pass\n"
+PLAIN = 'name="a", description="b"'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = 1\ny = )\n", "bad.py: line 2: unmatched ')'"),
+        ("x = 1\n", "bad.py: declares no METHODS, a tuple of MethodEntry"),
+        ("METHODS = (1,)\n", "bad.py: declares no METHODS, a tuple of MethodEntry"),
+        ("METHODS = ()\n", "bad.py: METHODS is empty"),
+        ("def f():\n    return 1 / 0\nf()\n", "bad.py: line 2: ZeroDivisionError: division by zero"),
+        ("import sys\nsys.exit(3)\n", "bad.py: line 2: SystemExit: 3"),
+        ("import nothing_there\n", "bad.py: line 1: ModuleNotFoundError"),
+        (HEAD + ENTRY.format('name="a", lable="b"'), "bad.py: line 2: TypeError"),
+        (HEAD + ENTRY.format(PLAIN), "bad.py: has no function make"),
+        (HEAD + ENTRY.format(PLAIN + ', module="no.where"'), "method 'a': no module no.where"),
+        (HEAD + ENTRY.format(PLAIN + ', files=("gone.pt",)') + MAKE, "gone.pt: no such file"),
+        (HEAD + ENTRY.format(PLAIN + ', trained="zz"') + MAKE, "no training is called 'zz'"),
+        (HEAD + ENTRY.format('name="a b", description="c"') + MAKE, "method 'a b': use letters"),
+        (HEAD + ENTRY.format('name="snug", description="c"') + MAKE,
+         "method 'snug' is declared twice, by the project itself and by "),
+        (HEAD + ENTRY.format(PLAIN + ', files="gone.pt"') + MAKE, "files='gone.pt': give a tuple of strings"),
+        (HEAD + ENTRY.format(PLAIN + ', options={"at": open}') + MAKE, "method 'a': options: cannot tell"),
+        (HEAD + ENTRY.format('name="body", description="c"') + MAKE, "method 'body': files of the project"),
+        (HEAD + ENTRY.format(f'name="{"a" * 151}", description="c"') + MAKE, "more than 150 bytes"),
+        (HEAD + "METHODS = tuple(MethodEntry(name=n, description='b') for n in ('a/b', 'a-b'))\n" + MAKE,
+         "free_fall x a-b and free_fall x a/b would have the same files: rename one"),
+        (HEAD + "from random_helper import f\n", "bad.py: line 2: ModuleNotFoundError"),
+        ("\udcff", "bad.py: cannot be read"),
+    ],
+)  # fmt: skip
+def test_a_file_that_cannot_be_meant_is_one_line(text, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.py").write_text(text, errors="surrogateescape")
+    assert run.main(["--scenes", "free_fall", "--methods", "bad.py", "-o", "out"]) == 2
+    out, error = capsys.readouterr()
+    assert out == "" and error.count("\n") == 1 and words in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "word", "words"),
+    [
+        ("--methods", "gone.py", "gone.py: no such file"),
+        ("--metrics", "energy", "energy: no such file or entry point"),
+        ("--metrics", "twice.py", "metric 'energy/total' is declared twice, by the project itself and by "),
+        ("--metrics", "bare.py", "metric 'mine/x' has no unit"),
+        ("--scenes", "taken.py", "a case of the project has this name"),
+        ("--scenes", "worn.py", "no garment is called 'toga'; there are tshirt, "),
+        ("--methods", "random.py", "Python knows random as"),
+        (
+            "--methods",
+            "packed",
+            "entry point packed of snug_benchmark.methods is declared by package one 1.0 and by package two ",
+        ),
+        (
+            "--methods",
+            "snug",
+            "--methods snug: is a name of the project, and the entry point of other: rename that",
+        ),
+    ],
+)
+def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = METRIC_FILE.replace("height/highest", "energy/total")
+    (tmp_path / "twice.py").write_text(text)
+    (tmp_path / "bare.py").write_text(text.replace("energy/total", "mine/x").replace('unit="m"', 'unit=""'))
+    (tmp_path / "taken.py").write_text(SCENE_FILE.replace('"lift", d', '"membrane/uniaxial", d'))
+    worn = SCENE_FILE.replace('"lift", d', '"worn", garment="toga", motion="kick", d')
+    (tmp_path / "worn.py").write_text(worn)
+    (tmp_path / "random.py").write_text("METHODS = ()\n")
+    for module, name in (("one", "packed"), ("two", "packed"), ("other", "snug")):
+        installed(tmp_path / "site", module, name=name)
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    with monkeypatch.context() as patch:
+        case = dataclasses.replace(selection.MEASURED[0], name="membrane/uniaxial")
+        patch.setattr("benchmarks.plan.selection.MEASURED", (case,))
+        assert run.main(["--scenes", "free_fall", option, word, "-o", "out"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and words in error
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ('metrics=("energies",)', "scene 'lift': metrics=('energies',): choose from energy, "),
+        ('metrics="energy"', "scene 'lift': metrics='energy': give a tuple of strings"),
+        ('start_of="free_fal"', "scene 'lift': start_of='free_fal': name another scene"),
+        ('start_of="lift"', "scene 'lift': start_of='lift': name another scene"),
+        ('garment="tshirt", motion="wlak"', "no motion is called 'wlak'; did you mean walk?"),
+    ],
+)
+def test_what_a_scene_names_and_nobody_knows_is_one_line(said, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "named.py").write_text(SCENE_FILE.replace('sizes=("sheet_frames",)', said))
+    assert run.main(["--scenes", "named.py", "-o", "out"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and words in error and not (tmp_path / "out").exists()
+
+
+def test_a_scene_whose_file_has_changed_is_done_again(files):
+    said = SCENE_FILE.replace('sizes=("sheet_frames",)', 'sizes=("sheet_frames",), files=("a.txt",)')
+    (files / "lifted.py").write_text(said)
+    (scene,) = outside.entries_of(outside.SCENES, str(files / "lifted.py"))
+    before = digest(declared(scene))
+    (files / "a.txt").write_text("another cloth")
+    assert digest(declared(scene)) != before
+
+
+def test_two_files_of_one_name_are_refused(tmp_path):
+    for folder, name in (("one", "a"), ("other", "b")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / f"method_{name}.py").write_text(
+            METHOD.format(helper="shared", name=name, label=name)
+        )
+        (tmp_path / folder / "shared.py").write_text(HELPER.format(shift=0.0))
+        (tmp_path / folder / "a.txt").write_text("")
+    outside.entries_of(outside.METHODS, str(tmp_path / "one" / "method_a.py"))
+    with pytest.raises(DeclarationError, match=r"other/shared\.py: Python knows shared as .*one/shared\.py"):
+        outside.entries_of(outside.METHODS, str(tmp_path / "other" / "method_b.py"))
+
+
+# --- source, energies and trainings ------------------------------------------------------------------------
+
+
+def test_modules_beside_a_file_and_in_its_package_count_and_those_installed_do_not(tmp_path):
+    package = tmp_path / "cloth_package"
+    (package / "deep").mkdir(parents=True)
+    more = "from cloth_package.deep.more import g\ndef f(): pass\n"
+    for name, text in {
+        "__init__.py": "", "deep/__init__.py": "", "unused.py": "", "helper.py": more,
+        "deep/methods.py": "import numpy\nfrom ..helper import f\n", "deep/more.py": "def g(): pass\n",
+    }.items():  # fmt: skip
+        (package / name).write_text(text)
+    code = code_of(str(package / "deep" / "methods.py"))
+    assert {Path(path).relative_to(tmp_path).as_posix() for path in code} == {
+        "cloth_package/deep/methods.py", "cloth_package/helper.py", "cloth_package/deep/more.py",
+    }  # fmt: skip
+
+
+def test_an_energy_of_a_file_can_be_trained_on_once_it_is_loaded(tmp_path):
+    with pytest.raises(RecipeError, match=r"unknown energy 'levity'.*import the file of your own"):
+        dataclasses.replace(DEFAULT, terms=("levity",))
+    (tmp_path / "levity.py").write_text(SCENE_FILE + "class Levity(Lift):\n    name = 'levity'\n")
+    outside.imported(str(tmp_path / "levity.py"))
+    assert dataclasses.replace(DEFAULT, terms=("strain", "levity")).terms[1] == "levity"
+
+
+def test_a_method_brings_the_training_of_its_network(tmp_path):
+    home = str(tmp_path / "windy.py")
+    Path(home).write_text("")
+    recipe = dataclasses.replace(DEFAULT, name="windy", window=4)
+    entry = MethodEntry(
+        name="windy", description="", module="benchmarks.methods.networks.network", declared_in=home, needs_body=True,
+        trained="windy", training=Training("snug", recipe), options={"kind": "windy"},
+    )  # fmt: skip
+    cell = Cell(of_garment("tshirt").scene("kick").at(TINY), entry, 0, ("garments",))
+    plan = Plan(
+        preset=TINY, suites=("garments",), cells=(cell,), cases=(), seeds=(0,), device="cpu", folder=tmp_path,
+        command="", motions=Motions(("walk",), ("kick",)),
+    )  # fmt: skip
+    (task,) = (task for task in Schedule(plan).tasks() if task.kind == "network")
+    assert (task.chosen, task.home, task.steps) == (Training("snug", recipe), home, TINY.steps["snug"])
+    assert home in task.modules and home in Schedule(plan).cell(cell).modules
+    other = dataclasses.replace(entry, name="b", training=Training("snug", DEFAULT))
+    for wrong in ([entry, other], [dataclasses.replace(entry, trained="snug")]):
+        with pytest.raises(DeclarationError, match="another training is called"):
+            outside._check_networks(wrong)
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        ("1 / 0", r"split\.py: ZeroDivisionError: division by zero"),
+        ("None", r"split\.py: TypeError: height/highest is None: give a number or an Estimate"),
+        ("[1.0, 2.0]", r"split\.py: TypeError: height/highest is \[1.0, 2.0\]: give a number"),
+    ],
+)
+def test_a_metric_that_gives_no_number_is_named_with_its_file(number, words, tmp_path):
+    home = tmp_path / "split.py"
+    home.write_text(METRIC_FILE.replace("float(", f"{number} if True else float("))
+    scene = SCENE["free_fall"].at(TINY).build()
+    trajectory = Trajectory(scene.exact, scene.cloth.faces, np.arange(scene.frames) * scene.dt)
+    group = metric.SceneRollOuts(scene)
+    group.roll_outs.append(metric.RollOut(group, METHODS[0], trajectory, suites=("speed",)))
+    with pytest.raises(RuntimeError, match=words):
+        measured(group.roll_outs[0], (), (str(home),))
+
+
+# --- programs ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("body", "seconds", "words"),
+    [
+        ("print('one', file=sys.stderr); sys.exit('no licence')", 9, "ended with status 1: no licence"),
+        ("import time; print('loading', flush=True); time.sleep(9)", 0.5, "was ended after 0.5 s: loading"),
+        ("pass", 9, "has not written {out}"),
+        ("import numpy as n; n.savez(out, positions=n.zeros((6, 3, 3)))", 9, "has 3 vertices"),
+        ("import numpy as n; n.savez(out, vertices=n.zeros((6, 3, 3)))", 9, "holds no positions"),
+        ("import numpy as n; x = n.load(scene + '/cloth.npz')['start_positions']\n"
+         "n.savez(out, positions=n.stack(6 * [x]), seconds_per_frame=-1.0)", 9, "no positive number"),
+    ],
+)  # fmt: skip
+def test_a_program_that_goes_wrong_says_so_in_its_last_line(body, seconds, words, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(f"import sys\n_, scene, out = sys.argv\n{body}\n")
+    entry = program("p", f"{sys.executable} -I {script} {{scene}} {{out}}", seconds=seconds)
+    method = entry.make(models=tmp_path, seed=0)
+    method.prepare(SCENE["free_fall"].at(TINY).build())
+    with pytest.raises(Exception) as raised:
+        method.run()
+    assert words in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_a_command_without_its_places_is_refused(tmp_path):
+    with pytest.raises(DeclarationError, match=r"has no \{out\}"):
+        program("p", "run.sh {scene}")
+    method = program("p", "nowhere/run.sh {scene} {out}").make(models=tmp_path, seed=0)
+    method.prepare(SCENE["free_fall"].at(TINY).build())
+    with pytest.raises(RuntimeError, match="cannot be started"):
+        method.run()

@@ -1,0 +1,124 @@
+"""The tasks of a plan, and what makes two of them different."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks import provenance
+from benchmarks.methods import find_method
+from benchmarks.plan.make_plan import choose_garment
+from benchmarks.plan.options import make_parser
+from benchmarks.plan.plan import Motions, Network, OwnGarment
+from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.tasks.metric_task import _training_poses
+from benchmarks.tasks.task import Context, Task
+from snug.garments.options import GarmentFile
+from snug.motion.library import make_motion
+from snug.recipes.named import TRAININGS, Simulated, Training
+from snug.recipes.recipe import DEFAULT, TERMS
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene
+from tests.benchmarks.tasks.test_cell_tasks import plan_of
+
+MOTIONS = Motions(train=("walk",), test=("kick",))
+
+
+def network(plan, name: str = "snug") -> Task:
+    return Schedule(plan).network(Network(name, 0, "tshirt"))
+
+
+def test_the_key_of_a_training_is_that_of_all_it_depends_on(tmp_path, monkeypatch):
+    plan = plan_of(tmp_path, motions=MOTIONS)
+    before = network(plan).key
+    assert before and network(plan).key == before
+    monkeypatch.setattr("benchmarks.runner.source._version", lambda package: "another")
+    assert network(plan).key != before
+
+
+def test_an_energy_that_a_recipe_names_is_part_of_the_training(tmp_path, monkeypatch):
+    terms = (*TERMS, "spring")
+    monkeypatch.setitem(TRAININGS, "mine", Training("snug", dataclasses.replace(DEFAULT, terms=terms)))
+    plan = plan_of(tmp_path, motions=MOTIONS)
+    assert "reference_sim.energies.stretch_spring" in network(plan, "mine").modules
+    assert not any(module.startswith("reference_sim") for module in network(plan).modules)
+
+
+def test_a_networks_cell_is_measured_beside_the_poses_that_it_trained_on_mixed_ones_too(
+    tmp_path, monkeypatch
+):
+    scene = dressed_scene("kick")
+    names = ("simulation", "untrained", "snug", "supervised")
+    cells = tuple(Cell(scene, find_method(name), 0, ("garments",)) for name in names)
+    schedule = Schedule(plan_of(tmp_path, motions=MOTIONS, cells=cells))
+    trainings = {cell.method: schedule.metrics(cell).training for cell in cells}
+    walk = make_motion("walk").cut(0, 30)
+    shirt = SimpleNamespace(rest_positions=np.zeros((300, 3)))
+    assets = SimpleNamespace(named=lambda names: [walk] * len(names), garments={"tshirt": shirt})
+    context = Context(RunFolder(tmp_path), assets)
+    assert trainings["simulation"] is None and _training_poses(trainings["untrained"], context) is None
+    given = _training_poses(trainings["supervised"], context)
+    mixed = _training_poses(trainings["snug"], context)
+    assert np.array_equal(given, walk.poses) and np.array_equal(mixed[:30], walk.poses)
+    assert len(mixed) - 30 == pytest.approx(DEFAULT.mixed * 30, abs=30)
+    # What simulated vertices teach draws no mixed clips, whatever its recipe says.
+    monkeypatch.setitem(TRAININGS, "mine", Training("supervised", DEFAULT, Simulated()))
+    assert np.array_equal(_training_poses(network(schedule.plan, "mine"), context), walk.poses)
+    narrow = dataclasses.replace(cells[2], scene=dataclasses.replace(scene, metrics=("energy",)))
+    assert schedule.metrics(narrow).training is None
+
+
+def test_a_cell_that_begins_removes_nothing_that_another_task_of_its_scene_has_made(tmp_path):
+    scene, folder = dressed_scene("kick"), RunFolder(tmp_path)
+    cells = tuple(Cell(scene, find_method(name), 0, ("garments",)) for name in ("simulation", "snug"))
+    schedule = Schedule(plan_of(tmp_path, motions=MOTIONS, cells=cells))
+    paths = (folder.start_path, folder.body_path, folder.rest_areas_path, folder.quasi_static_path)
+    made = [path(scene.name) for path in paths]
+    for path in made:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    for cell in cells:
+        schedule.cell(cell).clear(folder)
+        schedule.metrics(cell).clear(folder)
+    assert all(path.exists() for path in made)
+
+
+def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path):
+    mesh = tmp_path / "cape.obj"
+    with pytest.raises(ValueError, match=r"cape\.obj"):
+        choose_garment(make_parser().parse_args(["--garment", str(mesh)]))
+    seen = []
+    for text in ("v 0 0 0", "v 0 0 1"):
+        mesh.write_text(text)
+        garment = OwnGarment(GarmentFile(path=mesh), (digest_of_file(mesh),))
+        motions = dataclasses.replace(MOTIONS, worn=(garment.scenes,))
+        plan = dataclasses.replace(plan_of(tmp_path, motions=motions), garment=garment)
+        seen.append(dict(Schedule(plan).data("walk", "cape", find_method("simulation")).inputs))
+    assert seen[0] != seen[1] and seen[0].keys() == seen[1].keys()
+
+
+def test_only_what_trains_depends_on_the_accelerator(tmp_path, monkeypatch):
+    facts = {"processor": "a processor", "cores": 2, "python": "3", "accelerator": "a GPU"}
+    hardware = {"cpu": facts | {"accelerator": None}, "cuda": facts}
+    monkeypatch.setattr(provenance, "hardware", lambda device: hardware[device])
+    cell = Cell(dressed_scene("kick"), find_method("snug"), 0, ("garments",))
+    plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
+    there = dataclasses.replace(plan, device="cuda")
+    own, other = ({task.id: task.inputs for task in tasks_of(p)} for p in (plan, there))
+    assert own.keys() == other.keys()
+    assert {id[0] for id in own if own[id] != other[id]} == {"network", "windows"}
+
+
+def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(tmp_path):
+    cell = Cell(dressed_scene("kick"), find_method("simulation"), 0, ("garments",))
+    plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
+    some = dataclasses.replace(cell.scene, metrics=("energy", "cost", "dynamics"))
+    fewer = dataclasses.replace(cell, scene=some)
+    own, other = (
+        {t.kind: t.inputs for t in tasks_of(dataclasses.replace(plan, cells=(c,)))} for c in (cell, fewer)
+    )
+    assert {kind for kind in own if own[kind] != other[kind]} == {"metrics"}

@@ -1,0 +1,221 @@
+"""What a request becomes: cells and cases, and motions divided into training and test."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.plan import selection
+from benchmarks.plan.motion_roles import choose_motions
+from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.selection import Request, choose
+from benchmarks.plan.suites import FEW_MOTIONS
+from benchmarks.presets import find_preset
+from benchmarks.validation.stress.cases import MAPS
+
+SMOKE = find_preset("smoke")
+
+
+def chosen(suites, *, full=False, scenes=(), methods=(), seeds=(0,), test=("kick", "punch")):
+    cells, cases, _ = choose(
+        Request(
+            suites=tuple(suites), full=full, preset=find_preset("quick"), scenes=tuple(scenes),
+            motions=Motions(("walk",), test, {}), methods=tuple(methods), seeds=seeds,
+        )
+    )  # fmt: skip
+    return cells, cases
+
+
+def test_a_cell_in_two_suites_is_run_once():
+    found, _ = chosen(("garments", "speed"))
+    keys = [(cell.scene.name, cell.method, cell.seed) for cell in found]
+    assert len(set(keys)) == len(keys)
+    # Whole motions and their clips are scenes of their own: a suite that times every solver takes the clips.
+    assert {cell.suites for cell in found if cell.scene.part == "clip"} == {("speed",)}
+    assert {cell.suites for cell in found if cell.scene.name == "tshirt/kick"} == {("garments",)}
+
+
+def test_a_method_that_a_suite_lists_twice_is_of_it_once():
+    found, _ = chosen(("garments",), methods=("simulation", "simulation-perturbed-*", "simulation-refrozen"))
+    assert len(found) > 4 and all(cell.suites == ("garments",) for cell in found)
+
+
+def test_the_reference_comes_first_in_every_scene():
+    found, _ = chosen(("garments", "speed"), full=True)
+    first = {}
+    for cell in found:
+        if not cell.scene.networks_only:
+            first.setdefault(cell.scene.name, cell.method)
+    assert set(first.values()) == {"simulation"} and len(first) == 8
+
+
+def test_only_what_has_a_seed_is_repeated_and_the_rest_is_the_same_whatever_the_seeds():
+    found, _ = chosen(("garments",), seeds=(3, 5))
+    seeds = {}
+    for cell in found:
+        seeds.setdefault(cell.method, set()).add(cell.seed)
+    assert seeds["snug"] == seeds["untrained"] == {3, 5} and seeds["simulation"] == seeds["skinning"] == {0}
+
+
+def test_patterns_choose_scenes_methods_and_cases():
+    found, cases = chosen(("speed", "validation", "extremes"), scenes=["*sheet*", "free_fall"])
+    assert {cell.scene.name for cell in found} == {"hanging_sheet", "sheet_on_sphere", "free_fall"}
+    known = [case.name for case in cases if case.suite == "validation"]
+    assert known == ["free_fall", "hanging_sheet_time_step_order"]
+    assert tuple(case for case in cases if case.suite == "extremes") == MAPS["map_sheet"]
+    _, cases = chosen(("validation", "extremes"), methods=["sim*"])
+    assert sum(case.suite == "validation" for case in cases) >= 10
+    assert sum(case.suite == "extremes" for case in cases) >= 8
+
+
+def test_a_pattern_of_another_garment_means_its_motions_of_the_split():
+    def names(pattern, split="test", suites=("garments",)):
+        of = choose_motions([], [], find_preset("quick"), split=split)
+        found = choose(Request(suites=suites, preset=find_preset("quick"), motions=of, scenes=(pattern,)))[0]
+        return of, {cell.scene.name for cell in found}
+
+    for split in ("test", "validation"):
+        of, found = names("trousers/*", split)
+        assert found == {f"trousers/{motion}" for motion in of.measured} and len(found) >= 4
+    of, found = names("skirt/*")
+    assert found == {f"skirt/{motion}" for motion in of.dynamic_measured}
+    of, found = names("shorts/*@clip", suites=("speed",))
+    assert found == {f"shorts/{motion}@clip" for motion in of.measured}
+
+
+def test_a_name_means_itself_whatever_is_in_it():
+    found, _ = chosen(("garments",), scenes=["tshirt/w[1]"], test=("w[1]", "w2"))
+    assert {cell.scene.name for cell in found} == {"tshirt/w[1]"}
+
+
+def test_what_is_left_out_of_a_default_run_is_there_where_its_suite_or_itself_is_named():
+    both = ("speed", "extremes")
+    slow = {"newton-2", "lbfgs-40", "gradient-descent-10", "simulation-dt/8"}
+    for words, there in (({}, False), ({"full": True}, True), ({"methods": ("*",)}, True)):
+        found, cases = chosen(both, **words)
+        assert (slow & {cell.method for cell in found}) == (slow if there else set())
+        assert bool({*MAPS["map_shirt"]} & {*cases}) == ("full" in words)
+        assert {*MAPS["map_sheet"]} <= {*cases}
+    assert {cell.method for cell in chosen(both, methods=("lbfgs-40",))[0]} == {"lbfgs-40"}
+    assert chosen(("extremes",), scenes=("map_shirt/1/1",))[1]
+
+
+def dynamic(suites, **changes):
+    motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
+    words = {name: tuple(value) for name, value in changes.items()}
+    return choose(Request(suites=tuple(suites), preset=find_preset("quick"), motions=motions, **words))[0]
+
+
+def test_the_quick_subset_has_some_motions_and_all_where_the_suite_or_they_are_named():
+    def motions(full=False, preset="quick", **choice):
+        of = choose_motions([], choice.get("tests", []), find_preset(preset), **choice.get("split", {}))
+        request = Request(suites=("garments",), full=full, preset=find_preset(preset), motions=of)
+        return {cell.scene.motion for cell in choose(request)[0] if cell.scene.part == "whole"}
+
+    everything = set(choose_motions([], [], find_preset("quick")).test)
+    assert len(everything) == 5 and motions(full=True) == motions(preset="paper") >= everything
+    assert motions() < everything and len(motions()) == FEW_MOTIONS
+    named = ["kick", "punch", "walk", "bow"]
+    assert motions(tests=named) == set(named)
+    assert motions(split={"validation_names": named, "split": "validation"}) == set(named)
+    assert len(motions(tests=["walk"], split={"split": "validation"})) == FEW_MOTIONS
+
+
+def test_networks_of_a_second_garment_are_left_out_with_a_reason_until_its_scenes_are_named():
+    motions = Motions(("walk",), ("kick",), {}, dynamic_test=("twist_stop",))
+    request = Request(suites=("speed",), full=True, preset=find_preset("quick"), motions=motions)
+    skirt = {
+        cell.method: cell.entry.skip(cell.scene) for cell in choose(request)[0] if "skirt" in cell.scene.name
+    }
+    assert "second garment" in skirt["snug"] and "second garment" in skirt["pbns"] and not skirt["newton-4"]
+    named = choose(replace(request, scenes=("skirt/twist_stop@clip",)))[0]
+    assert {cell.entry.skip(cell.scene) for cell in named if cell.method == "snug"} == {None}
+
+
+def test_what_no_suite_lists_is_met_by_its_whole_name():
+    both = ("garments", "speed")
+    plain = {(cell.scene.name, cell.suites) for cell in dynamic(both, scenes=["tunic/*"])}
+    assert plain == {("tunic/twist_stop", ("garments",))}
+    clip, whole = "tunic/twist_stop@clip", "tshirt/twist_stop"
+    met = {(cell.scene.name, cell.suites) for cell in dynamic(both, scenes=[clip, whole])}
+    assert met == {(clip, ("speed",)), (whole, ("garments",))}
+    assert not {clip, whole} & {cell.scene.name for cell in dynamic(both)}
+
+
+def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
+    from benchmarks import methods, scenes
+    from benchmarks.method import MethodEntry
+    from benchmarks.scene import Scene
+
+    mine = Scene(name="my_scene", description="", module="my_scene")
+    monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, mine))
+    entries = (*methods.METHODS, MethodEntry(name="my-method", description="", module="my_method"))
+    for module in (methods, selection):
+        monkeypatch.setattr(module, "METHODS", entries)
+    found = dynamic(("garments", "speed"), scenes=["my_scene"], methods=["simulation", "my-method"])
+    assert [(c.scene, c.method, c.suites) for c in found] == [
+        (mine, "simulation", ("speed",)),
+        (mine, "my-method", ("speed",)),
+    ]
+    worn = dynamic(("garments", "speed"), scenes=["tshirt/kick"], methods=["my-method"])
+    assert [(c.scene.name, c.suites) for c in worn] == [("tshirt/kick", ("garments",))]
+    for choice in ({}, {"scenes": ["*"]}, {"methods": ["*"]}):
+        assert not {"my_scene", "my-method"} & {
+            name for c in dynamic(("speed",), **choice) for name in (c.scene.name, c.method)
+        }
+
+
+def test_motions_are_divided_as_help_says(tmp_path):
+    from snug.motion.library import TEST, TRAIN, VALIDATION
+
+    quick = find_preset("quick")
+    library = choose_motions([], [], quick)
+    assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION, TEST)
+    assert library.files == {} and library.measured == TEST
+    moved = choose_motions([], ["walk", "kick"], quick)
+    assert moved.test == ("walk", "kick") and "kick" not in moved.validation
+    assert not {"walk", *VALIDATION, *TEST} & set(moved.train)
+    other = choose_motions([], [], quick, validation_names=["bow"], split="validation")
+    assert (other.validation, other.test, other.measured) == (("bow",), TEST, ("bow",))
+    assert not {"bow", *VALIDATION, *TEST} & set(other.train)
+    small = choose_motions([], [], SMOKE)
+    assert (len(small.train), len(small.test)) == (SMOKE.train_motions, SMOKE.test_motions)
+
+    clips = clips_folder(tmp_path, "b", "a", "c")
+    files = choose_motions([clips], [], quick)
+    assert (files.train, files.test, sorted(files.files)) == (("b", "c"), ("a",), ["a", "b", "c"])
+    named = choose_motions([], ["kick", "punch", "walk"], SMOKE)  # all those named, whatever the preset
+    assert set(named.test) == {"kick", "punch", "walk"} and len(named.train) == SMOKE.train_motions
+    chosen = choose_motions([clips], ["c", "b"], quick)
+    assert (chosen.train, chosen.test) == (("a",), ("b", "c"))
+    both = choose_motions(["library", clips], [], quick)
+    assert both.train == ("a", "b", "c", *TRAIN) and both.test == TEST
+    single = choose_motions([str(Path(clips) / "a.npz")], [], quick)
+    assert (single.train, single.test) == (TRAIN, ("a",))
+    roles = choose_motions([clips], ["b"], quick, validation_names=["a", "c"])  # none is left to train on
+    assert (roles.train, roles.validation, roles.test) == (TRAIN, ("a", "c"), ("b",))
+    assert [roles.role_of(name) for name in ("a", "b", "walk", "kick")] == [
+        "validation", "test", "training", "",
+    ]  # fmt: skip
+    for words, said in (
+        ({"test_names": ["a"], "validation_names": ["a"]}, "'a' is a test motion"),
+        ({"test_names": [], "validation_names": ["d"]}, "--validation-motions: unknown motion 'd'"),
+        ({"test_names": ["a"], "split": "validation"}, "name some by --validation-motions"),
+    ):
+        with pytest.raises(PlanError, match=said):
+            choose_motions([clips], preset=quick, **words)
+    (tmp_path / "short").mkdir()
+    with pytest.raises(PlanError, match="2 frames; at least 3 are needed"):
+        choose_motions([clips_folder(tmp_path / "short", "d", frames=2) + "/d.npz"], [], quick)
+    with pytest.raises(PlanError, match="taken"):
+        choose_motions([clips, clips], [], quick)
+
+
+def clips_folder(folder: Path, *names: str, frames: int = 12) -> str:
+    for name in names:
+        poses = np.zeros((frames, 52 * 3))
+        np.savez(folder / f"{name}.npz", poses=poses, trans=np.zeros((frames, 3)), mocap_framerate=30.0)
+    return str(folder)

@@ -1,0 +1,169 @@
+"""A scheduler and workers of dask.distributed on this machine, and tasks for them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import DEFAULT_ONLY, Cache
+from benchmarks.runner.cluster import ClusterExecutor
+from benchmarks.runner.local_executor import Executor, LocalExecutor
+from benchmarks.runner.loop import Runner
+from benchmarks.tasks.task import Outcome, Task
+
+ROOT = Path(__file__).resolve().parents[3]
+PATH = str(ROOT)
+
+
+class Cluster:
+    """Processes of a scheduler and its workers. Each leads a session of its own."""
+
+    def __init__(self, folder: Path, *, port: int = 0) -> None:
+        self.folder = folder
+        self.workers: list[subprocess.Popen] = []
+        self.start_scheduler(port)
+
+    def start_scheduler(self, port: int) -> None:
+        file = self.folder / "scheduler.json"
+        file.unlink(missing_ok=True)
+        self.scheduler = self._start("scheduler", "--port", str(port), "--scheduler-file", str(file))
+        deadline = time.monotonic() + 60
+        while not (file.is_file() and file.read_text().endswith("}")):
+            assert self.scheduler.poll() is None and time.monotonic() < deadline
+            time.sleep(0.05)
+        self.address = json.loads(file.read_text())["address"]
+
+    def restart_scheduler(self) -> None:
+        """Kill it and start another at its address; the workers end by themselves."""
+        self.scheduler.kill()
+        self.scheduler.wait()
+        for worker in self.workers:
+            worker.wait(30)
+        self.start_scheduler(int(self.address.rpartition(":")[2]))
+
+    def add(self, *words: str, **environment: str) -> subprocess.Popen:
+        """Start a worker of one thread."""
+        words = (self.address, "--nthreads", "1", "--local-directory", str(self.folder), *words)
+        self.workers.append(self._start("worker", *(words if "--nanny" in words else (*words, "--no-nanny")),
+                                        **environment))  # fmt: skip
+        return self.workers[-1]
+
+    def _start(self, what: str, *words: str, **environment: str) -> subprocess.Popen:
+        with (self.folder / f"{what}.log").open("ab") as log:
+            return subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.dask_{what}", *words, "--no-dashboard"],
+                env=os.environ | {"PYTHONPATH": PATH} | environment, cwd=self.folder,
+                stdout=subprocess.DEVNULL, stderr=log, start_new_session=True,
+            )  # fmt: skip
+
+    def close(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait()
+
+
+@contextmanager
+def cluster(folder: Path, workers: int) -> Iterator[Cluster]:
+    """So many workers of one thread."""
+    started = Cluster(folder)
+    try:
+        for _ in range(workers):
+            started.add()
+        yield started
+    finally:
+        started.close()
+
+
+def worker() -> int:
+    """Who has asked for this process: not its parent, which is the server that forked it."""
+    asking = multiprocessing.parent_process()
+    assert asking is not None and asking.pid is not None
+    return asking.pid
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Write(Task):
+    """A file of so many random numbers, plus those of what it needs; `how` says what it does besides."""
+
+    kind = "numbers"
+    stage = "writing"
+    silent = True
+    count: int = 1000
+    seed: int = 0
+    how: str = ""
+    mark: str = ""  # a file that says that it is at it
+    seconds: float = 0.0
+
+    def run(self, context, needed):
+        if self.mark:
+            with open(self.mark, "a") as file:
+                file.write(f"{worker()} {os.getpid()}\n")
+        if self.how == "raise":
+            raise ValueError("broken on purpose")
+        if self.how == "die":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.how == "die with the worker":
+            os.kill(worker(), signal.SIGKILL)
+            time.sleep(60)
+        time.sleep(self.seconds)
+        numbers = np.random.default_rng(self.seed).random(self.count)
+        for outcome in needed.values():
+            numbers += np.load(context.folder.path / outcome.files[0])[: self.count]
+        path = context.folder.path / "numbers" / f"{self.name}.npy"
+        path.parent.mkdir(exist_ok=True)
+        np.save(path, numbers)
+        context.tell(self.units)
+        context.memo.setdefault("done", []).append(self.name)
+        return Outcome(result={"memo": list(context.memo["done"])}, files=(context.folder.relative(path),))
+
+
+def write(name: str, **fields) -> Write:
+    return Write(name=name, label=name, inputs={}, modules=("benchmarks.results.run_folder",), **fields)
+
+
+def chain(**fields) -> list[Write]:
+    """Twelve tasks in three rounds, the later ones made from the earlier ones, the last two one batch."""
+
+    def number(n: int, *needs: int, **more) -> Write:
+        ids = tuple(("numbers", str(need)) for need in needs)
+        return write(str(n), seed=n, needs=ids, **fields | more)
+
+    first = [number(n) for n in range(6)]
+    return [
+        *first,
+        *(number(n, n - 6, 0) for n in range(6, 10)),
+        *(number(n, 6, batch="b") for n in (10, 11)),
+    ]
+
+
+class NoLog:
+    def stage(self, name):
+        return nullcontext()
+
+
+def finish(folder: Path, executor: Executor, **fields) -> Runner:
+    """The chain, run or reused; what has failed is tried again."""
+    RunFolder(folder).remove_parts()
+    cache = Cache(RunFolder(folder), only=(*DEFAULT_ONLY, "failed"), origin={"commit": "c", "hardware": "h"})
+    runner = Runner(chain(**fields), cache)
+    runner.run(executor, NoLog())
+    return runner
+
+
+def main(folder: str, address: str, seconds: str, mark: str) -> None:
+    """The chain on a cluster, or without an address on two processes here."""
+    run = RunFolder(folder)
+    executor = ClusterExecutor(run, None, 1, address) if address else LocalExecutor(run, None, 2)
+    finish(Path(folder), executor, seconds=float(seconds), mark=mark)

@@ -1,0 +1,79 @@
+"""Tasks and scenes as a test wants them, without a plan."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+
+from benchmarks.assets.assets import Assets
+from benchmarks.presets import Preset, find_preset
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.scene import BuiltScene
+from benchmarks.scenes import SCENES, of_garment
+from benchmarks.tasks.task import Context
+from benchmarks.tasks.training import TrainNetwork
+from snug.recipes.named import TRAININGS
+
+
+def small_scene(name: str, *, cells: int = 6, frames: int = 10) -> BuiltScene:
+    """A scene of a small sheet."""
+    scene = next(scene for scene in SCENES if scene.name == name)
+    sizes = {"sheet_cells": cells, "sheet_frames": frames}
+    return dataclasses.replace(scene, sizes=(), options=sizes).build()
+
+
+def dressed_scene(motion: str, garment: str = "tshirt", *, part: str = "whole", preset: Preset | None = None):
+    """The declaration of a body in a garment."""
+    return of_garment(garment).scene(motion, part).at(preset or find_preset("smoke"))
+
+
+def assets_of(dressed, motion) -> Assets:
+    """A dressed body as the T-shirt of a run, and one motion."""
+    return Assets(dressed.body, {"tshirt": dressed.garment}, {motion.name: motion}, {})
+
+
+def training(name: str, *motions: str, steps: int, key: str = "0", device: str = "cpu") -> TrainNetwork:
+    """The task that trains a network of the T-shirt."""
+    return TrainNetwork(
+        name=name, label=name, inputs={}, modules=(), training=name, seed=0, garment="tshirt", steps=steps,
+        chosen=TRAININGS.get(name), motions=motions, device=device, key=key,
+        simulated={m: ("data", m) for m in motions if name in TRAININGS and TRAININGS[name].simulated},
+    )  # fmt: skip
+
+
+def context(folder, assets: Assets | None = None, **fields) -> Context:
+    """Of a process in which a task runs."""
+    return Context(RunFolder(folder), assets, **fields)
+
+
+class InProcess:
+    """An executor that does everything here: the seam behind which a cluster could stand."""
+
+    def __init__(self, folder: RunFolder, assets: Assets | None = None) -> None:
+        self.folder, self.assets = folder, assets
+        self._named: dict[str, Context] = {}
+
+    def context(self) -> Context:
+        return Context(self.folder, self.assets)
+
+    def together(self, ready, bar):
+        while batch := ready():
+            tasks, needed = batch
+            context = self.context()
+            for task in tasks:
+                clock = time.perf_counter()
+                outcome = task.run(context, needed)
+                yield task, dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
+
+    def begin(self, tasks):
+        for task, _ in tasks:
+            task.begin(self._named.setdefault(task.process, self.context()))
+
+    def alone(self, task, needed):
+        return task.run(self._named.setdefault(task.process, self.context()), needed)
+
+    def release(self, process):
+        self._named.pop(process, None)
+
+    def close(self):
+        self._named.clear()

@@ -1,0 +1,404 @@
+"""A cluster gives what this machine gives, whatever of it dies; and what cannot work is said in one line."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import nullcontext, suppress
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+pytest.importorskip("distributed")
+
+from benchmarks import run
+from benchmarks.plan.make_plan import choose_scheduler
+from benchmarks.plan.plan import PlanError
+from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.runner import cluster as runner_side
+from benchmarks.runner import cluster_worker
+from benchmarks.runner import whole_run as execution
+from benchmarks.runner.cluster import ClusterExecutor
+from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.source import digest
+from benchmarks.tasks.task import Outcome, RunStopped
+from snug.networks.tensor_file import read_tensors
+from tests.benchmarks.runner.cluster_by_hand import PATH, Cluster, cluster, finish, write
+
+KILLS = int(os.environ.get("KILLS", "20"))  # of the processes here, and as many of the cluster
+
+
+class Bar:
+    total, n = 100, 0
+
+    def update(self, units=1):
+        self.n += units
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    """A scheduler and two workers, for all tests that kill neither."""
+    with cluster(tmp_path_factory.mktemp("cluster"), 2) as started:
+        yield started
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "run").mkdir()
+    return RunFolder(tmp_path / "run")
+
+
+def together(folder: RunFolder, address: str, *batches, needed=None) -> dict[str, Outcome]:
+    executor = ClusterExecutor(folder, None, 1, address)
+    left = [(batch, needed or {}) for batch in reversed(batches)]
+    try:
+        found = executor.together(lambda: left.pop() if left else None, Bar())
+        return {task.name: outcome for task, outcome in found}
+    finally:
+        executor.close()
+
+
+def files(folder: Path) -> dict[str, str]:
+    """Name -> digest, of what is whole and of what is not."""
+    return {path.name: digest_of_file(path) for path in sorted(folder.rglob("*.npy"))}
+
+
+def until(true, seconds: float = 60.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def lines(mark: Path) -> list[list[int]]:
+    """Process ids of worker and task, of each beginning of a task that has this mark."""
+    return (
+        [[int(word) for word in line.split()] for line in mark.read_text().splitlines()]
+        if mark.is_file()
+        else []
+    )
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+# --- what comes back ---------------------------------------------------------------------------------------
+
+
+def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path):
+    here = tmp_path / "here"
+    here.mkdir()
+    finish(here, LocalExecutor(RunFolder(here), None, 2))
+    there = finish(folder.path, ClusterExecutor(folder, None, 1, two.address))
+    assert len(files(here)) == 12 and files(folder.path) == files(here)
+    origins = [outcome.origin for outcome in there.outcomes.values()]
+    assert {o["commit"] for o in origins} == {"c"} and "h" not in {o["hardware"] for o in origins}
+    assert len(finish(folder.path, ClusterExecutor(folder, None, 1, two.address)).reused) == 12
+
+
+def test_failures_are_values_and_a_batch_stays_together(two, folder):
+    large = 2 * runner_side.PIECE // 8 + 5  # numbers: more than two pieces
+    batch = [write("one"), write("bad", how="raise"), write("large", count=large)]
+    others = [[write("dies", how="die")], *([write(name)] for name in "abc")]  # two of these in one process
+    found = together(folder, two.address, batch, *others)
+    assert found["large"].result["memo"] == ["one", "large"]
+    assert all(found[name].result["memo"] == [name] for name in "abc")
+    assert found["bad"].reason == "ValueError: broken on purpose"
+    assert found["dies"].status == "out-of-memory" and "SIGKILL" in found["dies"].reason
+    expected = np.random.default_rng(0).random(large)
+    np.testing.assert_array_equal(np.load(folder.path / "numbers" / "large.npy"), expected)
+    task = write("from large", needs=(("numbers", "large"),), count=large)
+    together(folder, two.address, [task], needed={("numbers", "large"): found["large"]})
+    np.testing.assert_array_equal(np.load(folder.path / "numbers" / "from large.npy"), 2.0 * expected)
+
+
+def test_a_file_goes_to_a_worker_once(two, folder, monkeypatch):
+    (first,) = together(folder, two.address, [write("first")]).values()
+    sent, send = [], ClusterExecutor._asked
+    monkeypatch.setattr(
+        ClusterExecutor, "_asked", lambda self, *words: (sent.append(words[:3]), send(self, *words))[1]
+    )
+    batches = [[write(f"{n}", needs=(("numbers", "first"),))] for n in range(4)]
+    together(folder, two.address, *batches, needed={("numbers", "first"): first})
+    put = [(worker.address, name) for worker, function, name in sent if function is cluster_worker.put_piece]
+    assert len(put) == len(set(put)) and {name for _, name in put} >= {"numbers/first.npy"}
+
+
+def test_a_worker_has_its_next_task_before_results_of_others_are_taken(two, folder, monkeypatch):
+    monkeypatch.setattr(runner_side, "POLL", 1.0)  # both have ended then
+    calls = []
+    for name in ("_take", "_hand"):
+        own = getattr(ClusterExecutor, name)
+        monkeypatch.setattr(
+            ClusterExecutor, name,
+            lambda self, *words, own=own, name=name: (calls.append(name), own(self, *words)),
+        )  # fmt: skip
+    together(folder, two.address, *([write(name)] for name in "abcd"))
+    assert calls == ["_hand", "_hand", *["_take", "_hand"] * 2, *["_take"] * 2]
+
+
+def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
+    monkeypatch.setattr(runner_side, "LOOK", 0.1)
+    told = []
+    monkeypatch.setattr(Bar, "update", lambda self, units=1: told.append(units))
+    together(folder, two.address, [write("one", units=7), write("two", units=5, seconds=1.0)])
+    assert 7 in told
+
+
+@pytest.mark.slow
+def test_a_run_on_clusters_of_one_and_two_is_that_of_this_machine(tmp_path, monkeypatch):
+    """Bit for bit, but for times: ground truth, a network, frames, metrics."""
+    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    words = ["--preset", "smoke", "--suite", "garments", "--split", "validation"]
+    words += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
+    assert run.main([*words, "-o", str(tmp_path / "0")]) == 0
+    for workers in (1, 2):
+        there = tmp_path / f"cluster{workers}"
+        there.mkdir()
+        with cluster(there, workers) as started:
+            words_there = [*words, "-o", str(tmp_path / str(workers)), "--scheduler", started.address]
+            assert run.main(words_there) == 0
+    kept = contents(tmp_path / "0")
+    assert {kind for kind, *_ in kept} >= {"start", "data", "network", "cell", "metrics", "quasi-static"}
+    assert contents(tmp_path / "1") == contents(tmp_path / "2") == kept
+
+
+def contents(folder: Path) -> dict[tuple[str, ...], str]:
+    """Task, and file or number -> digest, without times, of all that a run keeps."""
+    found = {}
+    for path in folder.glob("cache/**/*.json"):
+        entry = json.loads(path.read_text())
+        kind = path.relative_to(folder / "cache").parts[0]
+        if kind in ("batch", "repeat", "windows"):
+            continue  # times alone, or with them
+        if kind == "metrics":
+            found[kind, path.stem, "result"] = digest(entry["outcome"]["result"])
+        for name in entry["files"]:
+            for array, values in arrays(folder / name).items():
+                if not array.endswith("frame_seconds"):
+                    found[kind, name, array] = digest(np.asarray(values).tobytes())
+    return found
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    if path.suffix == ".safetensors":
+        return {name: tensor.numpy() for name, tensor in read_tensors(path)[0].items()}
+    if path.suffix != ".vtkhdf":
+        return dict(np.load(path)) if path.suffix == ".npz" else {"": np.load(path)}
+    found: dict[str, np.ndarray] = {}
+    with h5py.File(path) as file:
+        file.visititems(
+            lambda name, node: found.update({name: node[()]}) if isinstance(node, h5py.Dataset) else None
+        )
+    return found
+
+
+# --- what is refused ---------------------------------------------------------------------------------------
+
+
+def test_a_worker_with_other_software_is_left_out_in_one_line(two, folder, monkeypatch, capsys):
+    own = cluster_worker.software_of
+    other = {"package numpy": "numpy 1.0", "benchmarks/runner/local_executor.py": "0"}
+    monkeypatch.setattr(cluster_worker, "software_of", lambda task: own(task) | other)
+    with pytest.raises(RunStopped, match="can be used") as stopped:
+        together(folder, two.address, [write("one")])
+    assert "package numpy: numpy 2" in str(stopped.value) and "numpy 1.0 here" in str(stopped.value)
+    assert "benchmarks/runner/local_executor.py" in str(stopped.value) and list(folder.path.iterdir()) == []
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("left out: worker tcp:")]
+    assert len(said) == 2
+
+
+def test_what_comes_damaged_is_not_kept(two, folder, monkeypatch):
+    asked = ClusterExecutor._asked
+
+    def damaged(self, worker, function, *words):
+        answer = asked(self, worker, function, *words)
+        return answer[:-1] + b"!" if function is cluster_worker.get_piece and answer else answer
+
+    monkeypatch.setattr(ClusterExecutor, "_asked", damaged)
+    with pytest.raises(RunStopped, match=r"one\.npy came damaged"):
+        together(folder, two.address, [write("one")])
+    assert files(folder.path) == {}
+
+
+def test_what_was_damaged_here_is_not_sent(two, folder):
+    (first,) = together(folder, two.address, [write("first")]).values()
+    (folder.path / first.files[0]).write_bytes(b"damaged")
+    with pytest.raises(RunStopped, match=r"first\.npy is damaged since this run wrote it"):
+        together(folder, two.address, [write("second")], needed={("numbers", "first"): first})
+
+
+def test_a_scheduler_that_does_not_answer_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(runner_side, "FIRST", 0.3)
+    words = ["--scenes", "free_fall", "-o", str(tmp_path / "run"), "--scheduler"]
+    assert run.main([*words, "tcp://127.0.0.1:1"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "--scheduler tcp://127.0.0.1:1" in said and "dask scheduler" in said
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert run.main([*words, "tcp://127.0.0.1:1"]) == 2
+    assert "pip install" in capsys.readouterr().err and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(("option", "value"), [("device", "cuda"), ("rollout", ["mine=out.npz"])])
+def test_what_a_cluster_cannot_do_is_refused(option, value):
+    plain = {"scheduler": "tcp://127.0.0.1:1", "device": "cpu", "rollout": []}
+    with pytest.raises(PlanError, match=f"--{option}.*leave out --scheduler"):
+        choose_scheduler(argparse.Namespace(**plain | {option: value}))
+
+
+# --- what dies ---------------------------------------------------------------------------------------------
+
+
+def test_an_interrupt_ends_what_the_cluster_does_and_leaves_the_cluster(two, folder, tmp_path, request):
+    mark = tmp_path / "mark"
+
+    def interrupt():
+        until(lambda: len(lines(mark)) == 2)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        together(folder, two.address, *([write(f"{n}", seconds=60.0, mark=str(mark))] for n in range(4)))
+    until(lambda: not any(alive(task) for _, task in lines(mark)), 10.0)
+    assert len(lines(mark)) == 2 and not list(two.folder.rglob("run-*"))
+    assert together(folder, two.address, [write("after")])["after"].status == "ok"
+
+
+def test_what_a_killed_runner_had_begun_is_ended(two, folder, tmp_path):
+    mark = tmp_path / "mark"
+    runner = start_runner(folder.path, two.address, seconds=60.0, mark=mark)
+    until(lambda: len(lines(mark)) == 2)
+    runner.kill()
+    runner.wait()
+    until(lambda: not any(alive(task) for _, task in lines(mark)), 10.0)
+    assert together(folder, two.address, [write("after")])["after"].status == "ok"
+
+
+def start_runner(folder: Path, address: str, *, seconds: float, mark: Path) -> subprocess.Popen:
+    program = "import sys, cluster_by_hand; cluster_by_hand.main(*sys.argv[1:])"
+    return subprocess.Popen(
+        [sys.executable, "-c", program, str(folder), address, str(seconds), str(mark)],
+        env=os.environ | {"PYTHONPATH": PATH}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folder, tmp_path):
+    with cluster(tmp_path, 4) as four:
+        batch = [write("deadly", how="die with the worker"), write("after")]
+        found = together(folder, four.address, batch, [write("beside")])
+    assert found["deadly"].failed and found["deadly"].reason.startswith("3 workers died while they did it: ")
+    assert found["after"].status == found["beside"].status == "ok"
+
+
+@pytest.mark.slow
+def test_an_outcome_that_goes_with_its_worker_keeps_nobody_waiting(folder, tmp_path, monkeypatch):
+    killed: list[float] = []
+    take = ClusterExecutor._take
+
+    def taken(self, worker, lane):
+        if not killed:
+            one.workers[0].kill()
+            killed.append(time.monotonic())
+            one.add()
+            until(lambda: worker.address not in self._client.nthreads())
+        take(self, worker, lane)
+
+    monkeypatch.setattr(ClusterExecutor, "_take", taken)
+    with cluster(tmp_path, 1) as one:
+        assert together(folder, one.address, [write("one")])["one"].status == "ok"
+        assert time.monotonic() - killed[0] < 55.0
+
+
+@pytest.mark.slow
+def test_workers_behind_a_nanny_need_a_setting_and_then_come_back(folder, tmp_path):
+    with cluster(tmp_path, 0) as none:
+        none.add("--nanny")
+        with pytest.raises(RunStopped, match="DASK_DISTRIBUTED__WORKER__DAEMON=False"):
+            together(folder, none.address, [write("one")])
+        none.workers[0].terminate()
+        none.workers[0].wait(30)
+        none.add("--nanny", DASK_DISTRIBUTED__WORKER__DAEMON="False")
+        found = together(folder, none.address, [write("deadly", how="die with the worker"), write("after")])
+    assert found["deadly"].failed and found["after"].status == "ok"
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("expected")
+    finish(folder, LocalExecutor(RunFolder(folder), None, 1))
+    return files(folder)
+
+
+@pytest.mark.slow
+def test_with_a_worker_killed_and_the_scheduler_restarted_the_files_are_the_same(folder, tmp_path, expected):
+    with cluster(tmp_path, 2) as two:
+        mark = tmp_path / "mark"
+        runner = start_runner(folder.path, two.address, seconds=1.0, mark=mark)
+        until(lambda: len(lines(mark)) >= 3)
+        os.kill(lines(mark)[-1][0], signal.SIGKILL)
+        two.add()
+        until(lambda: len(list(folder.path.rglob("*.json"))) >= 5)
+        two.restart_scheduler()
+        two.add()
+        two.add()
+        assert runner.wait(180) == 0
+    assert files(folder.path) == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [0, 2])
+def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected, workers):
+    """The runner, or a worker; here a task's process. What was finished is done no second time."""
+    chance, kills, mark = random.Random(7), 0, tmp_path / "mark"
+    with cluster(tmp_path, workers) if workers else nullcontext() as there:
+        address = there.address if there else ""
+        while kills < KILLS:
+            runner = start_runner(folder.path, address, seconds=0.3, mark=mark)
+            while kills < KILLS and runner.poll() is None:
+                begun = len(lines(mark))
+                until(lambda: len(lines(mark)) > begun or runner.poll() is not None)  # noqa: B023
+                time.sleep(chance.uniform(0.0, 0.6))
+                if runner.poll() is not None:
+                    break
+                kept = {path: path.read_bytes() for path in folder.path.glob("cache/**/*.json")}
+                kill_one(chance, there, runner, lines(mark)[-1][1])
+                kills += 1
+                assert {path: path.read_bytes() for path in kept} == kept
+            runner.wait(120)
+            if files(folder.path) == expected:  # begin again: there are kills left
+                for path in folder.path.rglob("*.json"):
+                    path.unlink()
+        last = ClusterExecutor(folder, None, 1, address) if there else LocalExecutor(folder, None, 2)
+        finish(folder.path, last)
+    assert files(folder.path) == expected
+    until(lambda: not any(alive(task) for _, task in lines(mark)), 15.0)
+
+
+def kill_one(chance: random.Random, there: Cluster | None, runner: subprocess.Popen, task: int) -> None:
+    if chance.random() < 0.5:
+        runner.kill()
+        runner.wait()
+    elif there is None:
+        with suppress(ProcessLookupError):  # it has just ended with the chain
+            os.kill(task, signal.SIGKILL)
+    else:
+        victim = there.workers.pop(chance.randrange(len(there.workers)))
+        victim.kill()
+        victim.wait()
+        there.add()

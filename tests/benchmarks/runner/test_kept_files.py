@@ -1,0 +1,175 @@
+"""Nothing damaged is believed: what a run has kept is done again where it is not as it was written."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from benchmarks import run
+from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.rows import rows_of
+from benchmarks.runner import local_executor as executor
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.schedule import tasks_of
+from benchmarks.tasks.task import Context, Outcome, RunStopped
+from tests.benchmarks.runner.tasks_by_hand import InProcess
+from tests.benchmarks.runner.test_runner import task
+from tests.benchmarks.tasks.test_cell_tasks import TINY, NoLog, plan_of
+
+QUICK = dataclasses.replace(TINY, least_seconds=0.0)
+METHODS = ("simulation", "newton-1")
+# What is done again where something of newton-1, or of the simulation that all are compared with, is damaged.
+CELL, METRICS = "cell hanging_sheet x newton-1", "metrics hanging_sheet x newton-1"
+ALL = {CELL, METRICS, "cell hanging_sheet x simulation", "metrics hanging_sheet x simulation"}
+
+
+def done(folder: Path) -> tuple[Runner, dict]:
+    """All tasks of a small run there, and what does not come from the clock of its rows."""
+    plan = plan_of(folder, *METHODS, scene="hanging_sheet", preset=QUICK)
+    runner = Runner(tasks_of(plan), Cache(RunFolder(folder)))
+    runner.run(InProcess(RunFolder(folder)), NoLog())
+    rows = rows_of(plan, runner.tasks, runner.outcomes)
+    return runner, {
+        (r.method, r.metric): (r.value, r.status, r.reason) for r in rows if not r.metric.startswith("cost/")
+    }
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> tuple[Path, dict]:
+    folder = tmp_path_factory.mktemp("whole")
+    return folder, done(folder)[1]
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 16
+    path.write_bytes(data)
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 3])
+
+
+def replace(path: Path) -> None:
+    """By a whole file of the same kind."""
+    other = path.with_name(path.name.replace("newton-1", "simulation"))
+    shutil.copyfile(other, path)
+
+
+@pytest.mark.parametrize("damage", [flip, truncate, replace, Path.unlink])
+@pytest.mark.parametrize(
+    ("name", "redone"),
+    [
+        ("trajectories/hanging_sheet/newton-1.vtkhdf", {CELL, METRICS}),
+        ("trajectories/hanging_sheet/newton-1.npz", {METRICS}),
+        ("cache/cell/hanging_sheet/newton-1.json", {CELL, METRICS}),
+        ("cache/metrics/hanging_sheet/newton-1.json", {METRICS}),
+    ],
+)
+def test_what_is_damaged_is_done_again_alone(whole, tmp_path, damage, name, redone):
+    folder = shutil.copytree(whole[0], tmp_path / "run")
+    damage(folder / name)
+    runner, rows = done(folder)
+    assert set(runner.reused) == ALL - redone
+    assert rows == whole[1]
+    assert len(done(folder)[0].reused) == len(ALL)
+
+
+WORN = "trajectories/tshirt-sudden_stop"
+WORDS = ["--preset", "smoke", "--suite", "garments", "--scenes", "tshirt/sudden_stop"]
+WORDS += ["--methods", "simulation,skinning,supervised,snug"]
+
+
+def run_dressed(folder: Path) -> dict:
+    """What the command leaves there that does not come from the clock."""
+    assert run.main([*WORDS, "-o", str(folder)]) == 0
+    rows = RunFolder(folder).read_rows()
+    kept = [row for row in rows if not row.metric.startswith("cost/") and row.unit not in ("s", "ms", "MB")]
+    return {(r.method, r.metric, r.seed): (r.value, r.status, r.reason, r.uncertainty) for r in kept}
+
+
+@pytest.fixture(scope="module")
+def dressed(tmp_path_factory) -> tuple[Path, dict]:
+    folder = tmp_path_factory.mktemp("dressed")
+    return folder, run_dressed(folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", [flip, truncate, "replace", Path.unlink])
+@pytest.mark.parametrize(
+    "name",
+    [
+        f"{WORN}/settled.npy", f"{WORN}/body.npy", f"{WORN}/body.vtkhdf", f"{WORN}/rest_areas.npy",
+        f"{WORN}/simulation.vtkhdf", f"{WORN}/quasi-static.vtkhdf", f"{WORN}/snug.npz",
+        f"{WORN}/snug-quasi-static.vtkhdf", "trajectories/tshirt-walk/simulation.vtkhdf",
+        "models/supervised-seed0.safetensors",
+    ],
+)  # fmt: skip
+def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dressed, tmp_path, name, damage):
+    folder = shutil.copytree(dressed[0], tmp_path / "run")
+    digests = RunFolder(folder).read_config()["digests"]
+    if damage == "replace":  # by another whole file of its kind
+        other = next(n for n in digests if Path(n).suffix == Path(name).suffix and n != name)
+        shutil.copyfile(folder / other, folder / name)
+    else:
+        damage(folder / name)
+    assert not (folder / name).is_file() or digest_of_file(folder / name) != digests[name]
+    rows = run_dressed(folder)
+    assert rows == dressed[1]
+    config = RunFolder(folder).read_config()
+    assert set(config["digests"]) == set(digests) and RunFolder(folder).changed(config) == []
+
+
+def test_what_hangs_on_a_damaged_reference_is_done_again(whole, tmp_path):
+    folder = shutil.copytree(whole[0], tmp_path / "run")
+    flip(folder / "trajectories/hanging_sheet/simulation.vtkhdf")
+    runner, rows = done(folder)
+    assert runner.reused == [CELL] and rows == whole[1]
+
+
+def test_a_number_changed_in_a_record_is_not_believed(whole, tmp_path):
+    folder = shutil.copytree(whole[0], tmp_path / "run")
+    path = folder / "cache/metrics/hanging_sheet/newton-1.json"
+    entry = json.loads(path.read_text())
+    entry["outcome"]["result"]["energy/total"] = 4.11
+    path.write_text(json.dumps(entry, indent=1, ensure_ascii=False))
+    runner, rows = done(folder)
+    assert METRICS not in runner.reused and rows == whole[1]
+
+
+def test_a_file_that_comes_back_as_it_was_does_nothing_else_again(tmp_path):
+    tasks = task("first"), task("second", needs=(("network", "first"),))
+
+    def run() -> Runner:
+        runner = Runner(tasks, Cache(RunFolder(tmp_path)))
+        runner.run(InProcess(RunFolder(tmp_path)), NoLog())
+        return runner
+
+    run()
+    (tmp_path / "first.txt").write_text("damaged")
+    runner = run()
+    assert runner.reused == ["network second"]
+    assert (tmp_path / "first.txt").read_text() == "first"
+
+
+def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it(tmp_path, monkeypatch):
+    folder = RunFolder(tmp_path)
+    first, second = task("first"), task("second", needs=(("network", "first"),))
+    cache = Cache(folder)
+    monkeypatch.setattr(executor, "_context", Context(folder), raising=False)
+    monkeypatch.setattr(executor, "_verified", set())
+    found = cache.keep(first, executor._perform(first, {}), {})
+    assert isinstance(found.outcome, Outcome)
+    needed = {first.id: found.outcome}
+    assert executor._perform(second, needed).status == "ok"
+    (tmp_path / "first.txt").write_text("worst")
+    assert executor._perform(second, needed).status == "ok"  # compared once in each process
+    executor._verified.clear()
+    with pytest.raises(RunStopped, match=r"^first\.txt is damaged since this run wrote it"):
+        executor._perform(second, needed)
+    assert cache.find(first, {}).state == "missing"

@@ -1,0 +1,156 @@
+"""Processes of this machine: outcomes of all tasks, a failure as a value, progress whatever dies."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import time
+
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner import local_executor as executor
+from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.tasks.task import Outcome, Task
+from tests.project.own_memory import needs_proc, own_memory
+
+HELD: list[bytearray] = []  # of a process
+
+
+class Bar:
+    total, n = 100, 0
+
+    def update(self, units=1):
+        self.n += units
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Add(Task):
+    kind = "sum"
+    stage = "adding"
+    terms: tuple = (1, 2)
+    how: str = ""
+
+    def begin(self, context):
+        if self.how == "die at once":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.how == "raise":
+            raise OSError("no such body")
+        context.memo["done"] = [f"{self.name} begun beside {self._others(context.folder.path)}"]
+
+    def _others(self, folder) -> int:
+        """How many others have begun once one has, or after a while."""
+        (folder / self.name).touch()
+        for _ in range(100):
+            if (others := len(list(folder.iterdir())) - 1) > 0:
+                return others
+            time.sleep(0.1)
+        return 0
+
+    def warm_up(self) -> None:
+        if self.how == "cold":
+            raise MemoryError("no room to compile")
+
+    def run(self, context, needed):
+        if self.how == "die telling":
+            executor._context.tell.__self__._wlock.acquire()  # as in the midst of a report
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.how == "hang":
+            signal.pause()
+        if self.how == "fill":
+            pieces: list = [bytearray(50_000) for _ in range(3000)]  # each too small to be mapped by itself
+            HELD.append(bytearray(50_000))  # while it is there the heap does not shrink by itself
+            pieces.append(pieces)  # freed only by who looks for circles
+            del pieces
+        context.tell(1)
+        context.memo.setdefault("done", []).append(self.name)
+        first, second = self.terms
+        return Outcome(result={"sum": first + second, "memo": list(context.memo["done"]), "kB": own_memory()})
+
+
+def add(name: str, **fields) -> Add:
+    return Add(name=name, label=name, inputs={}, modules=("benchmarks.results.run_folder",), **fields)
+
+
+def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Bar]:
+    bar = Bar()
+    left = [(batch, {}) for batch in reversed(batches)]
+    executor = LocalExecutor(RunFolder(folder), None, workers)
+    done = executor.together(lambda: left.pop() if left else None, bar)
+    return {task.name: outcome for task, outcome in done}, bar
+
+
+def test_a_failure_is_a_value_and_the_others_go_on(tmp_path):
+    found, _ = together(tmp_path, [add("one")], [add("two", terms=(1, "x"))], [add("three", terms=(3, 4))])
+    assert found["one"].result["sum"] == 3 and found["three"].result["sum"] == 7
+    assert found["two"].failed and found["two"].reason.startswith("TypeError")
+    assert all(outcome.seconds > 0.0 for outcome in found.values())
+
+
+def test_a_process_that_was_killed_while_it_reported_keeps_no_other_waiting(tmp_path):
+    found, _ = together(tmp_path, [add("dies", how="die telling")], [add("tells", terms=(3, 4))])
+    assert found["dies"].status == "out-of-memory" and "SIGKILL" in found["dies"].reason
+    assert found["tells"].result["sum"] == 7
+
+
+def test_a_task_that_hangs_is_ended_at_its_deadline(tmp_path):
+    found, _ = together(tmp_path, [add("hangs", how="hang", deadline=0.5)], [add("after")])
+    assert found["hangs"].status == "timeout" and "0.5 s" in found["hangs"].reason
+    assert found["after"].result["sum"] == 3
+
+
+def test_what_cannot_be_made_ready_is_a_failure(tmp_path):
+    found, _ = together(tmp_path, [add("cold", how="cold")], [add("after")])
+    assert found["cold"].status == "out-of-memory" and "no room to compile" in found["cold"].reason
+    assert found["after"].result["sum"] == 3
+
+
+def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
+    batch = [add("one"), add("two"), add("bad", terms=(1, "x")), add("four")]
+    found, _ = together(tmp_path, batch, [add("three")])
+    assert found["two"].result["memo"] == ["one", "two"] and found["three"].result["memo"] == ["three"]
+    assert found["bad"].failed and found["four"].result["memo"] == ["one", "two", "bad", "four"]
+
+
+@needs_proc
+def test_free_memory_of_a_batch_is_given_back(tmp_path):
+    found, _ = together(tmp_path, [add("one", how="fill"), add("two")], [add("three")])
+    during, after = (found[name].result["kB"] for name in ("two", "three"))
+    assert during - after > 100_000
+
+
+def test_what_hangs_in_a_batch_costs_the_others_nothing(tmp_path):
+    batch = [add("one"), add("hangs", how="hang", deadline=0.5), add("after", deadline=60.0)]
+    found, bar = together(tmp_path, batch)
+    assert found["hangs"].status == "timeout" and found["one"].result["sum"] == 3
+    assert found["after"].result["memo"] == ["after"] and bar.n == 2
+
+
+def test_a_named_process_is_kept_until_it_is_released(tmp_path):
+    alone = LocalExecutor(RunFolder(tmp_path), None, 1)
+    try:
+        first, second = (add(name, process="own") for name in ("first", "second"))
+        assert alone.alone(first, {}).result["memo"] == ["first"]
+        assert alone.alone(second, {}).result["memo"] == ["first", "second"]
+        alone.release("own")
+        assert alone.alone(second, {}).result["memo"] == ["second"]
+    finally:
+        alone.close()
+
+
+def test_timed_tasks_begin_side_by_side_and_what_goes_wrong_there_is_their_outcome(tmp_path):
+    two = LocalExecutor(RunFolder(tmp_path), None, 2)
+    tasks = [
+        add("one", process="a"), add("other", process="b"),
+        add("dies", process="c", how="die at once"), add("raises", process="d", how="raise", terms=(1, "x")),
+    ]  # fmt: skip
+    try:
+        two.begin([(task, {}) for task in tasks])
+        assert not two._crew
+        one, other, dies, raises = (two.alone(task, {}) for task in tasks)
+        assert one.result["memo"] == ["one begun beside 1", "one"]
+        assert other.result["memo"] == ["other begun beside 1", "other"]
+        assert dies.status == "out-of-memory" and "SIGKILL" in dies.reason
+        assert raises.reason.startswith("TypeError")
+        assert two.alone(add("dies", process="c"), {}).result["memo"] == ["dies"]  # in a new process
+    finally:
+        two.close()

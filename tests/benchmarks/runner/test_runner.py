@@ -1,0 +1,438 @@
+"""A run's folder: one run at a time, nothing measured out of date, whole after an interrupt or a kill."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import run
+from benchmarks.methods import find_method
+from benchmarks.plan.plan import Motions, Network
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.rows import rows_of
+from benchmarks.runner import whole_run as execution
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.scenes import of_garment
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.tasks.task import Outcome, Task
+from tests.benchmarks.runner.misbehaving import interrupt_at
+from tests.benchmarks.runner.tasks_by_hand import InProcess
+from tests.benchmarks.tasks.test_cell_tasks import TINY, NoLog, found_of, of_session, outcome_of, plan_of
+
+ROOT = Path(__file__).resolve().parents[3]
+WORDS = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall"]
+HOLDING = """
+import sys, time
+from pathlib import Path
+from benchmarks.runner.lock import held
+with held(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.fixture(autouse=True)
+def without_report(monkeypatch):
+    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+
+
+def words_of(folder: Path, *methods: str) -> list[str]:
+    return [*WORDS, "-o", str(folder), "--methods", ",".join(methods)]
+
+
+# --- one run at a time -----------------------------------------------------------------------------------
+
+
+def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    words, answers = words_of(tmp_path / "run", "simulation"), []
+
+    def execute(plan, assets):
+        if len(answers) == 0:
+            answers.append(None)
+            answers.append(run.main(words))
+        return 0
+
+    monkeypatch.setattr(execution, "execute", execute)
+    assert run.main(words) == 0 and answers == [None, 2]
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "another run" in said and str(tmp_path / "run") in said
+    assert run.main(words) == 0  # the first has ended
+    assert list((tmp_path / "run").iterdir()) == []
+
+
+def test_a_killed_run_holds_its_folder_no_longer(tmp_path, monkeypatch):
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLDING, tmp_path],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    assert process.stdout is not None and process.stdout.readline() == b"held\n"
+    monkeypatch.setattr(execution, "execute", lambda plan, assets: 0)
+    assert run.main(words_of(tmp_path, "simulation")) == 2
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    assert run.main(words_of(tmp_path, "simulation")) == 0
+
+
+def test_a_folder_of_an_earlier_version_is_refused_in_one_line(tmp_path, capsys):
+    (tmp_path / "run.json").write_text('{"command": "python -m benchmarks.run", "finished": null}')
+    assert run.main(words_of(tmp_path, "simulation")) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "earlier version" in said and "new folder" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
+
+
+def test_what_a_killed_run_was_writing_is_removed(tmp_path):
+    scene = tmp_path / "trajectories" / "free_fall"
+    scene.mkdir(parents=True)
+    for name in ("simulation.vtkhdf", "newton-1.vtkhdf.part", ".body.77.part.npy"):
+        (scene / name).write_bytes(b"half")
+    execution.RunLog(plan_of(tmp_path))
+    assert [path.name for path in scene.iterdir()] == ["simulation.vtkhdf"]
+
+
+def test_a_fresh_run_goes_on_from_no_training_that_was_stopped(tmp_path):
+    models = tmp_path / "models" / "tunic"
+    models.mkdir(parents=True)
+    stopped = models / ".snug-seed0.checkpoint.safetensors"
+    stopped.write_bytes(b"half")
+    plan = plan_of(tmp_path)
+    execution.RunLog(plan)
+    assert stopped.is_file()
+    execution.RunLog(dataclasses.replace(plan, fresh=True))
+    assert not stopped.exists()
+
+
+# --- tasks that fail -------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Written(Task):
+    """Writes a file, or dies."""
+
+    kind = "network"
+    stage = "writing"
+    silent = True
+    dies: bool = False
+
+    def run(self, context, needed):
+        if self.dies:
+            os.kill(os.getpid(), signal.SIGKILL)
+        path = context.folder.path / f"{self.name}.txt"
+        path.write_text("".join(outcome.result["word"] for outcome in needed.values()) or "first")
+        context.tell(self.units)
+        return Outcome(result={"word": self.name}, files=(path.name,))
+
+
+def task(name: str, *, dies: bool = False, value: int = 0, **ties) -> Written:
+    return Written(
+        name=name,
+        label=name,
+        inputs={"value": value},
+        modules=("benchmarks.results.run_folder",),
+        dies=dies,
+        **ties,
+    )
+
+
+def run_tasks(folder: Path, *tasks: Task, only=("stale", "missing")) -> Runner:
+    runner = Runner(tasks, Cache(RunFolder(folder), only=only))
+    runner.run(LocalExecutor(RunFolder(folder), None, 1), NoLog())
+    return runner
+
+
+class TwoAtOnce(InProcess):
+    """Two workers, of which the one that began first ends first; writes down what is at work at a time."""
+
+    def __init__(self, folder: RunFolder) -> None:
+        super().__init__(folder)
+        self.at_work: list[list[str]] = []
+
+    def together(self, ready, bar):
+        begun = []
+        while True:
+            while len(begun) < 2 and (batch := ready()):
+                begun.append(batch)
+            if not begun:
+                return
+            self.at_work.append([task.name for tasks, _ in begun for task in tasks])
+            tasks, needed = begun.pop(0)
+            for task in tasks:
+                yield task, task.run(self.context(), needed)
+
+    def alone(self, task, needed):
+        self.at_work.append([task.name])
+        return super().alone(task, needed)
+
+
+def test_workers_that_would_wait_begin_what_comes_later_and_nothing_is_beside_a_timed_task(tmp_path):
+    def ids(*names: str) -> tuple[tuple[str, str], ...]:
+        return tuple(("network", name) for name in names)
+
+    tasks = (
+        task("short"), task("long", units=5), task("next", needs=ids("short", "long")),
+        task("timed", needs=ids("next"), process="own"),
+        task("after", needs=ids("timed")), task("one", needs=ids("short"), batch="both"),
+        task("two", needs=ids("long"), batch="both"), task("three", needs=ids("next")),
+    )  # fmt: skip
+    folder = RunFolder(tmp_path)
+    runner, executor = Runner(tasks, Cache(folder)), TwoAtOnce(folder)
+    runner.run(executor, NoLog())
+    assert executor.at_work == [
+        ["long", "short"], ["short"], ["next", "one", "two"], ["one", "two"], ["timed"],
+        ["after", "three"], ["three"],
+    ]  # fmt: skip
+    assert all(outcome.status == "ok" for outcome in runner.outcomes.values())
+
+
+def test_a_task_whose_process_is_killed_is_kept_as_failed_and_done_again_when_asked(tmp_path):
+    def ended(*dies: bool, **only) -> tuple[list[Outcome], Runner]:
+        tasks = [task(name, dies=d) for name, d in zip(("one", "two", "three"), dies)]
+        runner = run_tasks(tmp_path, *tasks, **only)
+        return list(runner.outcomes.values()), runner
+
+    first, runner = ended(False, True, False)
+    assert [outcome.failed for outcome in first] == [False, True, False]
+    assert first[1].status == "out-of-memory" and "SIGKILL" in first[1].reason
+    found = runner.cache.find(task("two"), {})
+    assert found.state == "failed" and found.why.startswith("out-of-memory") and "SIGKILL" in found.why
+    assert dict(runner.broken()) == {"network two": found.why}
+    again, runner = ended(True, False, True)
+    assert again[1].reason == first[1].reason and dict(runner.broken()) == {"network two": found.why}
+    again, runner = ended(True, False, True, only=("failed",))
+    assert not again[1].failed and dict(runner.broken()) == {}
+
+
+def test_what_needs_a_failed_task_is_blocked_and_done_once_nothing_blocks_it(tmp_path):
+    def both(dies: bool, **only) -> Outcome:
+        needs = task("second", needs=(("network", "first"),))
+        return run_tasks(tmp_path, task("first", dies=dies), needs, **only).outcomes["network", "second"]
+
+    blocked = both(dies=True)
+    assert blocked.failed and blocked.reason.startswith("cannot be run: network first: out-of-memory")
+    assert both(dies=True).reason == blocked.reason
+    assert both(dies=True, only=("failed",)).failed
+    assert both(dies=False, only=("failed",)).status == "ok"
+    assert (tmp_path / "second.txt").read_text() == "first"
+
+
+def test_what_reads_a_failed_task_goes_on_without_it_and_is_another(tmp_path):
+    def both(dies: bool) -> Runner:
+        reads = task("second", reads=(("network", "first"),))
+        return run_tasks(tmp_path, task("first", dies=dies), reads, only=("failed", "stale", "missing"))
+
+    assert not both(dies=True).outcomes["network", "second"].failed
+    assert (tmp_path / "second.txt").read_text() == "first" and both(dies=True).reused == ["network second"]
+    assert both(dies=False).reused == []
+
+
+def test_a_damaged_file_is_made_anew_with_all_that_was_made_from_it(tmp_path):
+    tasks = task("first"), task("second", needs=(("network", "first"),)), task("third")
+    run_tasks(tmp_path, *tasks)
+    assert len(run_tasks(tmp_path, *tasks).reused) == 3
+    (tmp_path / "first.txt").write_text("damaged")
+    cache = Cache(RunFolder(tmp_path))
+    assert cache.find(tasks[0], {}).state == "missing"
+    assert cache.find(tasks[0], {}).why == "first.txt is damaged"
+    runner = run_tasks(tmp_path, *tasks)
+    assert (tmp_path / "first.txt").read_text() == "first" and "network third" in runner.reused
+    (tmp_path / "second.txt").unlink()
+    assert Cache(RunFolder(tmp_path)).find(tasks[1], runner.found).why == "second.txt is gone"
+    cache.path(tasks[2]).write_text("{")
+    assert cache.find(tasks[2], {}).state == "missing"
+
+
+def test_a_network_that_learned_without_a_failed_simulation_is_another(tmp_path):
+    plan = plan_of(tmp_path, motions=Motions(train=("walk", "run")))
+    schedule = Schedule(plan)
+    lost = schedule.data("run", "tshirt", find_method("simulation")).id
+    assert lost in schedule.network(Network("supervised", 0, "tshirt")).reads
+    assert schedule.network(Network("snug", 0, "tshirt")).reads == ()
+
+
+def test_a_cell_that_was_blocked_is_run_once_nothing_blocks_it(tmp_path):
+    plan = plan_of(tmp_path, "simulation")
+    (cell,) = (t for t in tasks_of(plan) if t.kind == "cell")
+    lame = dataclasses.replace(cell, needs=(("network", "lame"),))
+    runner = run_tasks(tmp_path, task("lame", dies=True), lame)
+    blocked = runner.outcomes["cell", cell.name]
+    assert blocked.status == "failed" and "network lame" in blocked.reason
+    assert outcome_of(dataclasses.replace(plan, only=frozenset({"failed"}))).status == "ok"
+
+
+def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(execution, "tasks_of", lambda plan: [task("lame", dies=True)])
+    assert execution.execute(plan_of(tmp_path)) == 1
+    assert "network lame: out-of-memory: the process was killed" in capsys.readouterr().err
+
+
+def test_a_dry_run_decides_as_the_run_does(tmp_path):
+    """What fails cannot be foreseen; everything else can."""
+
+    def planned_and_done(dies: bool, *only: str) -> tuple[set[str], set[str]]:
+        tasks = (
+            task("first", dies=dies), task("second", needs=(("network", "first"),)),
+            task("third", reads=(("network", "first"),)), task("fourth"),
+        )  # fmt: skip
+        preview = Runner(tasks, Cache(RunFolder(tmp_path), only=only)).preview()
+        planned = {task.name for task, _, outcome in preview if outcome is None}
+        runner = run_tasks(tmp_path, *tasks, only=only)
+        blocked = "failed: cannot be run"
+        ran = {name for (_, name), found in runner.found.items() if not found.why.startswith(blocked)}
+        return planned, ran - {title.removeprefix("network ") for title in runner.reused}
+
+    planned, done = planned_and_done(True, "stale", "missing")
+    assert planned - done == {"second"} and done == {"first", "third", "fourth"}
+    assert planned_and_done(True, "stale", "missing") == (set(), set())
+    (tmp_path / "cache" / "network" / "second.json").unlink()
+    assert planned_and_done(True, "missing") == (set(), set())
+    (tmp_path / "fourth.txt").unlink()
+    assert planned_and_done(False, "failed") == ({"first", "second"}, {"first", "second"})
+    assert planned_and_done(False, "stale", "missing") == ({"third", "fourth"}, {"third", "fourth"})
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Unkept(Task):
+    """Its outcome cannot be written down."""
+
+    kind = "unkept"
+    stage = "writing"
+    outcome: Outcome
+
+    def run(self, context, needed):
+        return self.outcome
+
+
+@pytest.mark.parametrize(
+    ("outcome", "word"),
+    [(Outcome(result={"x": np.float32(1)}), "float32"), (Outcome(files=("nowhere.npy",)), "nowhere.npy")],
+)
+def test_what_cannot_be_kept_has_failed_and_the_others_go_on(outcome, word, tmp_path):
+    bad = Unkept(
+        name="bad", label="bad", inputs={}, modules=("benchmarks.results.run_folder",), outcome=outcome
+    )
+    runner = run_tasks(tmp_path, bad, task("good"))
+    assert runner.outcomes["unkept", "bad"].failed and word in runner.outcomes["unkept", "bad"].reason
+    assert runner.outcomes["network", "good"].status == "ok"
+    assert run_tasks(tmp_path, bad, task("good")).reused == ["unkept bad", "network good"]
+
+
+# --- out of date -----------------------------------------------------------------------------------------
+
+
+def test_what_is_out_of_date_is_not_measured_as_if_it_were_not(tmp_path):
+    plan = plan_of(tmp_path, "simulation", "newton-1")
+    one = dataclasses.replace(plan, cells=plan.cells[:1])
+    assert execution.execute(one) == 0
+    before = {row.metric: row.value for row in RunFolder(tmp_path).read_rows()}
+    finer = dataclasses.replace(TINY, sheet_cells=4, sheet_frames=5)
+    missing = plan_of(tmp_path, "simulation", "newton-1", preset=finer, only=frozenset({"missing"}))
+    assert execution.execute(missing) == 0
+    rows = RunFolder(tmp_path).read_rows()
+    kept = [row for row in rows if row.method == "simulation"]
+    assert {row.metric: row.value for row in kept} == before
+    assert all(row.reason == "kept though scene changed" for row in kept)
+    new = {row.metric for row in rows if row.method == "newton-1" and row.status == "ok"}
+    assert "energy/total" in new and not any(metric.startswith("distance/") for metric in new)
+    assert execution.execute(dataclasses.replace(missing, only=frozenset({"stale", "missing"}))) == 0
+    rows = RunFolder(tmp_path).read_rows()
+    assert any(row.metric == "distance/rms" and row.method == "newton-1" for row in rows)
+    assert not any("kept" in row.reason for row in rows)
+
+
+# --- interrupts and kills --------------------------------------------------------------------------------
+
+
+def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path, monkeypatch):
+    words = words_of(tmp_path, "simulation,newton-4")
+    assert run.main(words) == 0
+    before = RunFolder(tmp_path).read_rows()
+    (tmp_path / "cache" / "metrics" / "free_fall" / "newton-4.json").unlink()
+    with monkeypatch.context() as patch:
+        interrupt_at("newton-1", patch)
+        assert run.main(words_of(tmp_path, "simulation,newton-1,newton-4")) == 130
+    assert RunFolder(tmp_path).read_rows() == [row for row in before if row.method == "simulation"]
+    assert run.main(words) == 0 and RunFolder(tmp_path).read_rows() == before
+
+
+def test_an_interrupt_before_anything_is_known_leaves_the_last_table(tmp_path, monkeypatch):
+    words = words_of(tmp_path, "simulation")
+    assert run.main(words) == 0
+    before = RunFolder(tmp_path).read_rows()
+
+    def interrupt(self, executor, log):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Runner, "run", interrupt)
+    assert run.main([*words, "--fresh"]) == 130
+    assert before and RunFolder(tmp_path).read_rows() == before
+
+
+def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
+    scene = of_garment("tshirt").scene("kick").at(TINY)
+    cell = Cell(scene, find_method("supervised"), 0, ("garments",))
+    motions = Motions(train=("walk", "run"), test=("kick",))
+    plan = plan_of(tmp_path, motions=motions, cells=(cell,))
+    cache, found = Cache(RunFolder(tmp_path)), {}
+    by_id = {t.id: t for t in tasks_of(plan)}
+    lost = Outcome("diverged", "far away", failed=True)
+    killed = Outcome("failed", "killed", failed=True)
+    network = Schedule(plan).network(Network("supervised", 0, "tshirt")).id
+    for id, outcome in (
+        (("start", "tshirt-kick"), Outcome()), (("data", "tshirt-walk/simulation"), Outcome()),
+        (("data", "tshirt-run/simulation"), lost), (network, Outcome()), (("cell", cell.name), killed),
+    ):  # fmt: skip
+        found[id] = cache.keep(by_id[id], outcome, found)
+    runner = Runner(tasks_of(plan), Cache(RunFolder(tmp_path)))
+    (row,) = rows_of(plan, runner.tasks, runner.known())
+    assert (row.method, row.status, row.reason) == ("supervised", "failed", "killed")
+    assert runner.outcomes["data", "tshirt-run/simulation"].reason == "far away"
+    assert found_of(plan).state == "failed"
+
+
+@pytest.mark.slow
+def test_killed_at_any_moment_a_run_ends_as_one_that_was_not(tmp_path):
+    names = ("simulation", "newton-1", "newton-4", "lbfgs-5", "gradient-descent-10")
+    assert run.main(words_of(tmp_path / "whole", *names)) == 0
+    folder = tmp_path / "killed"
+    words, killed = words_of(folder, *names), []
+    for files in (1, 5, 9, 14, 19):  # in the folder when it is killed, a little later each time
+        kept = {path: path.read_bytes() for path in folder.glob("cache/cell/**/*.json")}
+        process = subprocess.Popen(
+            [sys.executable, "-m", "benchmarks.run", *words],
+            cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
+        deadline = time.monotonic() + 120
+        while process.poll() is None and sum(path.is_file() for path in folder.rglob("*")) < files:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        time.sleep(0.03 * files)
+        process.kill()
+        process.wait()
+        killed.append(process.returncode)
+        while of_session(process.pid):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert {path: path.read_bytes() for path in kept} == kept
+    assert killed.count(-signal.SIGKILL) >= 4  # in the midst of it
+    assert run.main(words) == 0
+    assert measured(folder) == measured(tmp_path / "whole")
+    assert not [path for path in folder.rglob("*") if "part" in path.name]
+
+
+def measured(folder: Path) -> dict[tuple[str, str], tuple[float | None, str]]:
+    """What does not come from clock and process."""
+    rows = RunFolder(folder).read_rows()
+    return {(r.method, r.metric): (r.value, r.status) for r in rows if not r.metric.startswith("cost/")}

@@ -1,0 +1,168 @@
+"""What a task depends on is found from the source: no more, so that it is kept; no less."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.methods import METHODS
+from benchmarks.metrics import MODULES
+from benchmarks.performance.registry import MICROBENCHMARKS
+from benchmarks.runner import source
+from benchmarks.runner.source import code_of, data_of, digest, packages_of
+from benchmarks.scenes import FURTHER, SCENES
+
+FILES = {
+    "reference_sim/__init__.py": "from .cloth import Cloth\n",
+    "reference_sim/cloth.py": "class Cloth:\n    pass\n",
+    "reference_sim/stretch.py": "K = 1.0\n",
+    "reference_sim/bend.py": "K = 2.0\n",
+    "reference_sim/terms/__init__.py": "def __getattr__(name):\n    return load(name)\n",
+    "reference_sim/terms/stretch.py": "class Stretch:\n    pass\n",
+    "reference_sim/terms/bend.py": "class Bend:\n    pass\n",
+    "snug/network.py": "import torch\nfrom reference_sim.terms import Unknown\n",
+    "snug/data/body.npz": "weights",
+    "benchmarks/methods/__init__.py": "from . import one, other\n",
+    "benchmarks/methods/one.py": (
+        '"""Words."""\nfrom typing import TYPE_CHECKING\nfrom reference_sim import Cloth\n'
+        "from ..scene import build\nif TYPE_CHECKING:\n    from snug.network import Network\n"
+        "def make():\n    import numpy, nowhere\n    from reference_sim.terms import Stretch\n"
+    ),
+    "benchmarks/methods/other.py": "import snug.network\nfrom . import one\n",
+    "benchmarks/scene.py": "import os\ndef build():\n    return 1\n",
+}
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A small project; gives a function that writes a file of it anew."""
+
+    def write(path: str, text: str) -> None:
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+        forget()
+
+    monkeypatch.setattr(source, "ROOT", tmp_path)
+    for path, text in FILES.items():
+        write(path, text)
+    yield write
+    forget()
+
+
+def forget() -> None:
+    for name in ("_source", "_bound", "_defined", "_file_of", "_closure", "_data_files"):
+        getattr(source, name).cache_clear()
+
+
+def test_the_code_is_what_is_imported_also_inside_functions_and_by_first_use(project):
+    assert set(code_of("benchmarks.methods.one")) == {
+        "benchmarks/methods/one.py", "benchmarks/scene.py", "reference_sim/__init__.py",
+        "reference_sim/cloth.py", "reference_sim/terms/__init__.py", "reference_sim/terms/stretch.py",
+    }  # fmt: skip
+    assert "snug/network.py" in code_of("benchmarks.methods.other")
+
+
+@pytest.mark.parametrize(
+    "path", ["reference_sim/terms/bend.py", "benchmarks/methods/other.py", "snug/network.py"]
+)
+def test_what_is_not_used_may_change(project, path):
+    before = code_of("benchmarks.methods.one")
+    project(path, "CHANGED = True\n")
+    assert code_of("benchmarks.methods.one") == before
+
+
+@pytest.mark.parametrize(
+    "path", ["reference_sim/terms/stretch.py", "benchmarks/scene.py", "reference_sim/cloth.py"]
+)
+def test_what_is_used_may_not(project, path):
+    before = code_of("benchmarks.methods.one")
+    project(path, FILES[path] + "CHANGED = True\n")
+    after = code_of("benchmarks.methods.one")
+    assert [name for name in after if after[name] != before[name]] == [path]
+
+
+def test_words_and_blanks_do_not_count(project):
+    before = code_of("benchmarks.methods.one")
+    text = FILES["benchmarks/methods/one.py"].replace("Words.", "Other words.")
+    project("benchmarks/methods/one.py", f"{text}\n\n# a remark\n")
+    assert code_of("benchmarks.methods.one") == before
+
+
+def test_packages_are_those_that_the_code_imports_installed_or_not(project):
+    assert set(packages_of(code_of("benchmarks.methods.one"))) == {"numpy", "nowhere"}
+    found = packages_of(code_of("benchmarks.methods.other"))
+    assert found["nowhere"] == "absent" and found["numpy"].startswith("numpy ") and "torch" in found
+
+
+def test_a_name_that_nobody_defines_makes_all_of_its_package_count(project):
+    code = code_of("snug.network")
+    assert {"reference_sim/terms/stretch.py", "reference_sim/terms/bend.py"} < set(code)
+
+
+def test_what_lies_beside_the_source_counts_where_its_package_is_reached(project):
+    assert set(data_of(code_of("benchmarks.methods.other"))) == {"snug/data/body.npz"}
+    assert data_of(code_of("benchmarks.methods.one")) == {}
+
+
+def test_an_unknown_module_is_named():
+    with pytest.raises(ValueError, match=r"benchmarks\.nothing"):
+        code_of("benchmarks.nothing")
+
+
+def test_digests_tell_values_apart():
+    @dataclasses.dataclass
+    class Pair:
+        a: np.ndarray
+        b: str
+
+    one = Pair(np.arange(3.0), "x")
+    assert digest(one) == digest(Pair(np.arange(3.0), "x"))
+    others = [Pair(np.arange(3.0) + 1e-16, "y"), Pair(np.arange(3), "x"), Pair(np.arange(3.0)[:, None], "x")]
+    assert len({digest(value) for value in (one, *others)}) == 4
+    with pytest.raises(TypeError, match="object"):
+        digest({"a": object()})
+
+
+def test_a_scene_without_obstacle_or_body_depends_on_neither():
+    code = code_of(
+        "benchmarks.tasks.cell_task",
+        "benchmarks.scenes.hanging_sheet",
+        "benchmarks.methods.solvers.simulation",
+    )
+    assert "reference_sim/energies/bend_hinge.py" in code and "reference_sim/minimise/newton.py" in code
+    unused = ("snug/", "reports/", "reference_sim/energies/contact", "benchmarks/methods/__init__")
+    assert [path for path in code if path.startswith(unused)] == []
+
+
+def test_training_does_not_hang_on_the_solver():
+    code = code_of("benchmarks.tasks.training")
+    assert "snug/training/loss.py" in code and "reference_sim/energies/bend_hinge.py" in code
+    assert [path for path in code if path.startswith("reference_sim/minimise")] == []
+
+
+def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
+    """A line more in one of them makes nothing stale."""
+    lists = {f"benchmarks/{name}" for name in (
+        "scenes/__init__.py", "methods/__init__.py", "methods/solvers.py", "methods/learned.py",
+        "request/presets.py", "request/selection.py", "request/suites.py", "request/plan.py",
+        "runner/schedule.py", "validation/registry.py",
+    )}  # fmt: skip
+    lists.add("snug/recipes/named.py")
+    names = ("cell", "ground_truth", "training", "training_windows", "metrics", "case", "microbenchmark")
+    modules = [f"benchmarks.tasks.{name}" for name in names]
+    modules += [entry.module for entry in (*SCENES, *FURTHER, *METHODS)]
+    modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets.assets"]
+    modules += [f"benchmarks.metrics.{name}" for name in MODULES]
+    assert {name: found for name in modules if (found := lists & set(code_of(name)))} == {}
+    # A shirt of preset quick is measured.
+    lists -= {"benchmarks/presets.py", "benchmarks/scenes/__init__.py"}
+    assert not any(lists & set(code_of(benchmark.module)) for benchmark in MICROBENCHMARKS)
+
+
+def test_the_packages_that_move_a_number_are_known():
+    assert {"pymetis", "cvxopt", "scipy", "numba"} <= set(
+        packages_of(code_of("benchmarks.methods.solvers.simulation"))
+    )
+    assert "ipctk" in packages_of(code_of("reference_sim.energies.contact_barrier"))

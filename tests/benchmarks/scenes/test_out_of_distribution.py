@@ -1,0 +1,286 @@
+"""Motions out of distribution: what is hard about each, how a roll-out is measured and judged, who shares."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.assets.assets import Assets
+from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.networks.push_out import CleanUp
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metrics.motion import extrapolation
+from benchmarks.plan.plan import Motions, Plan
+from benchmarks.plan.selection import Request, choose
+from benchmarks.plan.suites import CHEAP
+from benchmarks.presets import find_preset
+from benchmarks.results.run_folder import RunFolder, model_path
+from benchmarks.rows import rows_of_cell
+from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.scenes import find_scene, out_of_distribution
+from benchmarks.scenes.variations import FEW, FEWEST, ORDINARY, OUT_OF_DISTRIBUTION
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.tasks.metric_task import measured
+from benchmarks.tasks.task import Context, Outcome
+from reference_sim import Trajectory
+from snug.body.parametric_body import Body
+from snug.body.skeleton import JOINT, joint_positions, rotation_matrices
+from snug.garments.templates import find_template
+from snug.motion.library import make_motion
+from snug.networks.dressed_body import DressedBody
+from snug.networks.roll_out import roll_out
+from snug.networks.trained_model import TrainedModel
+from snug.training.train import untrained_model
+
+SMOKE = find_preset("smoke")
+CASES = [scene for scene in OUT_OF_DISTRIBUTION if not scene.networks_only and scene.name != ORDINARY]
+
+
+@pytest.fixture(scope="module")
+def assets():
+    body = Body.load()
+    return Assets(body, {"tshirt": find_template("tshirt").tailor(body, vertices=200)}, {}, {})
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return make_motion("walk")
+
+
+@pytest.fixture(scope="module")
+def models(assets, walk, tmp_path_factory):
+    """Where a network with a random last layer lies."""
+    folder = tmp_path_factory.mktemp("models")
+    dressed = DressedBody(assets.body, assets.garments["tshirt"])
+    untrained_model("snug", dressed, [walk], seed=0).save(model_path(folder, "snug", 0))
+    return folder
+
+
+def built(assets, name):
+    return find_scene(name).at(SMOKE).build(assets)
+
+
+def motion_of(scene, walk):
+    options = {k: v for k, v in scene.options.items() if k not in ("change", "betas", "material")}
+    return out_of_distribution.CHANGES[scene.options["change"]](walk, **options)
+
+
+@pytest.mark.parametrize("scene", CASES, ids=lambda scene: scene.name)
+def test_a_hard_motion_starts_where_the_shirt_has_settled(scene, walk):
+    motion = motion_of(scene, walk)
+    assert 20 <= motion.frames <= 50 and motion.fps == walk.fps
+    assert np.array_equal(motion.translations[0], walk.translations[0])
+    assert scene.counterpart == ORDINARY
+    if "betas" in scene.options:
+        assert not motion.poses[0, 1:].any() and not scene.start_of  # in T-pose, in the shirt's rest shape
+    else:
+        assert motion.poses[0] == pytest.approx(walk.poses[0], abs=1e-12) and scene.start_of == ORDINARY
+
+
+def test_what_is_hard_about_each(walk):
+    made = {scene.name.partition("/")[2]: motion_of(scene, walk) for scene in CASES}
+    assert np.array_equal(made["walk_x4"].poses, walk.poses[::4])
+    plain, wrong = out_of_distribution.ordinary(walk), out_of_distribution.GLITCH
+    jump = made["root_glitch"].translations - plain.translations
+    assert np.flatnonzero(jump.any(axis=1)).tolist() == [wrong] and np.linalg.norm(jump) == pytest.approx(1.0)
+    flip = np.argwhere((made["limb_glitch"].poses != plain.poses).any(axis=2))
+    assert flip.tolist() == [[wrong, JOINT["left_shoulder"]]]
+    turned = [rotation_matrices(m.poses[wrong, JOINT["left_shoulder"]]) for m in (plain, made["limb_glitch"])]
+    assert np.trace(turned[0].T @ turned[1]) == pytest.approx(-1.0)  # half a turn
+    joints = joint_positions(made["splits"].poses, made["splits"].translations)[-1]
+    ankles = joints[JOINT["left_ankle"]] - joints[JOINT["right_ankle"]]
+    assert abs(ankles[0]) > 1.4  # [m] apart sideways: splits
+    joints = joint_positions(made["arms_crossed"].poses, made["arms_crossed"].translations)[-1]
+    wrists = joints[JOINT["left_wrist"]] - joints[JOINT["right_wrist"]]
+    assert wrists[0] < -0.1  # the left one is on the right
+
+
+def test_only_wrong_frames_are_recovered_from_and_a_small_body_is_refused(assets):
+    assert built(assets, "out_of_distribution/root_glitch").glitch == out_of_distribution.GLITCH
+    assert built(assets, "out_of_distribution/membrane_x10").glitch is None
+    shapeless = dataclasses.replace(assets, body=SimpleNamespace(shape_count=1))
+    with pytest.raises(ValueError, match="1 shapes"):
+        built(shapeless, "out_of_distribution/girth_+5")
+
+
+# --- what is measured --------------------------------------------------------------------------------------
+
+
+def trajectory_of(scene, positions, status="ok", reason=""):
+    return Trajectory(
+        positions=positions, faces=scene.cloth.faces, times=np.arange(len(positions)) * scene.dt,
+        frame_seconds=np.full(len(positions), np.nan), status=status, reason=reason, provenance={},
+        frame_fields={},
+    )  # fmt: skip
+
+
+def roll_outs(assets, models, name):
+    """Skinning and an untrained network in the scene, and in the ordinary walk."""
+    scene, plain = built(assets, name), built(assets, ORDINARY)
+
+    def positions(method, where):
+        made = find_method(method).make(models=models, seed=0)
+        made.prepare(where)
+        return made.run().positions
+
+    group = SceneRollOuts(scene)
+    for method in ("skinning", "snug"):
+        x, there = positions(method, scene), positions(method, plain)
+        entry = find_method(method)
+        group.roll_outs.append(RollOut(group, entry, trajectory_of(scene, x), suites=("extremes",)))
+        group.roll_outs[-1].counterpart = there
+    return {roll_out.entry.name: roll_out for roll_out in group.roll_outs}
+
+
+def test_a_glitch_is_forgotten_or_not(assets, models):
+    found = roll_outs(assets, models, "out_of_distribution/root_glitch")
+    free, net = (extrapolation.measure(found[name]) for name in ("skinning", "snug"))
+    assert set(free) == set(net) <= {metric.name for metric in extrapolation.METRICS}
+    assert [free[f"motion/recovery_{after}"] for after in (1, 10, 30)] == [0.0] * 3  # it has no memory
+    assert net["motion/recovery_1"] > net["motion/recovery_30"] > 0.0
+    assert free["motion/offset"] < 1e-3  # mm: its float32
+    assert free["motion/strain_ratio"] == pytest.approx(1.0)
+
+
+def test_distance_is_that_from_skinning(assets, models):
+    free = roll_outs(assets, models, "out_of_distribution/walk_x4")["skinning"]
+    moved = trajectory_of(free.scene, free.positions + np.array([0.001, 0.0, 0.0]))
+    other = RollOut(free.group, find_method("simulation"), moved)
+    free.group.roll_outs.append(other)
+    found = extrapolation.measure(other)
+    assert found["motion/offset"] == pytest.approx(1.0, abs=1e-3) and "motion/strain_ratio" not in found
+
+
+def test_another_material_judges_the_same_roll_out(assets, models):
+    found = roll_outs(assets, models, "out_of_distribution/membrane_x10")
+    free = extrapolation.measure(found["skinning"])
+    assert free["motion/strain_ratio"] == pytest.approx(10.0)
+    assert free["motion/total"] > free["motion/strain"] / 10
+    assert extrapolation.measure(found["snug"])["motion/total"] > 0
+
+
+def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
+    scene = built(assets, "out_of_distribution/girth_+5")
+    dressed, betas = DressedBody(assets.body, assets.garments["tshirt"]), scene.dressed.betas
+    assert betas.tolist()[:2] == [0.0, 5.0] and len(betas) == assets.body.shape_count
+    model = TrainedModel.load(model_path(models, "snug", 0))
+    by_hand = roll_out(model, dressed, scene.dressed.motion, betas).positions
+    for method in ("snug", "snug+cleanup", "skinning"):
+        made = find_method(method).make(models=models, seed=0)
+        made.prepare(scene)
+        x = made.run().positions
+        if method == "snug":
+            assert np.array_equal(x, by_hand)
+            still = roll_out(model, dressed, scene.dressed.motion, betas, quasi_static=True)
+            assert np.array_equal(made.quasi_static().positions, still.positions)
+        if method == "snug+cleanup":
+            clean = CleanUp(dressed.garment.rest_positions, dressed.body.shaped(), dressed.body.faces,
+                            scene.obstacle.positions)  # fmt: skip
+            assert np.array_equal(x, [clean(frame, number) for number, frame in enumerate(by_hand)])
+            assert not np.array_equal(x, by_hand)
+        depth = scene.obstacle.signed_distance(x[0], 0)
+        assert np.median(depth) > -0.01, method  # [m]: a shirt of the mean body would be inside this one
+    assert scene.start == pytest.approx(dressed.skinned(scene.dressed.motion, betas)[0], abs=0.05)
+
+
+# --- how it is judged --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method, far, expected", [
+    ("snug", 0.08, "ok"), ("snug", 0.7, "diverged"), ("simulation", 0.7, "ok"), ("snug", np.nan, "diverged"),
+])  # fmt: skip
+def test_a_network_whose_shirt_is_on_no_body_has_diverged(assets, models, tmp_path, method, far, expected):
+    """A simulated shirt may be where it likes: of a body that jumps by a metre it has to be left behind."""
+    free = roll_outs(assets, models, "out_of_distribution/walk_x4")["skinning"]
+    x = free.positions.copy()
+    x[3, 7, 0] += far
+    whole = bool(np.isfinite(far))
+    roll_out = RollOut(free.group, find_method(method), trajectory_of(free.scene, x), suites=("extremes",))
+    roll_out.counterpart = free.counterpart
+    free.group.roll_outs.append(roll_out)
+    values, _, ended = measured(roll_out, ("extrapolation",))
+    # Of what is not finite the cell says so itself, and keeps its own words.
+    own = ("ok", "") if whole else ("diverged", "not finite")
+    scene = find_scene("out_of_distribution/walk_x4").at(SMOKE)
+    cell = Cell(scene, find_method(method), 0, ("extremes",))
+    outcomes = {
+        ("cell", cell.name): Outcome(*own, result={"frames": 5}, files=("x",)),
+        ("metrics", cell.name): Outcome(*ended, result=values),
+    }
+    plan = Plan(
+        preset=SMOKE, suites=("extremes",), cells=(cell,), cases=(), seeds=(0,), device="cpu",
+        folder=tmp_path, command="",
+    )  # fmt: skip
+    rows = list(rows_of_cell(cell, Schedule(plan), outcomes))
+    assert {row.status for row in rows} == {expected} and len(rows) == len(values) >= 4
+    lost = "a vertex came 0.7 m away from the skinned shirt"
+    assert {row.reason for row in rows} == {own[1] or (lost if expected == "diverged" else "")}
+    assert not any(row.metric.startswith("cost/") for row in rows)  # nobody took its time
+
+
+# --- who takes part, and what is shared --------------------------------------------------------------------
+
+
+def cells(**words):
+    motions = Motions(("walk",), ("kick",), {})
+    preset = find_preset(words.pop("preset", "quick"))
+    return choose(Request(suites=("extremes",), preset=preset, motions=motions, **words))[0]
+
+
+def test_suite_extremes_trains_what_it_needs():
+    assert {cell.scene.name for cell in cells()} == set(FEW)
+    found = cells(full=True)
+    assert {cell.scene.name for cell in found} == {scene.name for scene in OUT_OF_DISTRIBUTION}
+    methods = {"simulation", "skinning", "snug", "supervised", "pbns", *CHEAP}
+    assert {cell.method for cell in found} == methods
+    alone = {cell.method for cell in found if cell.scene.name == "out_of_distribution/long"}
+    assert alone == {"snug", "supervised", "pbns"}
+    assert {cell.scene.name for cell in cells(preset="smoke")} == set(FEWEST)
+    assert {c.scene.name for c in cells(preset="smoke", scenes=("*splits",))} == {
+        "out_of_distribution/splits"
+    }
+
+
+def test_a_network_does_hard_motions_under_its_own_name_alone():
+    found = {cell.method for cell in cells(methods=("snug*", "pbns*", "tailornet", "untrained"))}
+    found -= set(CHEAP)  # a solver from its frame
+    batched = {entry.name for entry in METHODS if entry.batched}
+    assert found <= batched and {"snug", "pbns", "tailornet"} <= found
+    assert not any("+" in name for name in found)
+
+
+def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_path, monkeypatch):
+    found = cells(scenes=("*splits", "*girth_+5"), methods=("simulation",))
+    plan = Plan(
+        preset=SMOKE, suites=("extremes",), cells=found,
+        cases=(), seeds=(0,), device="cpu", folder=tmp_path, command="",
+    )  # fmt: skip
+    starts = {task.name: task for task in tasks_of(plan) if task.kind == "start"}
+    ordinary, splits = "out_of_distribution-ordinary", "out_of_distribution-splits"
+    assert list(starts) == [ordinary, splits, "out_of_distribution-girth_+5"]
+    assert starts[splits].needs == (("start", ordinary),) and not starts["out_of_distribution-girth_+5"].needs
+    settled = []
+    monkeypatch.setattr(
+        out_of_distribution, "settled", lambda cloth, *_: settled.append(cloth) or cloth.rest_positions + 1.0
+    )
+    context = Context(RunFolder(tmp_path), assets)
+    for task in starts.values():
+        task.run(context, {})
+    one, other, fitted = (np.load(context.folder.start_path(n.replace("-", "/", 1))) for n in starts)
+    assert len(settled) == 1 and np.array_equal(one, other) and not np.allclose(one, fitted)
+    areas = np.load(context.folder.rest_areas_path("out_of_distribution/ordinary"))
+    assert np.array_equal(areas, settled[0].areas)
+
+
+def test_cells_that_nobody_times_run_beside_others(tmp_path):
+    found = cells(scenes=("*walk_x4",))
+    plan = Plan(
+        preset=SMOKE, suites=("extremes",), cells=found, cases=(), seeds=(0,), device="cpu", folder=tmp_path,
+        command="",
+    )  # fmt: skip
+    tasks = [task for task in tasks_of(plan) if task.kind in ("cell", "batch", "repeat", "quasi-static")]
+    assert {task.kind for task in tasks} == {"cell"} and len(tasks) == len(found)
+    assert not any(task.process for task in tasks)

@@ -1,0 +1,312 @@
+"""Scenes: each declares what it has and no more, and what it does not declare is not loaded."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.assets.liveliest_part import clip, joint_speeds
+from benchmarks.methods import find_method
+from benchmarks.metrics.surface import body_shape
+from benchmarks.plan.plan import network_of
+from benchmarks.plan.selection import choose_suites
+from benchmarks.presets import PRESETS, find_preset
+from benchmarks.run import main
+from benchmarks.runner.cache import dependencies
+from benchmarks.runner.schedule import Schedule
+from benchmarks.scenes import FURTHER, GARMENT_SCENES, SCENES, all_scenes
+from benchmarks.scenes.free_fall import exact_fall
+from benchmarks.scenes.sheet import square_sheet
+from benchmarks.scenes.sheet_on_sphere import sphere
+from benchmarks.scenes.variations import SHAPES, shapes
+from reference_sim import simulate
+from snug.body.parametric_body import Body
+from snug.motion.library import make_motion
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene
+
+SMOKE = find_preset("smoke")
+TINY = dataclasses.replace(SMOKE, garment_vertices=300, frames=8)
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_small_scenes_build_alike_twice_and_declare_their_terms(scene):
+    first, second = scene.at(SMOKE).build(), scene.at(SMOKE).build()
+    assert np.array_equal(first.start, second.start) and first.frames == SMOKE.sheet_frames
+    assert first.terms[-1] == "inertia" and len(set(first.terms)) == len(first.terms)
+    assert (first.obstacle is not None) == ("collision" in first.terms)
+    assert first.dressed is None
+
+
+def test_the_terms_are_those_of_the_descriptions():
+    built = {scene.name: scene.at(SMOKE).build() for scene in SCENES}
+    assert built["hanging_sheet"].terms == ("strain", "bending", "gravity", "inertia")
+    assert built["sheet_on_sphere"].terms == ("strain", "bending", "gravity", "collision", "inertia")
+    assert built["free_fall"].terms == ("gravity", "inertia")
+    assert built["free_fall"].exact is not None
+
+
+def test_scene_names_are_unique_and_a_dressed_scene_needs_assets():
+    scenes = all_scenes(["walk", "run"], ["twist_stop"])
+    worn = sum(2 * (1 if garment.dynamic else 3) for garment in GARMENT_SCENES)  # whole, and as a clip
+    shaped = 1 + SHAPES  # the mean body and others
+    assert len(scenes) == len(SCENES) + worn + len(FURTHER) + shaped + 1  # one long
+    assert scenes["tshirt/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
+    assert scenes["tshirt/walk"].dressed and not scenes["flag"].dressed
+    with pytest.raises(ValueError, match="needs assets"):
+        dressed_scene("walk").build()
+
+
+def test_unseen_shapes_are_drawn_as_a_training_draws_them_and_once():
+    mean, *others = shapes("kick")
+    drawn = np.array([scene.options["betas"] for scene in others])
+    assert drawn.shape == (SHAPES, 10) and mean.options["betas"] == ()
+    assert 2.9 < np.abs(drawn).max() <= 3.0 and abs(drawn.mean()) < 3 * 3 / 360**0.5
+    assert drawn[0, 0] == pytest.approx(0.18975, abs=1e-5)  # nobody may draw until the numbers please
+    assert [scene.options for scene in shapes("punch", "tunic")] == [s.options for s in (mean, *others)]
+
+
+def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
+    assets = open_assets(TINY, embedded_motions(["punch"]), ["tshirt"])
+    garment, body = assets.garments["tshirt"], assets.body
+    built = {place: shapes("punch")[place].at(TINY).build(assets) for place in (0, 1)}
+    mean, other = built.values()
+    betas = np.array(shapes("punch")[1].options["betas"])
+    for of_rest in ("rest_positions", "Dm_inverse", "areas", "edge_lengths"):
+        assert np.array_equal(getattr(mean.cloth, of_rest), getattr(other.cloth, of_rest))
+        assert np.array_equal(getattr(other.cloth, of_rest), getattr(garment.cloth(), of_rest))
+    assert mean.dressed.betas is None and np.array_equal(other.dressed.betas, betas)
+    motion = other.dressed.motion
+    assert np.array_equal(other.obstacle.at(3), body.vertices(motion.poses, motion.translations, betas)[3])
+    assert other.origin_heights[2] == body.joints(betas)[0, 1] + motion.translations[2, 1]
+
+    starts = []
+
+    def simulated(cloth, energies, *, start, frames, obstacle, **rest):
+        starts.append((start, obstacle.at(0)))
+        return SimpleNamespace(frames=frames, positions=np.stack([start] * frames))
+
+    monkeypatch.setattr("benchmarks.scenes.dressed_body.simulate", simulated)
+    assert other.start.shape == (len(garment.rest_positions), 3)
+    unposed = body.vertices(np.zeros((1, 24, 3)), np.zeros((1, 3)), betas)[0]
+    for vertices, posed in starts[:1]:  # the way to the first pose begins in the T-pose, but for the root
+        apart = np.linalg.norm(vertices[:, None] - posed[None, ::9], axis=2).min(1)
+        wanted = garment.rest_for(body, betas)[:, None] - unposed[None, ::9]
+        assert apart == pytest.approx(np.linalg.norm(wanted, axis=2).min(1), abs=1e-9)
+
+
+def test_how_far_a_shape_is_from_the_mean_is_said_once():
+    def of(role, betas):
+        entry = SimpleNamespace(role=role)
+        scene = SimpleNamespace(dressed=SimpleNamespace(betas=betas))
+        return body_shape.measure(SimpleNamespace(entry=entry, scene=scene))
+
+    assert of("reference", np.array([3.0, 0.0, -4.0])) == {"body/shape": 5.0}
+    assert of("reference", None) == {"body/shape": 0.0} and of("network", None) == {}
+
+
+def test_shapes_are_asked_for_by_name_or_by_the_largest_preset():
+    def scenes(*words):
+        return [cell.scene.name for cell in planned("--methods", "simulation", *words).cells]
+
+    every = [scene.name for scene in shapes("kick")]
+    assert scenes("--suite", "shapes") == every and scenes("--scenes", "shapes/*") == every
+    assert not {*scenes(), *scenes("--suite", "garments")} & set(every)
+    assert set(every) <= set(scenes("--preset", "paper"))
+    cells = planned("--suite", "shapes", "--methods", "snug*").cells
+    assert {c.suites for c in cells} == {("shapes",)} and "snug-shapes" in {c.method for c in cells}
+
+
+def test_the_sheet_is_a_square_without_slivers():
+    positions, faces = square_sheet(9, 0.4)
+    corners = positions[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = normals[:, 1] / 2
+    assert areas.sum() == pytest.approx(0.16) and areas.min() > 0.2 * areas.mean()
+
+
+def test_the_sphere_is_closed_outward_and_round():
+    points, faces = sphere(0.2, 16)
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    corners = points[faces]
+    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    assert volume == pytest.approx(4 / 3 * np.pi * 0.2**3, rel=0.01)
+
+
+def test_the_exact_fall_obeys_backward_euler():
+    start, velocity, dt = np.array([[0.1, 2.0, 0.3]]), np.array([1.0, 2.0, 3.0]), 0.1
+    x = exact_fall(start, velocity, dt, 6)
+    v = np.diff(x[:, 0], axis=0) / dt
+    assert x[0] == pytest.approx(start)
+    assert np.diff(v, axis=0) == pytest.approx(np.tile([0, -9.81 * dt, 0], (4, 1)))
+    assert v[0] == pytest.approx(velocity - np.array([0, 9.81 * dt, 0]))
+
+
+def test_presets_grow():
+    sizes = [preset.garment_vertices for preset in PRESETS]
+    assert sizes == sorted(sizes) and [preset.name for preset in PRESETS] == ["smoke", "quick", "paper"]
+    assert (*choose_suites([]), "performance") == choose_suites(["all"])  # that one only where it is named
+
+
+TRAININGS = {"snug", "snug.recipes.recipe", "snug.recipes.named", "snug.recipes.deviations"}
+
+
+def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
+    out = tmp_path / "run"
+    words = ["--preset", "smoke", "--scenes", "hanging_sheet", "--methods", "simulation,newton-1"]
+    monkeypatch.setattr("benchmarks.runner.whole_run.RunLog.make_report", lambda self: True)
+    assert main([*words, "-o", str(out)]) == 0
+    for method in ("simulation", "newton-1"):
+        record = json.loads((out / "cache" / "cell" / "hanging_sheet" / f"{method}.json").read_text())
+        loaded = set(record["outcome"]["result"]["modules"])  # by the process of the cell
+        assert "reference_sim.energies.stretch_stvk" in loaded  # the list is not empty by mistake
+        # Names of trainings stand in the list of methods.
+        assert {name for name in loaded if name.startswith("snug")} <= TRAININGS
+        for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
+            assert name not in loaded, f"{name} was loaded"
+    text = (out / "results.csv").read_text()
+    assert "energy/strain" in text and "energy/collision" not in text and "penetration" not in text
+
+
+def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):
+    """And each scene is built with its own: the tunic is not the T-shirt."""
+    assets = open_assets(TINY, embedded_motions(["twist_stop"]), ["tunic"])
+    assert list(assets.garments) == ["tunic"]
+    built = dressed_scene("twist_stop", "tunic").build(assets)
+    assert built.dressed.garment.name == "tunic" and built.dressed.garment.parameters["flare"] > 0
+    assert len(built.cloth.rest_positions) == pytest.approx(300, abs=3)
+    with pytest.raises(KeyError):
+        dressed_scene("twist_stop").build(assets)
+
+
+def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes():
+    plan = planned("--scenes", "tunic/*,tshirt/kick", "--methods", "simulation,snug,snug-dynamic")
+    by_garment = {garment: plan.motions.train_of(garment) for garment in plan.garments}
+    assert set(by_garment) == {"tshirt", "tunic"} and "twist_1" in by_garment["tunic"]
+    assert not set(by_garment["tunic"]) & {*plan.motions.test_of("tunic"), *by_garment["tshirt"]}
+    assert {(n.name, n.garment) for n in plan.networks} == {
+        (name, garment) for name in ("snug", "snug-dynamic") for garment in by_garment
+    }
+    assert set(plan.simulated) == {"tshirt", "tunic"}  # snug-dynamic learns from simulations
+    keys = {key_of(Schedule(plan).network(network)) for network in plan.networks}
+    assert len(keys) == 4
+
+
+def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not():
+    plan = planned("--scenes", "tshirt/kick,hanging_sheet", "--methods", "simulation,skinning")
+    tasks = [t for cell in plan.cells for t in (Schedule(plan).cell(cell), Schedule(plan).metrics(cell))]
+    smoothed = {task.title for task in tasks if "snug/recipes/recipe.py" in dependencies(task)}
+    measured = {task.title for task in tasks if task.kind == "metrics"}
+    assert smoothed == measured | {task.title for task in tasks if task.cell.method == "skinning"}
+
+
+def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_networks():
+    assert planned().garments == ("tshirt",)
+    speed = planned("--suite", "speed")
+    skirts = [cell for cell in speed.cells if cell.scene.garment == "skirt"]
+    assert len({cell.method for cell in skirts}) >= 10
+    assert not any(find_method(cell.method).trained for cell in skirts if cell.entry.skip(cell.scene) is None)
+
+
+def test_suite_speed_has_clips_of_the_split():
+    for split, names in (
+        ("test", {"push_recovery", "dance_turn"}),
+        ("validation", {"sudden_stop", "spin_jump", "turning_stop"}),
+    ):
+        plan = planned("--suite", "speed", "--split", split)
+        assert {scene.motion for scene in plan.scenes if scene.garment == "tshirt"} == names
+        assert {plan.motions.role_of(scene.motion) for scene in plan.scenes if scene.dressed} == {split}
+
+
+def test_validation_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
+    plan = planned("--suite", "speed", "--split", "validation")
+    cells = [cell for cell in plan.cells if cell.scene.name == "tshirt/turning_stop@clip"]
+    assert {"simulation", "snug", "lbfgs-5"} <= {cell.method for cell in cells}
+    assert "turning_stop" in plan.motions_of("tshirt") and "turning_stop" not in plan.motions.train_of(
+        "tshirt"
+    )
+    body, whole = Body.load(), make_motion("turning_stop")
+    frames = clip(body, whole, plan.preset.clip_frames)
+    walk = whole.cut(frames.start, frames.stop)
+    assert joint_speeds(body, walk).min() > 0.5  # [m/s] it is over before the stop
+    pace = np.linalg.norm(np.ptp(walk.translations[:, [0, 2]], axis=0)) / walk.duration
+    assert 0.6 < pace < 1.6
+    for name in plan.motions.train_of("tshirt"):  # its strides are those of `walk`, its heading is nobody's
+        nearest = np.abs(walk.poses[:, None] - make_motion(name).poses).max(axis=(2, 3)).min(axis=1)
+        assert nearest.mean() > np.radians(10), name
+
+
+def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_path):
+    body = Body.load()
+    path, table = tmp_path / "tall.npz", np.stack([np.maximum(body.parents, 0), np.arange(24)])
+    arrays = {"v_template": body.template, "shapedirs": body.shape_directions, "f": body.faces}
+    arrays |= {"J_template": body.joint_template, "J_shapedirs": body.joint_directions}
+    tall = {key: 1.1 * array if key != "f" else array for key, array in arrays.items()}
+    np.savez(path, weights=body.skinning_weights, kintree_table=table, **tall)
+    plain, own = (planned("--suite", "garments", *more) for more in ((), ("--body", str(path))))
+    cell = next(cell for cell in own.cells if cell.method == "snug")
+    keys = [
+        (key_of(Schedule(plan).network(network_of(cell))), key_of(Schedule(plan).cell(cell)))
+        for plan in (plain, own)
+    ]
+    assert not set(keys[0]) & set(keys[1])
+    low, high = (open_assets(TINY, [make_motion("walk")], ["tshirt"], body=file) for file in (None, path))
+    heights = [np.ptp(assets.garments["tshirt"].rest_positions[:, 1]) for assets in (low, high)]
+    assert 1.05 < heights[1] / heights[0] < 1.15
+    scene = dressed_scene("walk").build(high)
+    assert scene.dressed is not None and scene.dressed.body is high.body
+
+
+def key_of(task) -> str:
+    """Equal where nothing that the task depends on has changed."""
+    return json.dumps(dependencies(task), sort_keys=True)
+
+
+def planned(*words):
+    from benchmarks.plan.make_plan import make_plan
+    from benchmarks.plan.options import make_parser
+
+    return make_plan(make_parser().parse_args(list(words)), words)
+
+
+def test_a_clip_is_the_liveliest_part_and_what_is_not_judged_before_it():
+    body, motion = Body.load(), make_motion("sudden_stop")
+    speed = joint_speeds(body, motion)
+    judged = clip(body, motion, 20)
+    sums = [speed[k : k + 19].sum() for k in range(len(speed) - 18)]
+    assert judged == range(np.argmax(sums), np.argmax(sums) + 20)
+    assert clip(body, motion, 20, 6) == range(judged.start - 6, judged.stop)
+    # Where it is liveliest at once, the liveliest part that has so much before it.
+    late = motion.cut(judged.start + 2, motion.frames)
+    frames = clip(body, late, 20, 6)
+    assert len(frames) == 26 and frames.start >= 0
+    assert clip(body, motion, 1000, 6) == range(motion.frames)
+    assert clip(body, motion, motion.frames - 2, 6) == range(motion.frames)
+
+
+def test_a_clip_goes_on_where_the_whole_motion_is():
+    """No jolt: its simulation and that of the whole motion are one until round-off has grown."""
+    preset = dataclasses.replace(SMOKE, frames=24, clip_frames=8, warm_up_frames=4, settle_frames=6)
+    assets = open_assets(preset, embedded_motions(["sudden_stop"]), ["tshirt"])
+    scenes = all_scenes(["sudden_stop"], [])
+    built = [scenes[f"tshirt/sudden_stop{part}"].at(preset).build(assets) for part in ("", "@clip")]
+    whole, part = (
+        simulate(
+            scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
+            start=scene.start, velocity=scene.start_velocity,
+        ).positions
+        for scene in built
+    )  # fmt: skip
+    frames = assets.clips["sudden_stop"]
+    assert frames.start > 0 and len(frames) == 12 and built[1].warm_up == 3  # at most a quarter
+    assert np.abs(whole[frames.start : frames.stop] - part).max() < 1e-8
+    assert np.abs(built[1].start_velocity).max() > 0.05
+    before, motion = built[1].dressed.before, built[1].dressed.motion
+    joined = before.followed_by(motion)
+    assert np.array_equal(joined.poses, assets.motions["sudden_stop"].poses[: frames.stop])
+    assert built[0].dressed.before is None

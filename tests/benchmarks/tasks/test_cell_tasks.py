@@ -1,0 +1,488 @@
+"""Cells: each in its own process, ended at a deadline, kept when finished, and taken up after a kill."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks import run
+from benchmarks.methods import find_method
+from benchmarks.methods.outside.program import program
+from benchmarks.plan.plan import Plan
+from benchmarks.presets import find_preset
+from benchmarks.results.run_folder import Row, RunFolder
+from benchmarks.rows import clock_costs, rows_of
+from benchmarks.runner import whole_run as execution
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.dry_run import describe
+from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.loop import NoLog, Runner
+from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.scenes import SCENES as DECLARED
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.tasks.task import Context, Outcome, failure
+
+ROOT = Path(__file__).resolve().parents[3]
+SCENES = {scene.name: scene for scene in DECLARED}
+TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1)
+
+
+def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", **changes) -> Plan:
+    """how: what the methods that are no simulation do instead of their work."""
+    preset = changes.get("preset", TINY)
+
+    def entry(name):
+        found = find_method(name)
+        wrong = {"module": "misbehaving", "options": {"how": how}, "batched": True, "gives_first_frame": True}
+        return dataclasses.replace(found, **wrong) if how and name != "simulation" else found
+
+    cells = tuple(Cell(SCENES[scene].at(preset), entry(name), 0, ("speed",)) for name in names)
+    values = {
+        "preset": preset, "suites": ("speed",), "cells": cells, "cases": (), "seeds": (0,), "device": "cpu",
+        "folder": folder, "command": "",
+    }  # fmt: skip
+    return Plan(**(values | changes))
+
+
+def finish(plan: Plan, *stages: str) -> Runner:
+    """All tasks of these stages, run or reused."""
+    tasks = [task for task in tasks_of(plan) if task.stage in (stages or ("cells",))]
+    runner = Runner(tasks, Cache(RunFolder(plan.folder), only=plan.only))
+    runner.run(LocalExecutor(RunFolder(plan.folder), None, 1), NoLog())
+    return runner
+
+
+def outcome_of(plan: Plan, number: int = 0) -> Outcome:
+    """Of one cell, its process ended."""
+    one = dataclasses.replace(plan, cells=plan.cells[number : number + 1])
+    return finish(one).outcomes["cell", plan.cells[number].name]
+
+
+def found_of(plan: Plan, kind: str = "cell", number: int = 0):
+    """What the folder says of a cell, or of its metrics."""
+    runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=plan.only))
+    return {task.id: found for task, found, _ in runner.preview()}[kind, plan.cells[number].name]
+
+
+def rows_of_cell(runner: Runner, plan: Plan) -> list[Row]:
+    return rows_of(plan, runner.tasks, runner.outcomes)
+
+
+# --- processes -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["still", "raise"])
+def test_a_cell_tells_the_bar_that_it_is_done(tmp_path, how):
+    plan, told = plan_of(tmp_path, "newton-1", how=how), []
+    task = Schedule(plan).cell(plan.cells[0])
+    task.run(Context(RunFolder(tmp_path), tell=told.append), {})
+    assert sum(told) == task.units
+
+
+def test_only_a_method_of_the_project_is_prepared_before_its_turn(tmp_path):
+    plan = plan_of(tmp_path, "newton-1", how="still")
+    own = dataclasses.replace(plan.cells[0].entry, declared_in="mine.py")
+    for entry, names in ((plan.cells[0].entry, {"scene", "ready"}), (own, set())):
+        context = Context(RunFolder(tmp_path))
+        cell = dataclasses.replace(plan.cells[0], entry=entry)
+        dataclasses.replace(Schedule(plan).cell(plan.cells[0]), cell=cell).begin(context)
+        assert set(context.memo) == names
+
+
+def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_path):
+    plan = plan_of(tmp_path, "simulation", scene="hanging_sheet")
+    outcome = outcome_of(plan)
+    result = outcome.result
+    assert (outcome.status, len(outcome.files), result["frames"]) == ("ok", 1, 3)
+    assert 0.0 < result["seconds"] < 10.0 and 50.0 < result["peak"] < 1000.0
+    assert result["terms"] == "strain+bending+gravity+inertia"
+    assert "reference_sim.energies.stretch_stvk" in result["modules"] and "numba" in result["modules"]
+    snug = {name for name in result["modules"] if name.startswith("snug")}
+    # Names of trainings, which the list of methods holds.
+    assert snug <= {"snug", "snug.recipes.recipe", "snug.recipes.named", "snug.recipes.deviations"}
+    for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
+        assert name not in result["modules"], f"{name} was loaded"
+    costs, remark = clock_costs(plan.cells[0], 1, {("cell", plan.cells[0].name): outcome})
+    frames = {"cost/frame_p50", "cost/frame_p95", "cost/frame_worst"}
+    assert set(costs) == {"cost/frame", "cost/whole", "cost/peak"} | frames and remark == ""
+    assert costs["cost/frame"] == costs["cost/whole"] == pytest.approx(1e3 * result["seconds"] / 3)
+    assert costs["cost/frame_p50"] <= costs["cost/frame_p95"] <= costs["cost/frame_worst"]
+    assert result["runs"] > 1 or result["seconds"] > TINY.least_seconds
+
+
+@pytest.mark.parametrize("scene", ["hanging_sheet", "sheet_on_sphere"])
+def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
+    """Modules that the process loaded are among the source that its entry in the cache is known by."""
+    from benchmarks.runner.cache import dependencies
+
+    plan = plan_of(tmp_path, "newton-1", scene=scene)
+    loaded = outcome_of(plan).result["modules"]
+    known = dependencies(next(task for task in tasks_of(plan) if task.kind == "cell"))
+    files = {
+        name: name.replace(".", "/") for name in loaded if name.split(".")[0] in ("reference_sim", "snug")
+    }
+    for name in (
+        "snug.recipes.recipe",
+        "snug.recipes.named",
+        "snug.recipes.deviations",
+    ):  # names of trainings, in the list of methods
+        files.pop(name, None)
+    missing = [n for n, stem in files.items() if f"{stem}.py" not in known and not (ROOT / stem).is_dir()]
+    assert missing == [] and len(files) > 10
+
+
+@pytest.mark.parametrize(
+    ("how", "status", "word"),
+    [
+        ("raise", "failed", "RuntimeError: broken on purpose"),
+        ("segfault", "failed", "SIGSEGV"),
+        ("killed", "out-of-memory", "SIGKILL"),
+        ("hungry", "out-of-memory", "no room"),
+        ("early", "failed", "its time cannot be believed"),
+        ("unheld", "failed", "OSError: no room left"),
+        ("late", "failed", "run() gives positions float64 (5, 16, 3): floats (4, 16, 3) are due"),
+        ("narrow", "failed", "run() gives positions float64 (4, 15, 3): floats (4, 16, 3) are due"),
+        ("astray", "failed", "quasi_static() gives positions float64 (4, 2, 3)"),
+    ],
+)
+def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path):
+    plan = plan_of(tmp_path, "newton-1", how=how)
+    runner = finish(plan, "cells", "metrics")
+    outcome = runner.outcomes["cell", plan.cells[0].name]
+    assert outcome.status == status and word in outcome.reason and outcome.failed and not outcome.files
+    (row,) = rows_of_cell(runner, plan)
+    assert (row.status, row.value) == (status, None) and not list(tmp_path.rglob("*.vtkhdf"))
+    found = found_of(plan)
+    assert (found.state, found.wanted) == ("failed", False) and word in found.why
+
+
+def test_a_cell_that_hangs_is_ended_with_all_that_it_has_started(tmp_path):
+    plan = plan_of(tmp_path, "newton-1", how="hang", preset=dataclasses.replace(TINY, cell_seconds=4.0))
+    outcome = outcome_of(plan)
+    assert outcome.status == "timeout" and "4 s" in outcome.reason
+    assert of_session(os.getsid(0), "time.sleep(60)") == []
+
+
+LEAVING = """
+import subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+open(sys.argv[3], "w").write(str(child.pid))
+time.sleep(60)
+"""
+LOOKING = """
+import pathlib, sys
+stat = pathlib.Path("/proc", open(sys.argv[3]).read(), "stat")
+sys.exit("it runs on" if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] != "Z" else "gone")
+"""
+
+
+def test_what_a_program_has_started_ends_with_it_before_the_next_cell(tmp_path):
+    cells = []
+    for name, text, seconds in (("leaving", LEAVING, 3.0), ("looking", LOOKING, 60.0)):
+        script = tmp_path / f"{name}.py"
+        script.write_text(text)
+        command = f"{sys.executable} -I {script} {{scene}} {{out}} {tmp_path / 'pid'}"
+        entry = program(name, command, seconds=seconds)
+        cells.append(Cell(SCENES["free_fall"].at(TINY), entry, 0, ("garments",)))
+    runner = finish(
+        plan_of(tmp_path / "run", cells=tuple(cells), suites=("garments",)), "cells that are not timed"
+    )
+    first, second = (runner.outcomes["cell", cell.name] for cell in cells)
+    assert first.status == "timeout" and second.reason.endswith("gone")
+
+
+def of_session(session: int, word: str = "") -> list[int]:
+    """Processes of a session that have this word in their command line and are no zombies."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            state, _, _, its_session = (path / "stat").read_text().rpartition(")")[2].split()[:4]
+            line = (path / "cmdline").read_text()
+        except OSError:
+            continue  # it has just ended
+        if int(its_session) == session and state != "Z" and word in line:
+            found.append(int(path.name))
+    return found
+
+
+def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_path):
+    plan = plan_of(tmp_path / "greedy", "newton-1", how="greedy")
+    runner = finish(plan)
+    name = plan.cells[0].name
+    greedy = runner.outcomes["cell", name]
+    assert greedy.status == "ok" and greedy.result["peak"] < 300.0
+    assert runner.outcomes["batch", name].result["seconds"] > 0.0
+    plan = plan_of(tmp_path / "crowded", "newton-1", how="crowded")
+    (row,) = rows_of_cell(finish(plan, "cells", "metrics"), plan)
+    assert row.status == "failed" and "many at once" in row.reason and row.value is None
+    assert "cannot be believed" in row.reason
+
+
+@pytest.mark.parametrize(
+    ("how", "words"), [("crammed", ("out-of-memory", "SIGKILL")), ("torn", ("failed", "no two bodies"))]
+)
+def test_what_a_cell_has_run_stands_where_many_go_wrong(how, words, tmp_path):
+    plan = plan_of(tmp_path, "newton-1", how=how)
+    runner = finish(plan, "cells", "metrics")
+    outcome = runner.outcomes["cell", plan.cells[0].name]
+    assert (outcome.status, outcome.failed) == ("ok", False)
+    rows = {row.metric: row for row in rows_of_cell(runner, plan)}
+    assert rows["cost/frame"].status == "ok" and "cost/batch" not in rows
+    reason = rows["cost/frame"].reason
+    assert f"many at once: {words[0]}" in reason and words[1] in reason
+    assert RunFolder(tmp_path).trajectory_path("free_fall", "newton-1").is_file()
+    again = finish(plan, "cells", "metrics")
+    assert {row.metric: row for row in rows_of_cell(again, plan)}.keys() == rows.keys()
+    assert again.outcomes["cell", plan.cells[0].name].result == outcome.result
+
+
+def test_torch_says_in_a_plain_error_that_there_is_no_room():
+    said = "[enforce fail at alloc_cpu.cpp:117] err == 0. DefaultCPUAllocator: can't allocate memory"
+    assert failure(RuntimeError(said)).status == "out-of-memory"
+    assert failure(RuntimeError("no such memory")).status == "failed"
+
+
+# --- reuse -----------------------------------------------------------------------------------------------
+
+
+def plain(outcome: Outcome) -> tuple:
+    return outcome.status, outcome.reason, outcome.files, dict(outcome.result)
+
+
+def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path):
+    plan = plan_of(tmp_path, "simulation")
+    first = outcome_of(plan)
+    again = finish(plan)
+    assert plain(again.outcomes["cell", plan.cells[0].name]) == plain(first)
+    assert again.reused == [f"cell {plan.cells[0].label}"]
+
+    finer = plan_of(tmp_path, "simulation", preset=dataclasses.replace(TINY, sheet_cells=4))
+    found = found_of(finer)
+    assert (found.state, found.why, found.wanted) == ("stale", "scene", True)
+    kept = finish(dataclasses.replace(finer, only=frozenset({"missing"})))
+    outcome = kept.outcomes["cell", plan.cells[0].name]
+    assert plain(outcome) == plain(first) and outcome.remark == "kept though scene changed"
+    assert kept.outdated() == {f"cell {plan.cells[0].label}": "kept though scene changed"}
+
+    elsewhere = plan_of(
+        tmp_path, "simulation", preset=dataclasses.replace(TINY, garment_vertices=99, gap_samples=9)
+    )
+    assert plain(outcome_of(elsewhere)) == plain(first)
+
+    RunFolder(tmp_path).trajectory_path("free_fall", "simulation").unlink()
+    assert found_of(plan).state == "missing"
+    gone = finish(dataclasses.replace(plan, only=frozenset({"failed"})))
+    left_out = gone.outcomes["cell", plan.cells[0].name]
+    assert (left_out.status, left_out.files, gone.reused) == ("skipped", (), [])
+    assert "left out" in describe(dataclasses.replace(plan, only=frozenset({"failed"})))
+
+
+def test_a_trajectory_that_was_changed_is_found_out(tmp_path):
+    import h5py
+
+    plan = plan_of(tmp_path, "simulation", "newton-1")
+    finish(plan, "cells", "metrics")
+    assert found_of(plan).state == "finished" and found_of(plan, "metrics", 1).state == "finished"
+    path = RunFolder(tmp_path).trajectory_path("free_fall", "simulation")
+    with h5py.File(path, "r+") as file:
+        file["VTKHDF/Points"][0, 0] += 1e-9
+    assert found_of(plan).why == "trajectories/free_fall/simulation.vtkhdf is damaged"
+    assert found_of(plan, "metrics", 1).state == "stale"  # it was compared with what is no more
+    path.write_bytes(path.read_bytes()[:2000])
+    assert found_of(plan).state == "missing"
+    runner = finish(plan, "cells", "metrics")
+    assert len(runner.reused) == 1 and found_of(plan).state == "finished"  # newton-1 alone was sound
+
+
+def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path):
+    plan = plan_of(tmp_path, "simulation", "newton-1", "newton-4")
+    folder = RunFolder(tmp_path)
+
+    def measured() -> list[str]:
+        """Methods whose metrics are there."""
+        return [
+            c.method for k, c in enumerate(plan.cells) if found_of(plan, "metrics", k).state == "finished"
+        ]
+
+    def after(number: int) -> list[str]:
+        finish(plan, "cells", "metrics")
+        assert len(measured()) == 3
+        folder.trajectory_path("free_fall", plan.cells[number].method).unlink(missing_ok=True)
+        folder.quasi_static_path("free_fall", plan.cells[number].method).touch()
+        outcome_of(plan, number)
+        assert not folder.quasi_static_path("free_fall", plan.cells[number].method).exists()
+        return measured()
+
+    assert after(1) == ["simulation", "newton-4"]
+    assert after(0) == []  # the others are compared with it
+    outcome_of(plan_of(tmp_path, "simulation", "newton-1", how="raise"), 1)
+    assert not folder.trajectory_path("free_fall", "newton-1").exists()
+
+
+def test_only_what_is_asked_for_is_done(tmp_path):
+    plan = plan_of(tmp_path, "newton-1", "newton-4", how="raise")
+    assert outcome_of(plan).status == "failed"
+    retry = plan_of(tmp_path, "newton-1", "newton-4", how="still", only=frozenset({"failed"}))
+    left_out = outcome_of(retry, 1)
+    assert left_out.status == "skipped" and "--only" in left_out.reason
+
+
+def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):
+    names = ("simulation", "newton-1", "newton-4")
+    preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=60.0)
+    plan = plan_of(tmp_path, *names, preset=preset, how="still")
+    order, alone = [], LocalExecutor.alone
+
+    def watched(self, task, needed):
+        order.append((task.kind, task.cell.method))
+        return alone(self, task, needed)
+
+    monkeypatch.setattr(LocalExecutor, "alone", watched)
+    runner = finish(plan)
+    repeats = [method for kind, method in order if kind == "repeat"]
+    assert repeats[:3] == ["newton-1", "newton-4", "simulation"]
+    assert repeats[3:] == ["newton-4", "simulation", "newton-1"]
+    cell = plan.cells[0]
+    seconds = [runner.outcomes["cell", cell.name].result["seconds"]]
+    seconds += [runner.outcomes["repeat", f"{cell.name}-{n}"].result["seconds"] for n in (1, 2)]
+    costs, _ = clock_costs(cell, 3, runner.outcomes)
+    assert costs["cost/frame"] == pytest.approx(1e3 * sorted(seconds)[1] / 3)
+    assert costs["cost/spread"] > 0.0
+    order.clear()
+    again = finish(plan)
+    assert order == [] and clock_costs(cell, 3, again.outcomes)[0] == costs
+
+
+def test_a_process_ends_when_none_of_its_cells_repeats_will_come(tmp_path, monkeypatch):
+    preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=0.0)
+    plan = plan_of(tmp_path, "simulation", "newton-1", preset=preset)
+    order = []
+    for name in ("alone", "release"):
+        inner = getattr(LocalExecutor, name)
+
+        def watched(self, first, *rest, name=name, inner=inner):
+            order.append((name, getattr(first, "process", first)))
+            return inner(self, first, *rest)
+
+        monkeypatch.setattr(LocalExecutor, name, watched)
+    finish(plan)
+    names = [cell.name for cell in plan.cells]
+    assert order[:2] == [("alone", names[0]), ("release", names[0])]
+    assert order[2:4] == [("alone", names[1]), ("release", names[1])]
+
+
+def test_a_repeat_that_fails_is_said_on_the_rows(tmp_path):
+    plan = plan_of(tmp_path, "newton-1", preset=dataclasses.replace(TINY, repeats=2, repeat_seconds=60.0))
+    runner = finish(plan, "cells", "metrics")
+    name = f"{plan.cells[0].name}-1"
+    crowd = Outcome("failed", "more than one thread", result={"seconds": 0.1})
+    rows = rows_of(plan, runner.tasks, runner.outcomes | {("repeat", name): crowd})
+    assert {row.reason for row in rows} == {"repeat 1: failed: more than one thread"}
+    assert {row.status for row in rows} == {"ok"} and "cost/spread" not in {row.metric for row in rows}
+
+
+def test_repeats_that_lie_apart_carry_a_remark(tmp_path):
+    plan = plan_of(tmp_path, "simulation", preset=dataclasses.replace(TINY, repeats=2))
+    name = plan.cells[0].name
+
+    def reasons(*seconds: float) -> dict[str, str]:
+        first = {"seconds": seconds[0], "frames": 1, "peak": 1.0}
+        outcomes = {
+            ("cell", name): Outcome(result=first, files=("x",)), ("metrics", name): Outcome(),
+            ("repeat", f"{name}-1"): Outcome(result={"seconds": seconds[1]}),
+        }  # fmt: skip
+        return {row.metric: row.reason for row in rows_of(plan, (), outcomes)}
+
+    wide, near = reasons(1.0, 1.5), reasons(1.0, 1.1)
+    assert "20 %" in wide["cost/spread"] and wide["cost/frame"] == ""
+    assert near["cost/spread"] == ""
+
+
+def test_a_dry_run_tells_what_is_there(tmp_path):
+    plan = plan_of(tmp_path / "run", "simulation", "newton-1", "skinning")
+    assert "4 tasks to run; 0 cached" in describe(plan) and not plan.folder.exists()
+    outcome_of(plan)
+    words = describe(plan)
+    assert "cell free_fall x simulation: cached" in words
+    assert "metrics free_fall x simulation: run (missing)" in words
+    assert "cell free_fall x newton-1: run (missing)" in words and "cell free_fall x skinning: skip" in words
+    assert "3 tasks to run; 1 cached" in words
+    longer = dataclasses.replace(TINY, sheet_frames=5)
+    stale = describe(plan_of(plan.folder, "simulation", "newton-1", preset=longer))
+    assert "cell free_fall x simulation: run (stale: scene), " in stale and "s last time" in stale
+    assert "4 tasks to run" in describe(dataclasses.replace(plan, fresh=True))
+
+
+# --- a kill ----------------------------------------------------------------------------------------------
+
+
+HANGING = """
+import time
+from benchmarks.process.isolated_process import IsolatedProcess
+if __name__ == "__main__":
+    with IsolatedProcess() as process:
+        process.call(print, "begun", seconds=60)
+        process.call(time.sleep, 60, seconds=60)
+"""
+
+
+def test_a_process_ends_when_its_parent_was_killed(tmp_path):
+    (tmp_path / "hanging.py").write_text(HANGING)
+    parent = subprocess.Popen(
+        [sys.executable, tmp_path / "hanging.py"],
+        env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    assert parent.stdout is not None and parent.stdout.readline() == b"begun\n"
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+    deadline = time.monotonic() + 30
+    while of_session(parent.pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
+    out = tmp_path / "run"
+    words = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall", "-o", str(out)]
+    words += ["--methods", "simulation,newton-1,newton-4"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "benchmarks.run", *words],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    entry = out / "cache" / "cell" / "free_fall" / "simulation.json"
+    deadline = time.monotonic() + 60
+    while not entry.is_file():
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    while of_session(process.pid):  # its cells end by themselves
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    before = entry.read_bytes()
+
+    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    assert run.main(words) == 0
+    assert entry.read_bytes() == before
+    first = RunFolder(out).read_rows()
+    assert {row.method for row in first} == {"simulation", "newton-1", "newton-4"}
+    assert run.main(words) == 0
+    assert RunFolder(out).read_rows() == first
+    config = RunFolder(out).read_config()
+    assert len(config["earlier"]) == 2 and config["clock"]["threads"] == 1
+    assert not [path for path in out.rglob("*") if "part" in path.name]

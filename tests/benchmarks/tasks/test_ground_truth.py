@@ -1,0 +1,213 @@
+"""Mixed clips are simulated once, like motions, and taught to every network that asks for them."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+
+import numpy as np
+import pytest
+
+from benchmarks.methods import METHODS, find_method
+from benchmarks.plan.plan import Motions, Network
+from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.tasks import ground_truth
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.tasks.ground_truth import SimulateClips, SimulateQuasiStatic
+from benchmarks.tasks.training import LONGEST, TrainNetwork
+from reference_sim import Trajectory, simulate
+from reference_sim.files.array_file import read_arrays
+from snug.recipes.named import TRAININGS, Simulated
+from snug.recipes.recipe import DEFAULT
+from snug.training.motion_augmentation import FRAMES, mixed_for, shared_clips
+from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene, training
+from tests.benchmarks.tasks.test_cell_tasks import plan_of
+from tests.snug.training.dressing import swaying, tube_dress
+
+MOTION = swaying(90)
+
+
+def clips_of(part: int, method: str = "simulation") -> SimulateClips:
+    return SimulateClips(
+        name=str(part), label="", inputs={}, modules=(), scene=dressed_scene(MOTION.name),
+        entry=find_method(method), motions=(MOTION.name,), clips="tshirt/mixed", part=part,
+    )  # fmt: skip
+
+
+def still(clip, entry) -> Trajectory:
+    """What a simulation of this clip may leave."""
+    positions = np.full((clip.frames, 150, 3), float(clip.name.split("_")[1]))
+    faces = tube_dress().garment.faces
+    return Trajectory(positions, faces, np.arange(clip.frames) / 30.0, status="converged")
+
+
+@pytest.fixture
+def quickly(monkeypatch):
+    """Clips that cost nothing: name -> how it ends otherwise; those that were asked for."""
+    odd, asked = {}, []
+
+    def simulated(scene, entry, folder):
+        clip = scene.dressed.motion
+        asked.append(clip.name)
+        return odd.get(clip.name, still)(clip, entry)
+
+    monkeypatch.setattr(ground_truth, "simulated", simulated)
+    return odd, asked
+
+
+def test_fewer_shared_clips_are_the_first_of_more_and_those_of_snugs_seed_0():
+    three, one = (shared_clips([MOTION], share, vertices=150) for share in (3, 1))
+    assert [len(three), len(one)] == [round(3 * 90 / FRAMES), round(90 / FRAMES)]
+    own = mixed_for([MOTION], dataclasses.replace(DEFAULT, mixed=3.0), vertices=150, seed=0)
+    assert all(np.array_equal(a.poses, b.poses) for a, b in zip(one, three))
+    assert all(np.array_equal(a.poses, b.poses) for a, b in zip(own, three, strict=True))
+    assert shared_clips([MOTION], 0, vertices=150) == []
+
+
+def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, quickly):
+    odd, asked = quickly
+
+    def ended(clip, entry):
+        return dataclasses.replace(still(clip, entry), status="stalled", reason="stuck")
+
+    def refused(clip, entry):
+        raise RuntimeError("no room")
+
+    def halved(clip, entry):
+        whole = still(clip, entry)
+        return dataclasses.replace(whole, positions=whole.positions[:9], times=whole.times[:9])
+
+    odd |= {"mixed_0": ended, "mixed_2": refused, "mixed_3": halved}
+    assets = assets_of(tube_dress(), MOTION)
+    outcomes = [clips_of(part).run(context(tmp_path, assets), {}) for part in range(4)]
+    assert asked == [clip.name for clip in shared_clips([MOTION], 4, vertices=150)]
+    assert [o.result["clips"] for o in outcomes] == [["mixed_1"], [], [], ["mixed_4", "mixed_5"]]
+    left_out = {name: why for o in outcomes for name, why in o.result["left_out"].items()}
+    assert left_out == {"mixed_0": "stalled: stuck", "mixed_2": "no room", "mixed_3": "converged: "}
+    kept = read_arrays(tmp_path / outcomes[0].files[0])
+    assert kept.keys() == {"mixed_1"} and kept["mixed_1"].dtype == np.float32
+    truncated = clips_of(0, "fast-lbfgs-10").run(context(tmp_path, assets), {})
+    assert truncated.result["clips"] == ["mixed_0", "mixed_1"]  # it is stopped on purpose
+
+
+def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
+    assets = assets_of(tube_dress(), MOTION)
+    clip, *_ = shared_clips([MOTION], 1, vertices=150)
+    outcome = clips_of(0, "lbfgs-5").run(context(tmp_path, assets), {})
+    scene = dressed_scene(clip.name).build(assets_of(tube_dress(), clip))
+    own = simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
+        start=scene.start, method="lbfgs", max_iterations=5, finish=False,
+    )  # fmt: skip
+    found = read_arrays(tmp_path / outcome.files[0])[clip.name]
+    assert np.array_equal(found, own.positions.astype(np.float32)) and len(found) == FRAMES
+
+
+def test_poses_held_still_say_how_many_of_them_did_not_converge(tmp_path, monkeypatch):
+    import reference_sim
+
+    scene, assets = dressed_scene(MOTION.name), assets_of(tube_dress(), MOTION)
+    task = SimulateQuasiStatic(name="still", label="", inputs={}, modules=(), scene=scene)
+    worn = dataclasses.replace(scene.build(assets), frames=5)
+    assert worn.start.shape  # it has come to rest
+    monkeypatch.setattr(ground_truth, "built", lambda *_: worn)
+    monkeypatch.setattr(reference_sim, "simulate", partial(simulate, max_iterations=1))
+    outcome = task.run(context(tmp_path, assets), {})
+    assert outcome.status == "ok"
+    assert outcome.result == {"status": "max_iterations", "frames_not_converged": 4}
+
+
+def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(tmp_path, quickly):
+    odd, _ = quickly
+    odd["mixed_1"] = lambda clip, entry: dataclasses.replace(still(clip, entry), status="stalled")
+    assets = assets_of(tube_dress(), MOTION)
+    clips = {("clips", str(part)): clips_of(part).run(context(tmp_path, assets), {}) for part in range(2)}
+    given = still(dataclasses.replace(MOTION, name="sway_9"), None)
+    path = tmp_path / "given.vtkhdf"
+    given.save(path)
+    done = ground_truth.Outcome(result={"whole": True}, files=(path.name,))
+    task = dataclasses.replace(training("supervised", MOTION.name, steps=1), clips=tuple(clips))
+    result = task.run(context(tmp_path, assets), {("data", MOTION.name): done, **clips}).result
+    assert result["frames"] == 90 + 2 * FRAMES
+    assert result["clips_left_out"] == 1 and result["left_out"] == []
+    lost = task.run(context(tmp_path, assets), {("data", MOTION.name): done}).result
+    assert lost["frames"] == 90
+    called = dataclasses.replace(MOTION, name="mixed_0")
+    task = dataclasses.replace(training("supervised", "mixed_0", steps=1), clips=tuple(clips))
+    needed = {("data", "mixed_0"): done, **clips}
+    with pytest.raises(ValueError, match=r"mixed_0.*rename"):
+        task.run(context(tmp_path, assets_of(tube_dress(), called)), needed)
+
+
+def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatch):
+    mine = dataclasses.replace(TRAININGS["tailornet"], simulated=Simulated(mixed=2, method="fast-lbfgs-10"))
+    monkeypatch.setitem(TRAININGS, "tailornet", mine)
+    more = dataclasses.replace(TRAININGS["supervised"], simulated=Simulated(mixed=3))
+    monkeypatch.setitem(TRAININGS, "supervised", more)
+    scene, names = dressed_scene("kick"), ("supervised", "santesteban2019", "tailornet", "snug")
+    cells = tuple(Cell(scene, find_method(name), seed, ("garments",)) for name in names for seed in (0, 1))
+    plan = plan_of(tmp_path, motions=Motions(train=("walk", "run"), test=("kick",)), cells=cells)
+    tasks = [task for task in tasks_of(plan) if task.stage == "ground truth"]
+    labels = [task.label for task in tasks]
+    assert len(labels) == len(set(labels)) == len({task.id for task in tasks}) == 1 + 2 + 3 + 2 + 2
+    assert "tshirt/walk" in labels and "tshirt/walk by fast-lbfgs-10" in labels
+
+    def read(name):
+        return {id[0]: id[1] for id in Schedule(plan).network(Network(name, 0, "tshirt")).reads}
+
+    assert read("tailornet")["clips"] == "tshirt-mixed-2/fast-lbfgs-10-1"
+    assert read("supervised")["clips"] == "tshirt-mixed-2/simulation-2" and read("snug") == {}
+    assert "clips" not in read("santesteban2019")
+
+
+BLOCK = [entry for entry in METHODS if entry.training is not None]
+
+
+def test_the_block_of_equal_data_gives_all_networks_the_same_frames_and_steps(tmp_path):
+    """Motions, mixed frames and steps of each training are what it declares; clean-up trains nothing anew."""
+    scene = dressed_scene("kick")
+    cells = tuple(Cell(scene, entry, 0, ("garments",)) for entry in BLOCK)
+    plan = plan_of(tmp_path, motions=Motions(train=("walk", "run", "bow"), test=("kick",)), cells=cells)
+    tasks = {task.training: task for task in tasks_of(plan) if isinstance(task, TrainNetwork)}
+    assert len(BLOCK) == 44 and len(tasks) == 24
+    for entry in BLOCK:
+        task, training = tasks[entry.trained], entry.training
+        mixed = training.simulated.mixed if training.simulated else training.recipe.mixed
+        assert mixed == entry.level and len(task.clips) == (mixed if training.simulated else 0)
+        assert task.motions == ("walk", "run")
+        assert task.steps == plan.preset.steps["snug"] * (LONGEST if training.converged else 1)
+        assert task.held_out == (("bow",) if training.converged else ())
+        assert (training.simulated is None) == (TRAININGS[training.kind].simulated is None)
+        usual = TRAININGS[training.kind].recipe
+        assert dataclasses.replace(training.recipe, mixed=usual.mixed, name=usual.name) == usual
+    families = {entry.family for entry in BLOCK}
+    assert len({(entry.family, entry.level) for entry in BLOCK}) == len(BLOCK) and len(families) == 20
+    alone = dataclasses.replace(plan, motions=Motions(train=("walk",), test=("kick",)))
+    network = Network("snug", 0, "tshirt", find_method("snug-data-converged-0").training)
+    task = Schedule(alone).network(network)  # a single motion cannot be held out
+    assert task.motions == ("walk",) and task.held_out == () and task.chosen.converged
+
+
+@pytest.mark.parametrize("kind", ["snug", "tailornet"])
+def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monkeypatch, kind):
+    entry = find_method(f"{kind}-data-converged-0")
+    held = dataclasses.replace(swaying(20, degrees=30.0), name="held")
+    motion = dataclasses.replace(swaying(30), name="given")
+    assets = assets_of(tube_dress(), motion)
+    assets = dataclasses.replace(assets, motions={"given": motion, "held": held})
+    needed = {}
+    for clip in (motion, held):
+        path = tmp_path / f"{clip.name}.vtkhdf"
+        still(dataclasses.replace(clip, name="still_1"), None).save(path)
+        needed["data", clip.name] = ground_truth.Outcome(result={"whole": True}, files=(path.name,))
+    task = dataclasses.replace(
+        training("supervised", "given", steps=200), chosen=entry.training, training=entry.trained,
+        held_out=("held",), simulated={id[1]: id for id in needed} if kind == "tailornet" else {},
+    )  # fmt: skip
+    values = iter([5.0, 3.0, *[4.0] * 200])
+    monkeypatch.setattr("snug.training.validation.Validator.value", lambda self: next(values))
+    result = task.run(context(tmp_path, assets), needed).result
+    # Of 200 steps: a validation after each second, no better than the second one 25 times.
+    assert result["steps"] == 2 * (2 + 25) and result["validation"]["best_step"] == 4
+    assert result["validation"]["motions"] == ["held"] and result["frames"] == 30
+    assert result["left_out"] == []

@@ -1,0 +1,276 @@
+"""The check of the contract: each breach is named with its remedy, and what keeps it passes."""
+
+from __future__ import annotations
+
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+from benchmarks import check
+from benchmarks.contract.check_method import CheckMethod
+from benchmarks.contract.check_scene import check_derivatives
+from benchmarks.contract.findings import Findings
+from benchmarks.method import Method, MethodEntry
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.tasks.cell_task import Cell
+from benchmarks.tasks.task import Context
+from benchmarks.validation.loads import DeadLoad
+from reference_sim import Trajectory
+from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE, SCENE_FILE, TINY, as_before
+from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene
+
+_as_before = pytest.fixture(autouse=True)(as_before)
+
+
+class Still(Method):
+    """Does no physics and keeps the contract; each breach below changes one thing."""
+
+    seed = 0
+
+    def prepare(self, scene):
+        self.scene = scene
+
+    def positions(self):
+        return np.repeat(np.array(self.scene.start)[None], self.scene.frames, axis=0)
+
+    def run(self):
+        times = np.arange(self.scene.frames) * self.scene.dt
+        return Trajectory(self.positions(), self.scene.cloth.faces, times, status="ok")
+
+
+def breach(name):
+    """A method that does one thing wrong."""
+
+    def shaped(self):
+        return Still.positions(self)[:, :-1]
+
+    def nan(self):
+        positions = Still.positions(self)
+        positions[-1, 0] = np.nan
+        return positions
+
+    def off(self):
+        positions = Still.positions(self)
+        positions[0] += 1e-3
+        return positions
+
+    def slipping(self):
+        positions = Still.positions(self)
+        positions[3] += 1e-3
+        return positions
+
+    def random(self):
+        positions = Still.positions(self)
+        positions[2:, -1] += np.random.default_rng().random(3)
+        return positions
+
+    def seeded(self):
+        positions = Still.positions(self)
+        positions[2:, -1] += self.seed
+        return positions
+
+    def kept(self):
+        if not hasattr(self, "result"):
+            self.result = Still.positions(self)
+        return self.result
+
+    def alters(self):
+        positions = Still.positions(self)
+        self.scene.cloth.masses.flags.writeable = True
+        self.scene.cloth.masses[0] *= 2.0
+        return positions
+
+    def connects(self):
+        import socket
+
+        with socket.socket() as stream:
+            stream.settimeout(0.01)
+            stream.connect_ex(("127.0.0.1", 9))
+        return Still.positions(self)
+
+    def late(self):
+        import threading
+        import time
+
+        positions = Still.positions(self)
+
+        def work():
+            end = time.perf_counter() + 0.3
+            while time.perf_counter() < end:
+                positions[-1] += 1e-6
+
+        threading.Thread(target=work, daemon=True).start()
+        return positions
+
+    def raises(self):
+        raise RuntimeError("broken on\npurpose")
+
+    return type("Breach", (Still,), {"positions": locals()[name]})
+
+
+BREACHES = {
+    "shaped": "floats (6, 16, 3) are due",
+    "nan": "has a position that is not finite in frame 5",
+    "off": "frame 0 is 0.001 m off the scene's start: put scene.start there",
+    "slipping": "a pin is 0.001 m off its place in frame 3",
+    "random": "a second run gives other positions",
+    "seeded": "another seed gives other positions, by 1 m: say seeded=True",
+    "kept": "run() gave again what it had given before: each call of run() has to do all of the work",
+    "alters": "alters the scene: cloth.masses: copy what you change",
+    "connects": "connects to 127.0.0.1:9: fetch what it needs beforehand",
+    "late": "positions still changed after run() had come back: wait in run() for all threads",
+    "raises": "run() raises RuntimeError: broken on purpose (",
+}
+
+
+def look(make, tmp_path, monkeypatch, scene="hanging_sheet", **fields) -> list[str]:
+    """What the check finds wrong with such a method."""
+    module = type(sys)("breaches")
+    module.make = make
+    monkeypatch.setitem(sys.modules, "breaches", module)
+    entry = MethodEntry(name="m", description="", module="breaches", **fields)
+    task = CheckMethod(
+        name="m", label="", inputs={}, modules=(), cell=Cell(SCENE[scene].at(TINY), entry, 0, ("speed",))
+    )
+    monkeypatch.setattr("benchmarks.contract.findings.code_of", lambda home: {__file__: ""})
+    return task.run(Context(RunFolder(tmp_path)), {}).result["wrong"]
+
+
+@pytest.mark.parametrize("name", BREACHES)
+def test_the_check_names_each_breach_and_its_remedy(name, tmp_path, monkeypatch):
+    def make(*, models, seed):
+        method = breach(name)()
+        method.seed = seed
+        return method
+
+    wrong = look(make, tmp_path, monkeypatch)
+    assert len(wrong) == 1 and BREACHES[name] in wrong[0]
+
+
+def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatch):
+    assert look(lambda *, models, seed: Still(), tmp_path, monkeypatch) == []
+    wrong = look(lambda *, models: Still(), tmp_path, monkeypatch)
+    assert "make() raises TypeError" in wrong[0] and "make(*, models, seed" in wrong[0]
+    assert "without prepare, run" in look(lambda *, models, seed: object(), tmp_path, monkeypatch)[0]
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("raise", "prepare() raises RuntimeError: broken on purpose"),
+        ("hungry", "run() raises MemoryError: no room"),
+        ("early", "positions still changed"),
+        ("unheld", "quasi_static() raises OSError: no room left for the held poses"),
+        ("crowded", "batch(): its time cannot be believed"),
+        ("torn", "batch() raises RuntimeError: no two bodies"),
+    ],
+)
+def test_the_check_catches_every_known_misbehaviour(how, words, tmp_path, monkeypatch):
+    from tests.benchmarks.runner import misbehaving
+
+    # What is still at work after run() would also be in the time of a batch.
+    fields = {"options": {"how": how}, "batched": how != "early"}
+    before = set(threading.enumerate())
+    (wrong,) = look(misbehaving.make, tmp_path, monkeypatch, **fields)
+    assert words in wrong
+    for left in set(threading.enumerate()) - before:  # or they would be at work in the next test
+        left.join(2.0)
+
+
+@pytest.mark.parametrize(("how", "words"), [("segfault", "SIGSEGV"), ("hang", "no answer within 4 s")])
+def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monkeypatch):
+    entry = MethodEntry(
+        name=how, description="", module="misbehaving", options={"how": how}, declared_in="misbehaving",
+        needs_no_obstacle=True,
+    )  # fmt: skip
+    monkeypatch.setattr(check, "BARE", ("free_fall",))
+    found = list(check.check({"methods": [entry], "scenes": [], "metrics": []}, tmp_path, 4.0))
+    assert [fine for _, fine in found] == [False] and words in found[0][0]
+
+
+def test_the_check_says_what_is_skipped_everywhere(tmp_path):
+    entry = MethodEntry(name="m", description="", module="misbehaving", package="nowhere")
+    ((line, fine),) = check.check({"methods": [entry], "scenes": [], "metrics": []}, tmp_path)
+    assert not fine and "is skipped in every scene: m needs the package nowhere" in line
+
+
+@pytest.fixture
+def in_process(monkeypatch):
+    monkeypatch.setattr(
+        "benchmarks.runner.local_executor.LocalExecutor", lambda run, assets, workers: InProcess(run, assets)
+    )
+
+
+def test_the_command_checks_what_files_declare(in_process, tmp_path, capsys):
+    (tmp_path / "lifted.py").write_text(SCENE_FILE)
+    (tmp_path / "highest.py").write_text(METRIC_FILE)
+    assert check.main([str(tmp_path / "lifted.py"), str(tmp_path / "highest.py")]) == 0
+    out = capsys.readouterr().out
+    assert "lift: fine\n" in out and "highest.py in hanging_sheet: fine\n" in out
+    assert "nothing is wrong" in out
+    askew = SCENE_FILE.replace("-self.cloth.masses[:, None] *", "-2.0 * self.cloth.masses[:, None] *")
+    (tmp_path / "askew.py").write_text(askew)
+    (tmp_path / "loose.py").write_text(METRIC_FILE.replace("float(", "").replace(".max())", ".max(axis=1)"))
+    assert check.main([str(tmp_path / "askew.py"), str(tmp_path / "loose.py")]) == 1
+    out = capsys.readouterr().out
+    assert "energy lift: its gradient is not the derivative of its value" in out
+    assert "height/highest of simulation is a ndarray: give a float" in out and "2 to mend" in out
+
+
+JUDGED = (
+    METRIC_FILE
+    + """
+def series(roll_out):
+    return {"height/all": roll_out.positions[..., 1]}
+
+def judge(roll_out, values):
+    return SAID
+"""
+)
+
+
+def test_the_command_asks_metrics_for_their_judgement_and_takes_curves_of_vertices(
+    in_process, tmp_path, capsys
+):
+    for name, said in (
+        ("none", "None"),
+        ("lost", "('diverged', 'lost')"),
+        ("word", "'lost'"),
+        ("no", "0 / 0"),
+    ):
+        (tmp_path / f"{name}.py").write_text(JUDGED.replace("SAID", said))
+    assert check.main([str(tmp_path / "none.py"), str(tmp_path / "lost.py")]) == 0
+    assert check.main([str(tmp_path / "word.py"), str(tmp_path / "no.py")]) == 1
+    out = capsys.readouterr().out
+    assert "judge() gives 'lost': None, or a status" in out
+    assert "judge() of simulation raises ZeroDivisionError" in out
+
+
+@pytest.mark.parametrize(("factor", "fine"), [(1.0, True), (0.999, False), (0.67, False), (-1.0, False)])
+def test_a_wrong_gradient_is_found_however_many_vertices_do_not_feel_it(factor, fine):
+    sheet = small_scene("hanging_sheet", cells=40)
+    forces = np.zeros_like(sheet.start)
+    forces[7, 1] = 0.01
+
+    class Pulled(DeadLoad):
+        def value_and_gradient(self, x):
+            value, gradient = super().value_and_gradient(x)
+            return value, factor * gradient
+
+    found = Findings("mine.py")
+    check_derivatives(found, Pulled(sheet.cloth, forces), sheet)
+    assert (not found.wrong) == fine
+    assert fine or "gradient is not the derivative of its value" in found.wrong[0]
+
+
+@pytest.mark.parametrize(
+    ("word", "words"),
+    [("gone.py", "gone.py: no such file"), ("empty.py", "declares none of METHODS, SCENES, METRICS")],
+)
+def test_the_command_refuses_in_one_line(word, words, tmp_path, monkeypatch, capsys):
+    (tmp_path / "empty.py").write_text("")
+    monkeypatch.chdir(tmp_path)
+    assert check.main([word]) == 2
+    assert words in capsys.readouterr().err

@@ -1,0 +1,91 @@
+"""Declarations that cannot be meant are refused, each by one line that names them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from benchmarks import methods, metrics, run, scenes
+from benchmarks.metric import Metric
+from benchmarks.presets import find_preset
+from benchmarks.registry import DeclarationError
+from benchmarks.runner.source import code_of
+from tests.benchmarks.runner.tasks_by_hand import small_scene
+
+
+def test_a_name_stands_once(monkeypatch):
+    monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, scenes.SCENES[0]))
+    with pytest.raises(DeclarationError, match="scene 'hanging_sheet' is declared twice"):
+        scenes.all_scenes((), ())
+    monkeypatch.setattr(methods, "METHODS", (*methods.METHODS, methods.METHODS[0]))
+    with pytest.raises(DeclarationError, match="method 'simulation' is declared twice"):
+        methods.find_method("skinning")
+    scene = small_scene("hanging_sheet")
+    with pytest.raises(DeclarationError, match="energy 'strain' is declared twice"):
+        dataclasses.replace(scene, energies=(*scene.energies, scene.energies[0]))
+
+
+@pytest.mark.parametrize(
+    ("declared", "word"),
+    [
+        (
+            (Metric(name="energy/total", unit="J", title="Mine", definition="mine"),),
+            "'energy/total' is declared",
+        ),
+        (None, "benchmarks.metrics.cost.cost declares no METRICS"),
+    ],
+)
+def test_a_metric_is_declared_once(declared, word, monkeypatch):
+    metrics.declared.cache_clear()
+    module = metrics.modules()["cost"]
+    with monkeypatch.context() as patch:
+        if declared is None:
+            patch.delattr(module, "METRICS")
+        else:
+            patch.setattr(module, "METRICS", (*module.METRICS, *declared))
+        with pytest.raises(DeclarationError, match=word):
+            metrics.declared()
+    assert metrics.find_metric("cost/frame")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"unit": ""}, "metric 'mine/x' has no unit: say '1' where it has no dimension"),
+        ({"unit": 1}, "metric 'mine/x': unit=1: give a string"),
+        ({"table": None}, "metric 'mine/x': table=None: give a string"),
+        ({"of": "clock"}, "metric 'mine/x': of='clock'"),
+    ],
+)
+def test_a_metric_says_its_unit_and_says_it_in_words(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        Metric(**{"name": "mine/x", "unit": "J", "title": "Mine", "definition": "mine"} | wrong)
+
+
+def test_a_role_and_a_size_that_nobody_knows_are_named():
+    with pytest.raises(DeclarationError, match="unknown role 'solvr'; use one of reference, "):
+        dataclasses.replace(methods.METHODS[0], role="solvr")
+    scene = dataclasses.replace(scenes.SCENES[0], sizes=("sheet_cell",))
+    with pytest.raises(DeclarationError, match="'sheet_cell', which no preset has"):
+        scene.at(find_preset("smoke"))
+
+
+def test_source_that_cannot_be_read_is_named(tmp_path, monkeypatch):
+    (tmp_path / "broken_method.py").write_text("x = 1\ny = )\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(DeclarationError, match=r"broken_method\.py: line 2: unmatched '\)'"):
+        code_of("broken_method")
+    with pytest.raises(DeclarationError, match=r"no module benchmarks\.nothing: see the entry that names it"):
+        code_of("benchmarks.nothing")
+
+
+@pytest.mark.parametrize("more", [[], ["--dry-run"]])
+def test_the_command_says_it_in_one_line_and_leaves_nothing(more, tmp_path, monkeypatch, capsys):
+    wrong = dataclasses.replace(scenes.SCENES[0], name="kite", module="benchmarks.scenes.kite")
+    monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, wrong))
+    words = ["--preset", "smoke", "--scenes", "kite", "--methods", "simulation", "-o", str(tmp_path / "run")]
+    assert run.main([*words, *more]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "no module benchmarks.scenes.kite" in error
+    assert not (tmp_path / "run" / "results.csv").exists()

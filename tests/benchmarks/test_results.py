@@ -1,0 +1,233 @@
+"""The result files: what is written is read back, broken files are named, nothing half-written stays."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+
+from benchmarks.results import frame_energies
+from benchmarks.results.run_folder import (
+    COLUMNS,
+    FORMAT,
+    ResultsError,
+    Row,
+    RunFolder,
+    replacing,
+    with_provenance,
+)
+
+ROWS = [
+    Row("garments", "dressed/walk", "snug", 0, "energy/strain", "J", 0.1 + 0.2, terms="strain+gravity"),
+    Row("garments", "dressed/walk", "pbns", 0, "energy/inertia", "J", None, "skipped", 'no "v", at all'),
+    Row("validation", "free_fall", "simulation", 3, "check", "m", 1e-17, expected=0.0, tolerance=1e-12),
+    Row("extremes", "stiff", "simulation", 0, "outcome", "weights", float("nan"), "failed", "line\ntwo"),
+]
+
+
+def test_columns_are_the_fields_of_a_row():
+    assert [field.name for field in dataclasses.fields(Row)] == list(COLUMNS)
+
+
+def test_rows_come_back_digit_for_digit(tmp_path):
+    folder = RunFolder(tmp_path / "run")
+    folder.write_rows(ROWS)
+    back = folder.read_rows()
+    assert back[0] == ROWS[0] and back[1] == ROWS[1] and back[2] == ROWS[2]
+    assert back[3].reason == "line two" and back[3].value != back[3].value
+    assert sorted(path.name for path in folder.path.iterdir()) == ["results.csv"]
+
+
+def test_a_file_of_before_what_each_reference_changes_is_read(tmp_path):
+    folder = RunFolder(tmp_path)
+    known = dataclasses.replace(ROWS[0], moved=(("simulation-refrozen", -0.1), ("simulation-dt/2", 1e-17)))
+    folder.write_rows([known, ROWS[1]])
+    assert folder.read_rows()[0].moved == known.moved
+    text = pd.read_csv(folder.rows_path, dtype=str, keep_default_na=False)
+    text.drop(columns="moved").to_csv(folder.rows_path, index=False)
+    assert [r.moved for r in folder.read_rows()] == [(), ()]
+
+
+def test_config_comes_back(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.write_config({"preset": "smoke", "seeds": [0, 1], "note": "λ"})
+    assert folder.read_config() == {"format": FORMAT, "preset": "smoke", "seeds": [0, 1], "note": "λ"}
+    folder.config_path.write_text('{"preset": "smoke"}')
+    with pytest.raises(ResultsError, match=r"run\.json: written by an earlier version .* new folder"):
+        folder.read_config()
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"status": "fine"}, "status 'fine'"),
+        ({"value": None}, "finite value"),
+        ({"value": float("nan")}, "finite value"),
+        ({"value": None, "status": "skipped"}, "reason"),
+        ({"status": "skipped", "reason": "why"}, "no value"),
+    ],
+)
+def test_a_row_that_says_nothing_true_is_refused(changes, word):
+    with pytest.raises(ResultsError, match=word):
+        dataclasses.replace(ROWS[0], **changes)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "line 1: the columns"),
+        ("a,b\n1,2\n", "line 1: the columns"),
+        (",".join(COLUMNS) + "\n1,2\n", f"line 2: {len(COLUMNS)} cells"),
+        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,,,1,,,,,,,,,false,\n", "line 2: column seed"),
+        (",".join(COLUMNS) + "\ns,c,m,0,x,J,1,ok,,,,,[2],,,,,1,,,,,,,,,false,\n", "line 2: column moved"),
+    ],
+)
+def test_a_broken_file_is_named_with_its_line(tmp_path, text, word):
+    folder = RunFolder(tmp_path)
+    folder.rows_path.write_text(text)
+    with pytest.raises(ResultsError, match=word) as caught:
+        folder.read_rows()
+    assert "results.csv" in str(caught.value)
+
+
+def test_an_absent_or_broken_config_is_named(tmp_path):
+    folder = RunFolder(tmp_path / "absent")
+    with pytest.raises(ResultsError, match=r"run\.json"):
+        folder.read_config()
+    assert not folder.path.exists()
+    folder = RunFolder(tmp_path)
+    folder.config_path.write_text("{")
+    with pytest.raises(ResultsError, match="not readable as JSON"):
+        folder.read_config()
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("[" * 100_000, "not readable as JSON"),
+        ('{"format": 4, "a": ' + "[" * 40 + "]" * 40 + "}", "nested more than 30 deep"),
+        ('{"format": 4, "seeds": ' + "9" * 5000 + "}", "not readable as JSON"),
+        ('{"format": 4, "metrics": []}', "'metrics' should be metric -> what it declares"),
+        ('{"format": 4, "metrics": {"a": {"title": 3}}}', "'metrics' should be"),
+        ('{"format": 4, "cases": {"a": {"map_point": ["x"]}}}', "'cases' should be"),
+        ('{"format": 4, "stages": [{"name": "a", "seconds": Infinity}]}', "'stages' should be"),
+        ('{"format": 4, "digests": {"a": 1}}', "'digests' should be file -> digest"),
+        ('{"format": 4, "earlier": 1}', "'earlier' should be a list"),
+        ('{"format": 4, "test_looks": [{"rows": 1}]}', "'test_looks' should be a list of looks"),
+    ],
+)
+def test_a_config_of_wrong_types_is_named(tmp_path, text, word):
+    folder = RunFolder(tmp_path)
+    folder.config_path.write_text(text)
+    with pytest.raises(ResultsError, match=word) as refused:
+        folder.read_config()
+    assert "run.json: " in str(refused.value) and len(str(refused.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        (b"strain+gravity", b"\xff\xfe", "not readable as CSV in UTF-8"),
+        (b"strain+gravity", b"x" * 200_000, "not readable as CSV"),
+        (b"snug", b"x" * 200, "line 2: column method: no name of at most 150"),
+        (b"snug", b"a\x00b", "no name of at most 150 printable"),
+        (b",0,", b"," + b"9" * 30 + b",", "column seed: a number beyond 64 bits"),
+    ],
+)
+def test_a_cell_that_is_none_is_named(tmp_path, old, new, word):
+    folder = RunFolder(tmp_path)
+    folder.write_rows(ROWS[:1])
+    data = folder.rows_path.read_bytes()
+    assert old in data
+    folder.rows_path.write_bytes(data.replace(old, new, 1))
+    with pytest.raises(ResultsError, match=word):
+        folder.read_rows()
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.write_rows(ROWS[:1])
+
+    def rows():
+        yield ROWS[1]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        folder.write_rows(rows())
+    assert folder.read_rows() == ROWS[:1]
+    assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
+
+
+def test_whoever_is_reading_the_old_rows_reads_them_to_their_end(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.write_rows(ROWS[:1])
+    with folder.rows_path.open() as reader:
+        folder.write_rows(ROWS)
+        assert len(reader.readlines()) == 2
+
+
+def test_replacing_keeps_the_suffix_for_writers_that_look_at_it(tmp_path):
+    with replacing(tmp_path / "a.vtkhdf") as temporary:
+        assert temporary.suffix == ".vtkhdf" and temporary.parent == tmp_path
+        temporary.write_text("x")
+    assert (tmp_path / "a.vtkhdf").read_text() == "x"
+
+
+def test_trajectory_paths_are_flat_and_told_apart(tmp_path):
+    folder = RunFolder(tmp_path)
+    paths = {folder.trajectory_path(s, m, k) for s in ("a/b", "a") for m in ("x", "y") for k in (0, 1)}
+    assert len(paths) == 8 and all(len(p.relative_to(tmp_path).parts) == 3 for p in paths)
+
+
+def test_provenance_is_filled_in():
+    assert {row.commit for row in with_provenance(ROWS, commit="abc")} == {"abc"}
+
+
+def test_a_row_of_an_earlier_run_keeps_where_it_comes_from():
+    earlier = [dataclasses.replace(row, commit="old", hardware="another") for row in ROWS]
+    filled = with_provenance(earlier, commit="new", preset="quick", hardware="this")
+    assert {(row.commit, row.preset, row.hardware) for row in filled} == {("old", "quick", "another")}
+
+
+def test_the_module_is_light():
+    code = "import sys, benchmarks.results.run_folder; print({'numpy', 'torch', 'pandas'} & set(sys.modules))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert answer.stdout.strip() == "set()", answer.stderr
+
+
+HEAD = "scene,method,seed,seconds,strain,total\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "line 1: the columns should be scene,method,seed,seconds and energies"),
+        ("scene,method,seed,seconds\n", "line 1: the columns"),
+        (HEAD.replace("total", "strain"), "energies, each once"),
+        (HEAD + "kick,snug,0,0.1,1\n", "line 2: 6 cells are due"),
+        (
+            HEAD + "kick,snug,0,0.1,1,2\nkick,snug,0,0.2,high,2\n",
+            "line 3: column strain: 'high' is no number",
+        ),
+        (HEAD + "kick,snug,.5,0.1,1,2\n", "line 2: column seed: '.5' is no number"),
+        (HEAD + "kick,snug,0,0.1,inf,2\n", "line 2: column strain: 'inf' is no number"),
+        (HEAD + "kick,sn\xff", "not readable as CSV in UTF-8"),
+    ],
+)
+def test_energies_of_frames_that_are_broken_are_refused_by_line_and_column(tmp_path, text, word):
+    path = RunFolder(tmp_path).frame_energies_path
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(ResultsError, match=word) as refused:
+        frame_energies.read(path)
+    assert str(path) in str(refused.value)
+
+
+def test_an_energy_that_a_scene_does_not_have_is_not_a_number(tmp_path):
+    path = RunFolder(tmp_path).frame_energies_path
+    path.write_text(HEAD + "kick,snug,2,0.1,,2.5\n")
+    columns, ((scene, method, seed, seconds, strain, total),) = frame_energies.read(path)
+    assert (scene, method, seed, seconds, total) == ("kick", "snug", 2, 0.1, 2.5) and strain != strain
+    assert columns[4:] == ["strain", "total"]

@@ -1,0 +1,256 @@
+"""From a trajectory to rows: what is judged, what is not finite, what may fail, and the closing table."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks import provenance
+from benchmarks.methods import METHODS, find_method
+from benchmarks.plan.plan import Motions
+from benchmarks.results.run_folder import Row
+from benchmarks.rows import NOT_FALLING, clock_costs, rows_of
+from benchmarks.runner.console import remarks, summary
+from benchmarks.runner.schedule import Schedule
+from benchmarks.runner.whole_run import RunLog, accepted
+from benchmarks.scenes import SCENES
+from benchmarks.tasks.cell_task import Cell, judge
+from benchmarks.tasks.task import Outcome
+from benchmarks.timing import Reading
+from reference_sim import Trajectory
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene
+from tests.benchmarks.tasks.test_cell_tasks import plan_of
+
+SHEET = SCENES[0]
+
+
+def trajectory(frames=4, **changes) -> Trajectory:
+    values = {
+        "positions": np.zeros((frames, 3, 3)), "faces": np.array([[0, 1, 2]]),
+        "times": np.arange(frames) / 30,
+        "frame_seconds": np.r_[0.0, np.full(frames - 1, 0.002)], "status": "converged",
+    }  # fmt: skip
+    return Trajectory(**(values | changes))
+
+
+@dataclasses.dataclass
+class FourFrames:
+    frames: int = 4
+    cloth: SimpleNamespace = dataclasses.field(default_factory=lambda: SimpleNamespace(vertex_count=3))
+
+
+def test_a_trajectory_is_judged_by_what_is_in_it():
+    def judged(truncated=False, **changes):
+        return judge(trajectory(**changes), Reading(1.0), FourFrames(), truncated=truncated)
+
+    assert judged() == ("ok", "")
+    assert judged(status="max_iterations", truncated=True) == ("ok", "")
+    assert judged(status="max_iterations", reason="frame 2: gave up")[0] == "stalled"
+    assert judged(frames=2)[0] == "diverged"
+    assert judged(frames=2, status="timeout", reason="60 s") == ("timeout", "60 s")
+    assert judged(positions=np.full((4, 3, 3), np.nan))[0] == "diverged"
+    assert judged(status="fine")[0] == "failed"
+    stalled = judged(
+        status="stalled", reason="frame 2: x", frame_fields={"converged": np.array([1, 1, 0, 0.0])}
+    )
+    assert stalled == ("stalled", "2 of 4 frames did not converge; first frame 2: x")
+    relaxed = judged(status="converged", reason="frame 1: round-off: residual 2e-6 above tolerance 1e-6")
+    assert relaxed == ("ok", "frame 1: round-off: residual 2e-6 above tolerance 1e-6")
+
+
+def test_a_time_that_cannot_be_believed_fails_the_cell():
+    status, reason = judge(trajectory(), Reading((1.0,), "it went on"), FourFrames(), truncated=False)
+    assert status == "failed" and "it went on" in reason
+
+
+def rows(cell: Cell, outcome: Outcome, metrics: dict[str, float] | None = None, **more: Outcome) -> list[Row]:
+    """Of one cell with these metrics; more: outcomes of other tasks of it by kind."""
+    outcomes = {("cell", cell.name): outcome} | {(kind, cell.name): other for kind, other in more.items()}
+    if metrics is not None:
+        outcomes["metrics", cell.name] = Outcome(result=metrics)
+    return rows_of(dataclasses.replace(plan_of(None), cells=(cell,)), (), outcomes)
+
+
+RAN = Outcome(result={"seconds": 1.0, "frames": 4, "peak": 70.0, "terms": "strain+inertia"}, files=("x",))
+
+
+def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
+    cell = Cell(SHEET, find_method("newton-1"), 0, ("garments", "speed"))
+    found = rows(cell, RAN, {"energy/strain": 1.0, "distance/rms": np.nan})
+    assert [row.suite for row in found] == ["garments"] * 4 + ["speed"] * 4
+    assert {row.dtype for row in found} == {"float64"} and {row.terms for row in found} == {"strain+inertia"}
+    by_metric = {row.metric: row for row in found}
+    assert by_metric["cost/frame"].value == 250.0 and by_metric["cost/peak"].unit == "MB"
+    strain, lost = by_metric["energy/strain"], by_metric["distance/rms"]
+    assert strain.value == 1.0 and strain.unit == "J" and strain.status == "ok"
+    assert lost.value is None and lost.status == "failed" and "finite" in lost.reason
+    skinned = rows(Cell(SHEET, find_method("skinning"), 0, ("speed",)), RAN, {"energy/strain": 1.0})
+    assert skinned[0].dtype == "float32"
+    skipped = rows(cell, Outcome("skipped", "why"))
+    assert [(row.status, row.reason, row.value) for row in skipped] == [("skipped", "why", None)] * 2
+
+
+def test_inputs_are_added_to_a_methods_own_work_and_percentiles_are_medians_of_repeats():
+    cell = Cell(SHEET, find_method("newton-1"), 0, ("speed",))
+    found: dict = {("cell", cell.name): RAN}
+    assert set(clock_costs(cell, 3, found)[0]) == {"cost/frame", "cost/peak"}  # as an earlier run wrote it
+    late = [{"seconds": s, "frame_p95": p} for s, p in ((1.0, 0.3), (1.2, 0.5), (1.1, 0.4))]
+    found["cell", cell.name] = dataclasses.replace(RAN, result={**RAN.result, **late[0], "inputs": 0.002})
+    found |= {("repeat", f"{cell.name}-{n}"): Outcome(result=late[n]) for n in (1, 2)}
+    costs, remark = clock_costs(cell, 3, found)
+    assert costs["cost/frame"] == pytest.approx(275.0) and costs["cost/whole"] == pytest.approx(277.0)
+    assert costs["cost/frame_p95"] == pytest.approx(400.0) and remark == ""
+
+
+def test_rows_carry_what_scene_and_method_declare():
+    scene = dressed_scene("kick", part="clip")
+    (row, *_) = rows(Cell(scene, find_method("snug+lbfgs-4"), 1, ("speed",)), RAN, {"energy/strain": 1.0})
+    assert (row.garment, row.motion, row.part) == ("tshirt", "kick", "clip")
+    assert (row.role, row.family, row.level, row.base) == ("warm-started", "snug+lbfgs", 4.0, "snug")
+    assert row.seeded and row.pairing_group == "snug" and row.seed == 1
+    (row, *_) = rows(Cell(SHEET, find_method("vbd-20"), 0, ("speed",)), RAN, {"energy/strain": 1.0})
+    assert (row.garment, row.motion, row.part, row.base) == ("", "", "", "")
+    assert (row.role, row.family, row.level, row.seeded) == ("solver", "vbd", 20.0, False)
+
+
+def test_only_the_reference_is_judged_by_what_nobody_asks_of_a_network():
+    for method, statuses in (("simulation", ("ok", "failed")), ("skinning", ("ok", "ok"))):
+        cell = Cell(SHEET, find_method(method), 0, ("garments",))
+        for value, status in zip((1e-7, 1e-5), statuses):
+            found = rows(cell, RAN, {"conservation/momentum_worst": value})
+            row = next(row for row in found if row.metric.startswith("conservation"))
+            assert row.status == status and row.tolerance == (2e-6 if method == "simulation" else None)
+
+
+def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
+    def row(suite, status, reason="why"):
+        return Row(suite, "s", "m", 0, "x", "1", None, status, reason)
+
+    assert accepted(row("extremes", "stalled")) and accepted(row("garments", "skipped"))
+    assert not accepted(row("extremes", "failed")) and not accepted(row("garments", "stalled"))
+    assert not accepted(row("extremes", "stalled", ""))
+
+
+def test_networks_skip_scenes_without_a_body_and_solvers_skip_nothing():
+    for entry in (entry for entry in METHODS if entry.package is None):
+        reason = entry.skip(SHEET)
+        assert bool(reason) == entry.needs_body and entry.skip(dressed_scene("walk")) is None
+
+
+def test_the_closing_table_shows_a_dash_for_what_is_not_there():
+    rows = [
+        Row("garments", "tshirt/a", "snug", 0, "energy/total", "J", 1.0),
+        Row("garments", "tshirt/b", "snug", 0, "energy/total", "J", 3.0),
+        Row("garments", "tshirt/a", "pbns", 0, "cost/frame", "ms", None, "failed", "why"),
+        Row("validation", "c", "simulation", 0, "check", "1", 0.0),
+    ]
+    text = summary(rows, [{"name": "cells", "seconds": 3.2}])
+    lines = text.splitlines()
+    assert "mean of 2 scenes" in lines[0] and lines[1].split() == ["snug", "2", "ok"]
+    assert lines[2].split() == ["pbns", "-", "failed"]
+    assert "validation: 1 ok" in text and "cells 3 s" in text
+
+
+def test_the_closing_table_keeps_garments_apart_and_marks_means_over_less():
+    rows = [
+        Row("garments", scene, method, 0, "energy/total", "J", value, garment=scene.partition("/")[0])
+        for scene, method, value in (
+            ("tshirt/a", "snug", 1.0), ("tshirt/b", "snug", 3.0), ("tshirt/a", "pbns", 5.0),
+            ("tunic/a", "snug", 9.0),
+        )
+    ]  # fmt: skip
+    rows.append(Row("garments", "tunic/long", "snug", 0, "roll_out/drift", "mm", 1.0, garment="tunic"))
+    rows.append(
+        Row("garments", "tshirt/b", "pbns", 0, "cost/frame", "ms", None, "diverged", "why", garment="tshirt")
+    )
+    lines = summary(rows, []).splitlines()
+    assert "garments, tshirt, mean of 2 scenes" in lines[0] and lines[1].split() == ["snug", "2", "ok"]
+    assert lines[2].split() == ["pbns", "5*", "ok,", "diverged"] and lines[3].startswith("* over fewer")
+    assert "garments, tunic, mean of 1 scene " in lines[5] and lines[6].split() == ["snug", "9", "ok"]
+
+
+def test_the_remarks_name_repeats_that_lie_apart_gaps_that_rise_and_what_is_out_of_date():
+    base = Row("speed", "flag", "newton-1", 0, "cost/spread", "%", 12.0)
+    late = dataclasses.replace(base, method="lbfgs-5", value=31.0, status="stalled", reason="2 of 4 frames")
+    tight = dataclasses.replace(base, status="stalled", reason="2 of 4 frames")
+    gap = dataclasses.replace(base, method="vbd-20", metric="gap/relative", reason=f"{NOT_FALLING}: so")
+    said = remarks([tight, late, gap], 3, {"cell flag x snug": "kept though scene changed"})
+    assert [line for line in said if "flag x newton-1" in line] == [] and len(said) == 4
+    assert said[0].startswith("3 results") and said[1] == "cell flag x snug: kept though scene changed"
+    assert said[2].endswith("flag x lbfgs-5 (31 %)") and said[3].endswith("flag x vbd-20")
+    assert remarks([base], 0, {}) == []
+
+
+def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch):
+    facts = {"processor": "a processor", "cores": 2, "device": "cuda", "accelerator": "a GPU"}
+    monkeypatch.setattr(provenance, "hardware", lambda device: facts)
+    log = RunLog(plan_of(tmp_path, device="cuda"))
+    metrics = ("cost/train", "cost/frame")
+    log.write_rows([Row("garments", "tshirt/kick", "snug", 0, metric, "s", 1.0) for metric in metrics])
+    found = {row.metric: row.hardware for row in log.folder.read_rows()}
+    assert found == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
+
+
+def test_a_run_that_has_just_begun_leaves_what_the_rows_there_mean(tmp_path):
+    log = RunLog(plan_of(tmp_path))
+    log.write_rows([Row("garments", "tshirt/kick", "snug", 0, "energy/total", "J", 1.0)])
+    before = log.folder.read_config()
+    RunLog(plan_of(tmp_path))  # and is interrupted before it knows anything
+    after = log.folder.read_config()
+    assert before["digests"] and all(after[name] == before[name] for name in ("scenes", "digests"))
+
+
+def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path, capsys):
+    motions = Motions(("walk",), ("dance_turn",), validation=("kick",))
+    cells = [
+        Cell(dressed_scene(name), find_method("skinning"), 0, ("garments",))
+        for name in ("dance_turn", "kick")
+    ]
+
+    def looks(scene: str, *values: float) -> int:
+        log = RunLog(plan_of(tmp_path, motions=motions, cells=tuple(cells)))
+        log.write_rows(
+            [Row("garments", scene, "skinning", 0, "energy/total", "J", value) for value in values]
+        )
+        config = log.folder.read_config()
+        assert config["scenes"][scene]["role"] == ("test" if scene == "tshirt/dance_turn" else "validation")
+        return len(config["test_looks"])
+
+    assert looks("tshirt/kick", 1.0) == 0
+    assert looks("tshirt/dance_turn", 1.0) == 1
+    assert looks("tshirt/dance_turn", 1.0) == 1  # taken from the folder, or the report again
+    assert looks("tshirt/dance_turn", 1.5) == 2  # other code, another seed
+    assert looks("tshirt/kick", 2.0) == looks("tshirt/dance_turn") == looks("tshirt/dance_turn", 1.0) == 2
+
+
+@pytest.mark.parametrize(("method", "data"), [("snug", 0.0), ("supervised", 7.0)])
+def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_from(method, data):
+    cell = Cell(dressed_scene("kick"), find_method(method), 0, ("garments",))
+    motions = Motions(train=("walk", "run"), test=("kick",))
+    plan = dataclasses.replace(plan_of(None), cells=(cell,), motions=motions)
+    schedule = Schedule(plan)
+    there = {"commit": "c", "preset": "p", "hardware": "there"}
+    result = {"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0, "steps": 60, "frames": 90}
+    trained = Outcome(result=result, origin=there)
+    outcomes = {
+        ("cell", cell.name): RAN, ("metrics", cell.name): Outcome(result={"energy/strain": 1.0}),
+        schedule.network(plan.networks[0]).id: trained,
+        ("data", "tshirt-walk/simulation"): Outcome(seconds=3.0, origin=there | {"hardware": "elsewhere"}),
+        ("data", "tshirt-run/simulation"): Outcome(seconds=4.0, origin=there),
+        ("data", "tshirt-run/fast-lbfgs-10"): Outcome(seconds=5.0),
+    }  # fmt: skip
+    rows = rows_of(plan, (), outcomes)
+    machines = {row.metric: row.hardware for row in rows}
+    assert machines["cost/train"] == machines["cost/setup"] == "there" and machines["cost/frame"] == ""
+    assert machines["cost/data"] == ("elsewhere and there" if data else "")
+    assert {row.reason for row in rows} == {""}
+    costs = {row.metric: row.value for row in rows}
+    assert costs["cost/data"] == data and costs["cost/train"] == 120.0
+    assert costs["cost/setup"] == 20.0 and costs["cost/memory"] == 9.0
+    assert costs["cost/train_steps"] == 60 and costs["cost/train_frames"] == 90
+    lacking = dataclasses.replace(trained, result={**trained.result, "left_out": ["run"]})
+    rows = rows_of(plan, (), outcomes | {schedule.network(plan.networks[0]).id: lacking})
+    assert all("learned without run" in row.reason for row in rows)

@@ -1,0 +1,202 @@
+"""The command: quick to answer, one clear line for a wrong word, honest about what failed."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import methods, run
+from benchmarks.methods import METHODS
+from benchmarks.plan import selection
+from benchmarks.plan.make_plan import choose_folder
+from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.suites import SUITES, Extent
+from benchmarks.presets import PRESETS
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.validation.registry import KNOWN_ANSWERS
+from benchmarks.validation.stress.cases import MAPS, STEPS
+from reference_sim import Trajectory
+from reference_sim.files.array_file import array_names
+from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, VALIDATION
+from tests.benchmarks.runner.misbehaving import interrupt_at
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def command(*words: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-m", "benchmarks.run", *words],
+        capture_output=True, text=True, cwd=cwd, timeout=120, env=environment,
+    )  # fmt: skip
+
+
+# --- quick answers ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("word", ["--help", "--list"])
+def test_help_and_list_answer_within_a_second(word):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    answer = command(word)
+    assert answer.returncode == 0 and "hanging_sheet" in answer.stdout
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)  # of the processor: others may have the machine
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 1.0
+
+
+@pytest.mark.parametrize("word", ["--help", "--list", "--dry-run"])
+def test_nothing_heavy_is_loaded_before_there_is_something_to_do(word, tmp_path):
+    code = (
+        "import sys; sys.argv = ['run', sys.argv[1]]\n"
+        "import runpy, contextlib, io\n"
+        "with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):\n"
+        "    runpy.run_module('benchmarks.run', run_name='__main__')\n"
+        "print([m for m in ('torch', 'vtk', 'vtkmodules', 'pyvista', 'pandas', 'numba', 'igl', 'scipy', "
+        "'skfem', 'matplotlib') if m in sys.modules])"
+    )
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    answer = subprocess.run(
+        [sys.executable, "-c", code, word], capture_output=True, text=True, cwd=tmp_path, env=environment
+    )
+    assert answer.stdout.strip().endswith("[]"), answer.stdout + answer.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_help_names_every_exit_status(capsys):
+    with pytest.raises(SystemExit):
+        run.main(["--help"])
+    said = capsys.readouterr().out.partition("exit status: ")[2]
+    assert all(f"{status} when " in said for status in (0, 1, 2, 130))
+
+
+def test_the_list_names_everything(capsys):
+    assert run.main(["--list"]) == 0
+    words = capsys.readouterr().out
+    names = [m.name for m in METHODS] + [c.name for c in KNOWN_ANSWERS]
+    names += [c.name for c in STEPS] + [f"{name}/*" for name in MAPS]
+    for name in [*names, "tshirt/", "garments", "paper", "walk"]:
+        assert name in words
+
+
+@pytest.mark.parametrize("split", ["test", "validation"])
+@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
+def test_the_list_names_every_scene_that_a_suite_has(preset, split, capsys):
+    motions = Motions(
+        test=TEST, dynamic_test=DYNAMIC_TEST, validation=VALIDATION, dynamic_validation=DYNAMIC_VALIDATION,
+        split=split,
+    )  # fmt: skip
+    extents = [Extent(preset, motions, full=wide, further=wide) for wide in (False, True)]
+    asked = {name for suite in SUITES for extent in extents for name in suite.scenes(extent)}
+    assert run.main(["--list"]) == 0
+    listed = {line.split()[0] for line in capsys.readouterr().out.splitlines() if line.strip()}
+    assert "tshirt/there_and_back" in asked
+    assert not {name.removesuffix("@clip") for name in asked} - listed
+
+
+# --- wrong words -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["--preset", "huge"], "smoke, quick, paper"),
+        (["--suite", "garment"], "garments"),
+        (["--scenes", "hanging_sheets"], "did you mean hanging_sheet"),
+        (["--scenes", "tshirt/walk"], "--test-motions"),
+        (["--methods", "sung"], "did you mean snug"),
+        (["--motions", "nowhere"], "nowhere"),
+        (["--motions", "empty.amc"], "empty.amc"),
+        (["--motions", "broken.npz"], "broken.npz"),
+        (["--motions", "folder"], "folder"),
+        (["--motions", "back.npz", "--motion-up", "z"], "on its back or side: it stands along y"),
+        (["--repair"], "say of which files by --motions"),
+        (["--test-motions", "wlak"], "did you mean walk"),
+        (["--seeds", "one"], "--seeds"),
+        (["--seeds", "-1"], "--seeds"),
+        (["--device", "tpu"], "cpu or cuda"),
+        (["--out", "broken.npz"], "is a file"),
+        (["--out", "full"], "holds no run"),
+        (["--out", "torn"], "torn/run.json: not readable"),
+        (["--only", "finished"], "failed, stale, missing"),
+        (["--only", "failed", "--fresh"], "leave out"),
+        (["--workers", "0"], "1 or more"),
+        (["--frobnicate"], "--frobnicate"),
+        (["--scenes", "free_fall", "--methods", "snug", "--suite", "garments"], "nothing to run"),
+        (["--scenes", "free_fall", "--suite", "extremes"], "nothing to run"),
+    ],
+)
+def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monkeypatch, capsys):
+    (tmp_path / "empty.amc").write_text("")
+    (tmp_path / "broken.npz").write_bytes(b"PK no zip")
+    np.savez(tmp_path / "back.npz", poses=np.zeros((3, 72)), trans=np.zeros((3, 3)), fps=30)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "note.txt").write_text("mine")
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "run.json").write_text('{"command": ')
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("benchmarks.runner.whole_run.execute", lambda *_: pytest.fail("the run was begun"))
+    assert run.main(words) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and hint in err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(PlanError, match="cannot be written"):
+        choose_folder(str(tmp_path / "new"))
+
+
+# --- a run -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def misbehaving(monkeypatch):
+    """newton-1 raises when it is made ready; the others are as they are."""
+    wrong = {"module": "misbehaving", "options": {"how": "raise"}}
+    entries = tuple(dataclasses.replace(m, **wrong) if m.name == "newton-1" else m for m in METHODS)
+    monkeypatch.setattr(methods, "METHODS", entries)
+    monkeypatch.setattr(selection, "METHODS", entries)
+
+
+def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, capsys):
+    out = tmp_path / "run"
+    words = ["--preset", "smoke", "--scenes", "free_fall", "--suite", "speed", "-o", str(out)]
+    assert run.main([*words, "--methods", "simulation,newton-1,newton-4,skinning"]) == 1
+    rows = RunFolder(out).read_rows()
+    by_method = {row.method: row for row in rows if row.metric == "cost/frame"}
+    assert by_method["newton-1"].status == "failed"
+    assert by_method["newton-1"].reason == "RuntimeError: broken on purpose"
+    assert by_method["newton-4"].status == by_method["simulation"].status == "ok"
+    assert by_method["skinning"].status == "skipped" and "no body" in by_method["skinning"].reason
+    exact = {row.method: row.value for row in rows if row.metric == "exact/distance"}
+    assert exact["simulation"] < 1e-12
+    config = RunFolder(out).read_config()
+    assert config["finished"] and config["commit"] and config["versions"]["numpy"]
+    assert {stage["name"] for stage in config["stages"]} >= {"cells", "metrics"}
+    shown, said = capsys.readouterr()
+    assert shown.strip().splitlines()[-1] == str((out / "report.pdf").resolve())
+    assert "newton-1" in said and (out / "report.pdf").stat().st_size > 1000
+    fields = array_names(RunFolder(out).curves_path("free_fall", "simulation"))
+    assert {"energy/gravity", "energy/inertia", "energy/total"} <= set(fields)
+    assert not [path for path in out.rglob("*") if "part" in path.name]
+
+
+def test_an_interrupt_leaves_what_was_finished(tmp_path, monkeypatch, capsys):
+    interrupt_at("newton-1", monkeypatch)
+    out = tmp_path / "run"
+    words = ["--preset", "smoke", "--scenes", "free_fall", "--suite", "speed", "-o", str(out)]
+    assert run.main([*words, "--methods", "simulation,newton-1"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    folder = RunFolder(out)
+    assert folder.read_config()["interrupted"] is True and folder.read_rows() == []
+    assert Trajectory.load(folder.trajectory_path("free_fall", "simulation")).status == "converged"
+    assert not [path for path in out.rglob("*") if "part" in path.name]

@@ -1,0 +1,159 @@
+"""Stress tests: their cases, their map in the report, and that the solver copes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.tasks.case import RunCase
+from benchmarks.tasks.task import Outcome
+from benchmarks.validation.registry import STRESS_TESTS
+from benchmarks.validation.solvers import convergence_check
+from benchmarks.validation.solvers.convergence_check import lbfgs_then_newton, solve_and_check
+from benchmarks.validation.stress import cases as stress_tests
+from benchmarks.validation.stress.cases import MAPS, STEPS
+from benchmarks.validation.stress.initial_conditions import INITIAL_POSITIONS, REST_SHAPES, VELOCITIES
+from benchmarks.validation.stress.sheet_steps import BODIES, PINS, sheet, solve_sheet
+from reference_sim import Cloth, minimise
+from reference_sim.energies import Energy, StretchStVK
+from tests.reference_sim.meshes import grid
+
+SMOKE = [case for case in STRESS_TESTS if case.smoke]
+
+
+# --- cases ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", SMOKE, ids=lambda case: case.name)
+def test_a_case_of_the_smallest_preset_is_honest(case):
+    row = case.run()
+    assert row.status == "ok", row.reason
+    assert row.suite == "extremes" and row.scene == case.name and row.metric == case.metric == "outcome"
+
+
+def test_there_are_enough_cases_and_each_can_be_built():
+    assert len(STEPS) >= 60 and len(SMOKE) == 6 and len(MAPS) == 2
+    metrics = [(case.scene, case.metric) for cases in MAPS.values() for case in cases]
+    assert len(set(metrics)) == len(metrics)
+    assert {case.options.get("start", "noisy") for case in STEPS} == set(INITIAL_POSITIONS)
+    assert set(VELOCITIES) <= {case.options.get("speed") for case in STEPS}
+    for case in STEPS:
+        if case.function == "solve_sheet":
+            step = sheet(**case.options)
+            assert step.guess.shape == (81, 3) and step.weight > 0, case.name
+    assert stress_tests.TOLERANCE == convergence_check.TOLERANCE
+    assert all(case.seconds and case.seconds > convergence_check.TIMEOUT for case in STRESS_TESTS)
+
+
+def test_a_point_of_a_map_counts_iterations_and_names_its_place():
+    case = next(case for case in MAPS["map_sheet"] if case.options == {"stiffness": 1.0, "dt": 1 / 30})
+    row = case.run()
+    assert row.status == "ok" and row.value == solve_and_check(sheet(), lbfgs_then_newton).iterations
+    assert (row.scene, row.metric, row.unit) == ("map_sheet", "map/1/0.0333", "iterations")
+    task = RunCase(name=case.name, label=case.name, case=case, inputs={}, modules=(case.module,))
+    (ended,) = task.rows(Outcome("timeout", "no answer within 60 s", failed=True))
+    assert (ended.status, ended.value, ended.unit, ended.scene) == ("failed", None, "iterations", "map_sheet")
+
+
+# --- the report's part ----------------------------------------------------------------------------------
+
+
+# --- the solver's part ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("factor", "most"), [(1e3, 60), (1e4, 60), (1e6, 80)])
+def test_stiff_cloth_converges_in_tens_of_iterations(factor, most):
+    """Without predicted stresses and watchdog steps: 99 iterations at x1e3, more than 300 beyond."""
+    checked = solve_and_check(sheet(stiffness=factor))
+    assert checked.status == "ok" and checked.iterations <= most, checked
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", STEPS, ids=lambda case: case.name)
+def test_a_stress_test_never_lies(case):
+    row = case.run()
+    assert row.status in ("ok", "stalled", "timeout", "diverged") and row.reason, row.reason
+
+
+def test_predicted_stress_is_linear_in_the_step_and_forgotten():
+    x, faces = grid(3, 3, width=0.3, depth=0.3)
+    cloth = Cloth(x, faces)
+    random = np.random.default_rng(4)
+    x = x + random.normal(0, 0.01, x.shape)
+    step = random.normal(0, 0.05, x.shape)
+    energy = StretchStVK(cloth)
+    true = energy.hessian_blocks(x)
+    energy.predict_stress(x, step)
+    predicted = energy.hessian_blocks(x + step)
+    energy.forget()
+    assert np.array_equal(energy.hessian_blocks(x), true)
+    # From the definition: the part of the Hessian without stress, at x + step, plus the stress's own part
+    # of the difference between S(x) + dS/dx step and S(x + step).
+    there = Energy.hessian_blocks(energy, x + step)
+
+    def strain(positions):
+        corner = positions[cloth.faces]
+        F = np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=-1) @ cloth.Dm_inverse
+        return 0.5 * (F.transpose(0, 2, 1) @ F - np.eye(2))
+
+    # Strain is quadratic, so that a central difference is its derivative.
+    missing = strain(x) + 0.5 * (strain(x + step) - strain(x - step)) - strain(x + step)
+    m = cloth.material
+    trace = np.einsum("fii->f", missing)[:, None, None]
+    stress = m.lame_lambda * trace * np.eye(2) + 2 * m.lame_mu * missing
+    b = np.concatenate([-cloth.Dm_inverse.sum(axis=1, keepdims=True), cloth.Dm_inverse], axis=1)
+    part = cloth.areas[:, None, None] * np.einsum("fai,fij,fcj->fac", b, stress, b)
+    expected = there + np.einsum("fac,ij->faicj", part, np.eye(3)).reshape(there.shape)
+    assert predicted == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    assert np.abs(predicted - there).max() > 0.01 * np.abs(there).max()
+
+
+def test_every_kept_point_is_observed_and_lower_than_the_one_before():
+    step = sheet(start="very noisy")
+    kept = []
+    result = minimise(step.potential, step.guess, observe=kept.append)
+    assert np.array_equal(kept[0], step.guess) and np.array_equal(kept[-1], result.positions)
+    assert 2 < len(kept) <= result.iterations + 1  # an excursion's way is not kept, only its end
+    values = np.array([step.potential.value(x) for x in kept])
+    assert (np.diff(values) < 1e-13 * values[0]).all()
+
+
+def test_the_hessian_is_the_true_one_again_after_a_run_that_was_cut():
+    step = sheet(stiffness=1e4)
+    before = step.potential.hessian(step.guess).toarray()
+    for cut in (1, 3, 7):
+        minimise(step.potential, step.guess, max_iterations=cut)
+        assert np.array_equal(step.potential.hessian(step.guess).toarray(), before)
+
+
+def drawn(seed: int) -> dict[str, object]:
+    """A step of a sheet that nobody has chosen: every option of `sheet` drawn, factors over decades."""
+    random = np.random.default_rng(seed)
+
+    def factor(low: float, high: float) -> float:
+        return float(10 ** random.uniform(low, high))
+
+    def one_of(values):
+        return values[random.integers(len(values))]
+
+    terms = one_of(["membrane", "membrane+bending", "membrane+bending+area", "membrane+area"])
+    return {
+        "stiffness": factor(-3, 5), "bending": factor(-3, 5), "mass": factor(-2, 2), "contact": factor(-2, 3),
+        "gravity": one_of([0.0, 1.0, factor(0, 3)]), "dt": one_of([None, factor(-4, 1), factor(-4, 1)]),
+        "size": factor(-2, 2), "pins": one_of(list(PINS)), "shape": one_of(list(REST_SHAPES)),
+        "start": one_of(list(INITIAL_POSITIONS)), "speed": one_of([0.0, factor(-1, 3), *VELOCITIES]),
+        "scaling": one_of(["none", "length_area"]), "rest_angles": one_of([0.0, 1.0, "random"]),
+        "terms": terms, "body": one_of(["", *BODIES]),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [range(6), *(pytest.param(range(k, k + 25), marks=pytest.mark.slow) for k in range(1000, 1500, 25))],
+    ids=lambda seeds: str(seeds[0]),
+)
+def test_a_step_that_nobody_chose_is_no_lie_either(seeds):
+    """Claims are checked from the definitions, contact included; a failure has to be said."""
+    for seed in seeds:
+        row = solve_sheet(**drawn(seed))
+        assert row.status in ("ok", "stalled", "timeout", "diverged") and row.reason, (seed, drawn(seed), row)

@@ -1,0 +1,109 @@
+"""Known answers: every case passes, and a number is judged as it should be."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.plan.plan import Motions
+from benchmarks.plan.selection import Request, choose
+from benchmarks.presets import find_preset
+from benchmarks.validation.case import Case
+from benchmarks.validation.dynamics.time_steps import VISCOSITY, Viscosity, halving_order
+from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
+from reference_sim import Cloth, Material, Potential
+from reference_sim.energies import Step
+
+
+@pytest.mark.parametrize("case", KNOWN_ANSWERS, ids=lambda case: case.name)
+def test_a_known_answer_is_found(case):
+    row = case.run()
+    assert row.status == "ok", row.reason
+    assert (row.suite, row.scene, row.method, row.metric) == ("validation", case.name, "simulation", "check")
+
+
+def test_there_are_enough_of_every_kind():
+    names = [case.name for case in CASES]
+    assert len(set(names)) == len(set(CASES)) == len(names)
+    judged = [case for case in KNOWN_ANSWERS if case.tolerance is not None]
+    assert len(judged) >= 40
+    assert sum(name.endswith("_order") for name in names) >= 9
+    assert all(case.reason for case in KNOWN_ANSWERS)
+    # A number is judged against a number: declared, or solved by the check itself.
+    modules = {case.module.rpartition(".")[2] for case in judged if case.expected is None}
+    assert modules <= {"membrane", "oscillators", "statics", "clamped_stretch"}
+
+
+def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
+    def chosen(preset, scenes=()):
+        suites = ("validation",)
+        return choose(
+            Request(suites=suites, full=True, preset=find_preset(preset), motions=Motions(), scenes=scenes)
+        )[1]
+
+    assert chosen("quick") == KNOWN_ANSWERS
+    assert chosen("smoke") == tuple(case for case in KNOWN_ANSWERS if case.smoke)
+    assert [case.name for case in chosen("smoke", ("slit_annulus_inner",))] == ["slit_annulus_inner"]
+
+
+@pytest.mark.parametrize(
+    ("found", "expected", "tolerance", "status"),
+    [
+        (1.0, 1.0, 0.0, "ok"),
+        (1.2, 1.0, 0.1, "failed"),
+        ((1.2, 1.15), None, 0.1, "ok"),
+        ((1.2, 1.0), None, 0.1, "failed"),
+        (7.0, None, None, "ok"),
+        (7.0, 3.0, None, "ok"),
+        (7.0, None, 0.1, "failed"),
+        (math.nan, None, None, "failed"),
+        (math.nan, 1.0, 0.1, "failed"),
+    ],
+)
+def test_how_a_number_is_judged(monkeypatch, found, expected, tolerance, status):
+    from benchmarks.validation import curvature
+
+    monkeypatch.setattr(curvature, "torus_order", lambda: found)
+    case = Case(
+        name="planted", description="", reason="planted", module=curvature.__name__, function="torus_order",
+        expected=expected, tolerance=tolerance,
+    )  # fmt: skip
+    row = case.run()
+    assert row.status == status and (status == "ok" or row.reason)
+    assert row.tolerance == tolerance
+    if isinstance(found, tuple):
+        assert (row.value, row.expected) == found
+    broken = dataclasses.replace(case, function="nothing").run()
+    assert broken.status == "failed" and "nothing" in broken.reason
+
+
+def test_order_is_the_slope():
+    assert fitted_order([4e-3, 1e-3, 2.5e-4], [1, 0.5, 0.25]) == pytest.approx(2)
+    assert math.isnan(fitted_order([1.0, 0.0], [1, 0.5])) and math.isnan(
+        fitted_order([1.0, math.inf], [1, 0.5])
+    )
+
+
+@pytest.mark.parametrize("order", [0.5, 1, 2])
+def test_order_by_halving_needs_no_exact_answer(order):
+    limit, error = np.random.default_rng(0).normal(size=(2, 5, 3))
+    found = halving_order(lambda n: limit + error / n**order, (10, 20, 40, 80))
+    assert found == pytest.approx(order)
+
+
+def test_viscous_edges_resist_what_stretches_and_not_what_moves_alike():
+    rest = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    term = Viscosity(Cloth(rest, np.array([[0, 1, 2]]), Material()))
+    term.prepare(Step(previous=rest, velocity=0 * rest, guess=rest, dt=0.1))
+    assert np.abs(term.value_and_gradient(rest + np.array([1.0, 2.0, 3.0]))[1]).max() == 0.0
+    apart = rest.copy()
+    apart[1, 0] += 0.2  # at 2 m/s from both other vertices
+    value, gradient = term.value_and_gradient(apart)
+    assert gradient[:, 0] == pytest.approx([-2 * VISCOSITY, 4 * VISCOSITY, -2 * VISCOSITY])
+    assert value == pytest.approx(2 * VISCOSITY * 0.2**2 / 2 / 0.1)
+    hessian = Potential([term]).hessian(apart).toarray()
+    assert (hessian @ (apart - rest).ravel()).reshape(3, 3) == pytest.approx(gradient)

@@ -1,0 +1,195 @@
+"""A full disk loses nothing that was finished: one line, status 1, and the same command goes on with room.
+
+A limit on the size of files stands for the full disk: both are found when a file grows.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from benchmarks import run
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner import whole_run as execution
+from reference_sim import Trajectory
+from reference_sim.command import simulate_command as command
+from reference_sim.files.array_file import write_array
+from reference_sim.files.atomic_files import disk_full, new_folder, replacing
+from reference_sim.trajectory.writer import ROOM
+from snug.networks.tensor_file import read_tensors, write_tensors
+from snug.training import run as training_run
+from snug.training.run import Saving
+from tests.benchmarks.runner.tasks_by_hand import InProcess
+from tests.reference_sim.meshes import grid
+from tests.reference_sim.trajectory.test_trajectory import wave
+from tests.snug.training.test_checkpoint import same_model, short
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """No file of this process grows beyond that size [bytes]."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def limited(size: int, *words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The command in a process of its own under that limit."""
+    return subprocess.run(
+        [sys.executable, "-m", *words],
+        cwd=cwd, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
+    )  # fmt: skip
+
+
+# --- files -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda path: write_array(path, np.zeros(1000)),
+        lambda path: np.savez(path, a=np.zeros(1000)),
+        lambda path: path.write_bytes(bytes(8000)),
+    ],
+)
+def test_a_file_that_finds_no_room_leaves_the_one_before_it(tmp_path, write):
+    path = tmp_path / "a.npz"
+    path.write_text("before")
+    with (
+        pytest.raises(OSError, match="File too large") as full,
+        files_up_to(4000),
+        replacing(path) as temporary,
+    ):
+        write(temporary)
+    assert full.value.errno == errno.EFBIG and full.value.filename == str(path)
+    assert disk_full(full.value).startswith(f"{path}: File too large (") and "MB are free" in disk_full(
+        full.value
+    )
+    assert path.read_text() == "before" and os.listdir(tmp_path) == ["a.npz"]
+    assert disk_full(PermissionError(errno.EACCES, "no")) == disk_full(ValueError()) == ""
+
+
+def test_a_model_that_finds_no_room_leaves_the_one_before_it(tmp_path):
+    path = tmp_path / "a.safetensors"
+    write_tensors(path, {"a": torch.zeros(10)}, {"format": "x"})
+    with pytest.raises(OSError, match="File too large"), files_up_to(4000):
+        write_tensors(path, {"a": torch.ones(10_000)}, {"format": "x"})
+    assert not read_tensors(path)[0]["a"].any() and os.listdir(tmp_path) == ["a.safetensors"]
+
+
+@pytest.mark.parametrize("size", [0, 1000, ROOM, ROOM + 30_000])
+def test_a_trajectory_that_finds_no_room_leaves_no_part(tmp_path, size):
+    with pytest.raises(OSError, match="File too large") as full, files_up_to(size):
+        wave(40).save(tmp_path / "a.vtkhdf")
+    assert "a.vtkhdf" in full.value.filename and list(tmp_path.iterdir()) == []
+
+
+def test_a_trajectory_takes_no_more_room_than_it_needs(tmp_path):
+    wave(5).save(tmp_path / "a.vtkhdf")
+    assert (tmp_path / "a.vtkhdf").stat().st_size < ROOM // 4
+
+
+# --- commands ----------------------------------------------------------------------------------------------
+
+
+def test_a_simulation_stops_in_one_line_and_resumes_to_the_same_bits(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    positions, faces = grid(6, 6, width=0.4, depth=0.4)
+    lines = [f"v {x} {y} {z}\n" for x, y, z in positions] + [f"f {a} {b} {c}\n" for a, b, c in faces + 1]
+    Path("sheet.obj").write_text("".join(lines))
+    words = ["sheet.obj", "--pins", "0,6", "--frames", "12", "--quiet", "-o"]
+    assert command.main([*words, "whole.vtkhdf"]) == 0
+    limit = Path("whole.vtkhdf").stat().st_size + ROOM - 10_000
+    stopped = limited(limit, "reference_sim.simulate", *words, "a.vtkhdf", cwd=tmp_path)
+    assert stopped.returncode == 1 and stopped.stderr.count("\n") == 1
+    assert stopped.stderr.startswith("simulate: a.vtkhdf: File too large") and "--resume" in stopped.stderr
+    assert 1 <= Trajectory.load("a.vtkhdf").frames < 12
+    assert command.main([*words, "a.vtkhdf", "--resume"]) == 0
+    whole, resumed = Trajectory.load("whole.vtkhdf"), Trajectory.load("a.vtkhdf")
+    np.testing.assert_array_equal(resumed.positions, whole.positions)
+    for name, values in whole.frame_fields.items():
+        np.testing.assert_array_equal(resumed.frame_fields[name], values)
+
+
+def test_a_training_keeps_its_last_checkpoint(tmp_path, monkeypatch):
+    whole, path = short(steps=12), tmp_path / "run.safetensors"
+    write, saved = training_run.write_tensors, []
+
+    def second_is_too_large(place, tensors, header):
+        saved.append(header["done"])
+        with files_up_to(1 << 40 if len(saved) == 1 else 4000):
+            return write(place, tensors, header)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(training_run, "write_tensors", second_is_too_large)
+        with pytest.raises(OSError, match="File too large") as full:
+            short(steps=12, saving=Saving(path=path, steps=4))
+    assert saved == [4, 8] and disk_full(full.value).startswith(f"{path}: ")
+    assert os.listdir(tmp_path) == ["run.safetensors"] and read_tensors(path)[1]["done"] == 4
+    same_model(short(steps=12, saving=Saving(path=path, steps=4, resume=True)), whole)
+
+
+def in_process(folder, assets, workers) -> InProcess:
+    return InProcess(folder, assets)
+
+
+@pytest.mark.parametrize("own_processes", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    words = [
+        "--preset",
+        "smoke",
+        "--suite",
+        "speed",
+        "--scenes",
+        "free_fall",
+        "--methods",
+        "simulation",
+        "-o",
+    ]
+    folder, other = RunFolder(tmp_path / "a"), RunFolder(tmp_path / "b")
+    if own_processes:
+        stopped = limited(100_000, "benchmarks.run", *words, str(folder.path), cwd=ROOT)
+        status, said = stopped.returncode, stopped.stderr
+    else:
+        monkeypatch.setattr(execution, "LocalExecutor", in_process)
+        with files_up_to(100_000):
+            status = run.main([*words, str(folder.path)])
+        said = capsys.readouterr().err
+    (line,) = (line for line in said.splitlines() if line.startswith("benchmarks.run: "))
+    assert status == 1 and "Traceback" not in said and line.endswith("the same command goes on from there")
+    assert "simulation.vtkhdf.part: File too large" in line
+    assert folder.read_config()["interrupted"] and not list(folder.path.rglob("*.part*"))
+    assert run.main([*words, str(folder.path)]) == run.main([*words, str(other.path)]) == 0
+    rows, others = (
+        [(r.metric, r.value, r.status) for r in made.read_rows() if "cost/" not in r.metric]
+        for made in (folder, other)
+    )
+    assert rows == others
+
+
+def test_two_processes_that_fill_a_folder_of_one_name_do_not_share_it(tmp_path, monkeypatch):
+    first, second = new_folder(tmp_path / "out"), new_folder(tmp_path / "out")
+    (first.__enter__() / "first").touch()
+    monkeypatch.setattr(os, "getpid", lambda: 7)
+    (second.__enter__() / "second").touch()
+    first.__exit__(None, None, None)
+    with pytest.raises(OSError, match="not empty"):
+        second.__exit__(None, None, None)
+    assert [p.name for p in tmp_path.rglob("*")] == ["out", "first"]

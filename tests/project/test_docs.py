@@ -1,0 +1,187 @@
+"""The documents: examples run as written, links lead somewhere, definitions are those of the code."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from benchmarks.metrics import declared
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+PAPER = ROOT / "docs" / "paper.md"
+PUBLISHED = ROOT / "reports" / "published"
+SAID = {"holds": "reproduced", "does not hold": "refuted", "tie": "tie", "cannot be told": "cannot be told"}
+EXTEND = ROOT / "docs" / "extend.md"
+FILE = re.compile(r"File `([^`]+)`:$")
+SHORT = ("A method", "A network from elsewhere", "A scene", "A metric", "A package")
+LONG = (
+    "How to add something",
+    "A program",
+    "A recipe",
+)  # tests/benchmarks/plan/test_plug_ins.py: the first two
+
+
+def blocks(text: str) -> Iterator[tuple[str, str, str]]:
+    """(line before, language, content) of each block of code."""
+    for found in re.finditer(r"(?:^([^\n]*)\n\n?)?^```(\w*)\n(.*?)^```$", text, re.M | re.S):
+        yield (found[1] or "").strip(), found[2], found[3]
+
+
+def sections(text: str) -> dict[str, str]:
+    """Title -> text, of the parts under "# " and "## "."""
+    parts = re.split(r"^##? (.+)$", text, flags=re.M)
+    return dict(zip(parts[1::2], parts[2::2]))
+
+
+SECTIONS = sections(EXTEND.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def user(tmp_path_factory) -> Path:
+    """A user's folder with every file of the document."""
+    folder = tmp_path_factory.mktemp("user")
+    for section in SECTIONS.values():
+        for before, _, content in blocks(section):
+            if found := FILE.search(before):
+                (folder / found[1]).write_text(content, encoding="utf-8")
+    return folder
+
+
+def run(folder: Path, line: str) -> None:
+    path = os.pathsep.join([str(ROOT), str(folder / "site")])
+    found = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    environment = os.environ | {"PYTHONPATH": path, "PATH": found, "MPLBACKEND": "Agg"}
+    words = ["bash", "-ec", line]
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
+
+
+def commands(folder: Path, title: str, out: Path | None = None) -> None:
+    """Run the commands of a section, in their order; what is installed goes into a folder of its own."""
+    for _, language, content in blocks(SECTIONS[title]):
+        if language == "sh":
+            install = "python -m pip install -q --no-deps --no-build-isolation --target site ."
+            run(folder, content.replace("pip install .", install).replace("DIR", str(out)))
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with (folder / "results.csv").open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.mark.parametrize("title", [*SHORT, *(pytest.param(title, marks=pytest.mark.slow) for title in LONG)])
+def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
+    commands(user, title, tmp_path)
+    if title == "How to add something":
+        return  # a check leaves nothing
+    rows = rows_of(tmp_path)
+    assert rows and all(row["status"] == "ok" for row in rows)
+    methods = {row["method"] for row in rows}
+    if title in ("A method", "A package"):
+        total = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/total"}
+        # In n frames backward Euler falls (n + 1) / n times as far.
+        assert total["explicit-200"] == pytest.approx(total["simulation"], rel=0.2)
+    if title == "A network from elsewhere":
+        skinned = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/strain"}
+        assert skinned["pose-network"] > skinned["skinning"] > 0.0  # the same but for smoothed weights
+    if title == "A program":
+        off = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "exact/distance"}
+        assert methods == {"simulation", "fall"} and max(off.values()) < 1e-9
+    if title == "A scene":
+        assert {row["scene"] for row in rows} == {"curtain"}
+        # The section on energies gives the curtain its wind, which does work on it.
+        wind = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/wind"}
+        assert wind.keys() == {"simulation", "newton-1"} and max(wind.values()) < 0.0
+    if title == "A metric":
+        assert {row["unit"] for row in rows if row["metric"] == "height/lowest"} == {"m"}
+        table = (tmp_path / "tables" / "height_by_scene.csv").read_text(encoding="utf-8")
+        assert table.startswith("suite,scene,method,height/lowest [m],")
+    if title == "A recipe":
+        assert methods == {"snug-windy"}
+
+
+def test_every_example_is_tested():
+    examples = {title for title, text in SECTIONS.items() if "```sh" in text}
+    assert examples == {*SHORT, *LONG}
+
+
+def test_every_metric_is_defined_as_declared():
+    text = (ROOT / "docs" / "metrics.md").read_text(encoding="utf-8")
+    escaped = {name: metric.definition.replace("|", "\\|") for name, metric in declared().items()}
+    lines = [f"| `{name}` | {metric.unit} | {escaped[name]} |" for name, metric in declared().items()]
+    table = re.findall(r"^\| `[^`|]+/[^`|]+` \|.*$", text, re.M)
+    assert not [line for line in lines if line not in table], "add these lines to the table"
+    assert not [line for line in table if line not in lines], "remove these lines from the table"
+
+
+def table_rows(path: Path) -> list[list[str]]:
+    """The cells of each row of each table of a document."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return [[cell.strip() for cell in line[1:-1].split("|")] for line in lines if line.startswith("|")]
+
+
+def effect_text(kind: str, metric: str, text: str) -> str:
+    """As docs/paper.md writes it: a ratio in two places, or two digits where it is small; whole points;
+    other differences in two places, or three below 1.
+    """
+    value = float(text)
+    if kind == "difference":
+        places = 0 if "%" in metric else 2 if abs(value) >= 1.0 else 3
+        return re.sub(r"^(-?)0\.", r"\1.", f"{value:.{places}f}")
+    return (f"{value:.2f}" if value >= 0.1 else f"{value:.2g}").removeprefix("0")
+
+
+def test_the_page_of_the_paper_counts_its_own_verdicts():
+    rows = table_rows(PAPER)
+    judged = Counter(row[1] for row in rows if row[1] in (*SAID.values(), "not tested"))
+    assert {row[0]: int(row[1]) for row in rows if row[0] in judged} == judged
+    assert f"| of {judged.total()} claims |" in PAPER.read_text(encoding="utf-8")
+
+
+def findings(run: str) -> list[tuple[str, str]]:
+    """(verdict, effect) of each published finding, as docs/paper.md writes it; of those with an interval."""
+    with (PUBLISHED / run / "tables" / "findings.csv").open(newline="", encoding="utf-8") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["effect_low"] != "-"]
+    names = ("effect", "effect_low", "effect_high")
+    texts = [[effect_text(row["effect_kind"], row["metric"], row[name]) for name in names] for row in rows]
+    return [
+        (SAID[row["verdict"]], f"{effect} ({low} to {high})") for row, (effect, low, high) in zip(rows, texts)
+    ]
+
+
+def test_the_page_of_the_paper_says_what_the_published_findings_say():
+    published = findings("quick")
+    judged = [row for row in table_rows(PAPER) if row[-1] == "findings"]
+    for verdict, words in published:
+        assert any(row[1] == verdict and words in row[2] for row in judged), f"{verdict}: {words}"
+    assert len(judged) == len(published)
+    for row in table_rows(PAPER):
+        if row[-1] == "its findings":
+            runs = [run for run in ("ablations", "windows") if f"`{run}`" in row[-2]]
+            said = [(verdict, words) for run in runs for verdict, words in findings(run) if words in row[2]]
+            assert said and {verdict for verdict, _ in said} == {row[1]}, row
+
+
+def heading_anchors(path: Path) -> set[str]:
+    """What GitHub makes of the headings of a document."""
+    titles = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(path):
+    for link in re.findall(r"\]\(([^)\s]+)\)", path.read_text(encoding="utf-8")):
+        if not link.startswith(("http://", "https://")):
+            name, _, anchor = link.partition("#")
+            target = path.parent / name if name else path
+            assert target.exists(), f"{path.name}: {link}"
+            assert not anchor or anchor in heading_anchors(target), f"{path.name}: {link}"

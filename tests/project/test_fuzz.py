@@ -1,0 +1,40 @@
+"""Files that nobody meant: every reader refuses them in one line, at once, without taking the memory."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from snug.motion.files import load_motions
+from snug.motion.motion import MotionError
+
+HERE = Path(__file__).resolve().parent
+
+
+@pytest.mark.parametrize("count", [210, pytest.param(2001, marks=pytest.mark.slow)])
+def test_mutated_files_are_refused_in_one_line(count, tmp_path):
+    paths = os.pathsep.join(map(str, (HERE.parent.parent,)))
+    done = subprocess.run(
+        [sys.executable, HERE / "fuzz_readers.py", str(count), tmp_path],
+        env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, timeout=900,
+    )  # fmt: skip
+    last = tmp_path / "last"
+    at = last.read_text() if last.is_file() else "the valid files"
+    assert done.returncode == 0, f"ended at {at}: {done.stderr[-2000:]}"
+    found = json.loads(done.stdout)
+    assert found["problems"] == []
+    assert found["refused"] > 0.7 * count and found["peak"] < 2000.0 and found["slowest"] < 10.0
+
+
+@pytest.mark.parametrize("name", [b"a" * 246, b"walk\xff", b"two\nlines"])
+def test_a_motion_that_no_file_can_be_named_after_is_refused(name, tmp_path):
+    path = tmp_path / os.fsdecode(name + b".npz")
+    path.write_bytes(b"")
+    with pytest.raises(MotionError, match="a name of at most 100 printable bytes") as refused:
+        load_motions(path)
+    assert str(refused.value).isascii() and "\n" not in str(refused.value)

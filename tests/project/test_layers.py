@@ -1,0 +1,170 @@
+"""Who may import whom, read from the syntax tree: the rules of the architecture, held by a test."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+LAYERS = ("reference_sim", "snug", "benchmarks", "reports")
+
+# What each layer may import of ours. An entry also allows what lies below it.
+ALLOWED = {
+    "reference_sim": ("reference_sim",),
+    "snug": ("snug", "reference_sim"),
+    "benchmarks": ("benchmarks", "snug", "reference_sim"),
+    "reports": (
+        "reports",
+        "benchmarks.results.run_folder",
+        "benchmarks.results.frame_energies",
+        "benchmarks.metrics.surface.curvature",
+        "reference_sim.command.command_line",
+        "reference_sim.trajectory.trajectory",
+        "reference_sim.files.array_file",
+        "reference_sim.trajectory.point_cache",
+        "reference_sim.files.atomic_files",
+        "reference_sim.cloth",  # what lies under the skin is looked up as the simulator does
+        "reference_sim.obstacle",
+    ),
+}
+# The referee's solvers are not for the contestants.
+FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate")}
+# A run ends by making the report of the run that it wrote.
+EXCEPTIONS = {("benchmarks/runner/whole_run.py", "reports.build.build_report")}
+# Headline geometry must not share an error with the physics.
+PURE = ("benchmarks/metrics/surface/curvature.py", "benchmarks/metrics/surface/distances.py")
+DECLARATION = "benchmarks.metric.Metric"  # name, unit and definition: no physics
+
+
+def files_of(layer: str) -> list[Path]:
+    return sorted((ROOT / layer).rglob("*.py"))
+
+
+def imports(tree: ast.Module, package: str) -> Iterator[tuple[int, str]]:
+    """(line, dotted name) of everything imported; without those for the type checker alone."""
+    for node in _walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                parents = package.split(".")[: len(package.split(".")) - node.level + 1]
+                base = ".".join([*parents, *([base] if base else [])])
+            yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
+
+
+def _walk(node: ast.AST) -> Iterator[ast.AST]:
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+            continue
+        yield child
+        yield from _walk(child)
+
+
+def within(name: str, roots: tuple[str, ...]) -> bool:
+    return any(name == root or name.startswith(root + ".") for root in roots)
+
+
+def complaints(relative: str, source: str) -> list[str]:
+    """Every import of the file that breaks a rule."""
+    layer = relative.split("/")[0]
+    package = ".".join(Path(relative).parent.parts)
+    tree = ast.parse(source)
+    wrong = []
+    for line, name in imports(tree, package):
+        ours = name.split(".")[0] in LAYERS
+        if ours and not within(name, ALLOWED[layer]) and (relative, name) not in EXCEPTIONS:
+            wrong.append(f"{relative}:{line}: {layer} must not import {name}")
+        if within(name, FORBIDDEN.get(layer, ())):
+            wrong.append(f"{relative}:{line}: {layer} must not import {name}")
+        if relative in PURE and within(name, LAYERS) and name != DECLARATION:
+            wrong.append(f"{relative}:{line}: a geometry metric must not import {name}")
+    return wrong
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_imports_follow_the_layers(layer):
+    files = files_of(layer)
+    assert files, f"no module in {layer}"
+    wrong = []
+    for path in files:
+        wrong += complaints(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_named_files_exist():
+    named = (*PURE, *(path for path, _ in EXCEPTIONS))
+    assert [path for path in named if not (ROOT / path).is_file()] == []
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("reference_sim/a.py", "import snug"),
+        ("reference_sim/energies/a.py", "def f():\n    from benchmarks import run"),
+        ("snug/a.py", "from reference_sim import simulate"),
+        ("snug/a.py", "from reference_sim.minimise.newton import minimise_newton"),
+        ("snug/a.py", "from reports import build"),
+        ("benchmarks/cell.py", "from reports.build import build_report"),
+        ("reports/a.py", "from benchmarks import run"),
+        ("reports/a.py", "import reference_sim"),
+        ("reports/a.py", "from ..snug import body"),
+        ("benchmarks/metrics/surface/distances.py", "from reference_sim import Potential"),
+    ],
+)
+def test_a_planted_import_is_found(path, source):
+    assert complaints(path, source)
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("snug/a.py", "from reference_sim import Cloth\nfrom . import body"),
+        ("snug/baselines/a.py", "from ..loss import f\nimport torch"),
+        (
+            "benchmarks/runner/whole_run.py",
+            "def f():\n    import torch\n    from reports.build import build_report",
+        ),
+        ("reports/a.py", "from benchmarks.results.run_folder import RunFolder\nfrom .tables import f"),
+        ("reports/a.py", "def f():\n    from reference_sim.trajectory.trajectory import Trajectory"),
+        (
+            "benchmarks/metrics/surface/distances.py",
+            "if TYPE_CHECKING:\n    from reference_sim import Obstacle",
+        ),
+    ],
+)
+def test_an_allowed_import_passes(path, source):
+    assert not complaints(path, source)
+
+
+def demand_no_circle(sources: Mapping[str, str]) -> None:
+    """Raises CycleError for modules, name to source, that import each other; inside functions counts too."""
+    graph: dict[str, set[str]] = {}
+    for module, source in sources.items():
+        inside = f"{module}."
+        package = module if any(name.startswith(inside) for name in sources) else module.rpartition(".")[0]
+        named = [name for _, name in imports(ast.parse(source), package)]
+        found = {name if name in sources else name.rpartition(".")[0] for name in named}
+        graph[module] = found & set(sources) - {module}
+    TopologicalSorter(graph).prepare()
+
+
+def test_no_module_imports_itself_by_a_circle():
+    sources = {}
+    for path in (path for layer in LAYERS for path in files_of(layer)):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        sources[module] = path.read_text(encoding="utf-8")
+    assert len(sources) > 150
+    demand_no_circle(sources)
+
+
+def test_a_planted_circle_is_found():
+    one, other = "from snug.b import f", "def f():\n    from snug import a"
+    with pytest.raises(CycleError):
+        demand_no_circle({"snug.a": one, "snug.b": other, "snug.c": one})
+    typed = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from snug.a import g"
+    demand_no_circle({"snug.a": one, "snug.b": typed, "snug.c": one})

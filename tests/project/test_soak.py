@@ -1,0 +1,75 @@
+"""What works for long takes no more memory than what it keeps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference_sim import Cloth, Obstacle, simulate
+from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Gravity, StretchStVK
+from snug.recipes.recipe import DEFAULT
+from snug.training.run import Saving
+from snug.training.train import train
+from tests.project.own_memory import needs_proc, own_memory, slope
+from tests.reference_sim.meshes import grid, sphere
+from tests.snug.training.dressing import swaying, tube_dress
+
+pytestmark = [pytest.mark.slow, needs_proc]
+FRAMES, STEPS = 5000, 20_000
+LOOP = 120  # frames in which the ball goes round
+
+
+def growth(samples: list[tuple[int, int]], unit: str) -> tuple[float, float]:
+    """Slope and its error [bytes] of what is left once everything is loaded and compiled."""
+    late = [(number, 1024 * kilobytes) for number, kilobytes in samples[len(samples) // 10 :]]
+    found, error = slope(late)
+    first, last = late[0][1] / 1e6, late[-1][1] / 1e6
+    print(f"{first:.1f} to {last:.1f} MB, {found:.0f} ± {error:.0f} bytes a {unit}")
+    return found, error
+
+
+def test_a_simulation_of_many_frames_keeps_the_frames_alone(tmp_path):
+    """A sheet hung by two corners over a ball that goes round below it, with friction."""
+    positions, faces = grid(9, 9, width=0.5, depth=0.5)
+    cloth = Cloth(positions + np.array([-0.25, 0.21, -0.25]), faces, pins=[0, 9])
+    ball, ball_faces = sphere(2, 0.2)
+    angle = 2 * np.pi * np.arange(FRAMES) / LOOP
+    way = 0.05 * np.stack([np.cos(angle) - 1, 0 * angle, np.sin(angle)], axis=1)
+    contact = ContactPenalty(cloth)
+    samples: list[tuple[int, int]] = []
+
+    def handles(frame: int) -> np.ndarray:
+        if frame % 100 == 0:
+            samples.append((frame, own_memory()))
+        return cloth.rest_positions[[0, 9]]
+
+    made = simulate(
+        cloth,
+        [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), contact, ContactFriction(contact)],
+        frames=FRAMES, obstacle=Obstacle(ball + way[:, None], ball_faces), pin_positions=handles,
+        path=tmp_path / "long.vtkhdf",
+    )  # fmt: skip
+    assert made.frames == FRAMES and made.frame_fields["converged"].mean() > 0.99
+    moved = np.abs(made.positions[-1] - made.positions[-1 - LOOP // 2]).max()
+    assert moved > 0.01  # it was not at rest
+    found, error = growth(samples, "frame")
+    kept = 24 * cloth.vertex_count + 3000  # positions; times, counts and energies by name
+    assert found < kept + 3 * error
+
+
+def test_a_training_of_many_steps_keeps_its_history_alone(tmp_path):
+    samples: list[tuple[int, int]] = []
+
+    def look() -> bool:
+        samples.append((len(samples), own_memory() if len(samples) % 400 == 0 else 0))
+        return False
+
+    recipe = replace(DEFAULT, mixed=0.0, batch=4)
+    saving = Saving(path=tmp_path / "checkpoint.safetensors", steps=1000)
+    train("snug", tube_dress(), [swaying(60)], steps=STEPS, seed=0, recipe=recipe,
+          progress=False, every=100, saving=saving, stop=look)  # fmt: skip
+    assert len(samples) == STEPS
+    found, _ = growth(samples[::400], "step")
+    assert found < 1000  # positions of one frame, kept in each, would be 1800

@@ -1,0 +1,158 @@
+"""Both Cholesky backends against dense numpy, on matrices that know nothing of cloth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from reference_sim import Cloth, Potential
+from reference_sim.assembly.cholesky import CholmodSolver, SuperLUSolver, analyse, nested_dissection
+from reference_sim.energies import Inertia, StretchStVK
+from tests.reference_sim.meshes import patch
+
+both = pytest.mark.parametrize("backend", [CholmodSolver, SuperLUSolver])
+
+
+class Problem:
+    """A random sparse symmetric matrix, of which the lower triangle is stored."""
+
+    def __init__(self, size: int, seed: int) -> None:
+        generator = np.random.default_rng(seed)
+        pattern = sp.random(size, size, density=0.1, random_state=seed) + sp.eye(size)
+        self.lower = sp.csc_matrix(sp.tril(pattern + pattern.T))
+        self.lower.sort_indices()
+        self.order = generator.permutation(size)
+        self.rows = self.lower.indices
+        self.columns = np.repeat(np.arange(size), np.diff(self.lower.indptr))
+        self.off = self.rows != self.columns
+        self.data = np.where(self.off, generator.normal(size=self.lower.nnz), 0.0)
+        self.data[~self.off] = np.abs(self.dense(self.data)).sum(axis=1) + 1.0  # diagonally dominant
+
+    def dense(self, data: np.ndarray) -> np.ndarray:
+        """The symmetric matrix that these values mean; what is stored above the diagonal is ignored."""
+        size = self.lower.shape[0]
+        lower = np.zeros((size, size))
+        lower[self.rows, self.columns] = data
+        lower = np.tril(lower)
+        return lower + np.tril(lower, -1).T
+
+    def solver(self, backend):
+        return backend(self.lower.indptr.astype(np.int64), self.rows.astype(np.int64), self.order)
+
+    def indefinite(self) -> np.ndarray:
+        """Values with one negative eigenvalue, in the middle of the matrix."""
+        data = self.data.copy()
+        data[~self.off] = np.where(
+            np.arange(self.lower.shape[0]) == self.lower.shape[0] // 2, -1, data[~self.off]
+        )
+        assert np.linalg.eigvalsh(self.dense(data))[0] < 0
+        return data
+
+
+@both
+@pytest.mark.parametrize("size", [1, 2, 3, 60])
+def test_solves_as_dense_numpy_does(backend, size):
+    problem = Problem(size, seed=size)
+    solver = problem.solver(backend)
+    assert solver.factorise(problem.data)
+    generator = np.random.default_rng(0)
+    for b in (generator.normal(size=size), generator.normal(size=(size, 3))):
+        before = b.copy()
+        x = solver.solve(b)
+        assert x.shape == b.shape and (b == before).all()
+        # Diagonally dominant: condition number below 100 times round-off.
+        assert x == pytest.approx(np.linalg.solve(problem.dense(problem.data), b), rel=1e-12, abs=1e-13)
+
+
+@both
+def test_a_matrix_that_is_not_positive_definite_is_an_answer_and_makes_no_noise(backend, capfd):
+    problem = Problem(40, seed=7)
+    solver = problem.solver(backend)
+    assert not solver.factorise(problem.indefinite())
+    assert not solver.factorise(-problem.data)
+    assert not solver.factorise(0.0 * problem.data)
+    semidefinite = problem.data.copy()  # one zero row and column
+    semidefinite[(problem.rows == 5) | (problem.columns == 5)] = 0.0
+    assert not solver.factorise(semidefinite)
+    captured = capfd.readouterr()
+    assert captured.out == "" and captured.err == ""
+
+
+@both
+def test_an_indefinite_matrix_with_a_positive_diagonal_is_found_out(backend):
+    """[[1, 2], [2, 1]]: only elimination sees the negative eigenvalue."""
+    solver = backend(np.array([0, 2, 3]), np.array([0, 1, 1]), np.arange(2))
+    assert not solver.factorise(np.array([1.0, 2.0, 1.0]))
+    assert solver.factorise(np.array([1.0, 0.5, 1.0]))
+    assert solver.solve(np.array([1.5, 1.5])) == pytest.approx([1.0, 1.0], rel=1e-14)
+
+
+@both
+def test_the_pattern_serves_again_after_success_and_after_failure(backend):
+    problem = Problem(50, seed=3)
+    solver = problem.solver(backend)
+    b = np.random.default_rng(1).normal(size=50)
+    generator = np.random.default_rng(2)
+    for k in range(4):
+        data = problem.data * np.where(problem.off, generator.uniform(0.1, 1.0, len(problem.data)), 1.0 + k)
+        assert not solver.factorise(problem.indefinite())
+        assert solver.factorise(data)
+        assert solver.solve(b) == pytest.approx(np.linalg.solve(problem.dense(data), b), rel=1e-12, abs=1e-13)
+
+
+@both
+def test_values_stored_above_the_diagonal_are_ignored(backend):
+    # [[4, 1], [1, 3]] with a wrong value in the upper corner, as a whole 2 x 2 block has one.
+    solver = backend(np.array([0, 2, 4]), np.array([0, 1, 0, 1]), np.array([1, 0]))
+    assert solver.factorise(np.array([4.0, 1.0, 99.0, 3.0]))
+    assert solver.solve(np.array([1.0, 2.0])) == pytest.approx([1 / 11, 7 / 11], rel=1e-14)
+
+
+@both
+def test_a_membrane_with_its_own_pattern_and_order(backend):
+    x, faces = patch(2, cells=5)
+    cloth = Cloth(x, faces, pins=[0, 5])
+    potential = Potential([StretchStVK(cloth), Inertia(cloth, 1 / 30)])
+    free = np.ones(cloth.vertex_count, dtype=bool)
+    free[cloth.pins] = False
+    pattern = potential.pattern(free)
+    data = pattern.assemble(1.1 * x)
+    dense = pattern.symmetric(data).toarray()
+    solver = backend(pattern.indptr, pattern.indices, pattern.order)
+    assert solver.factorise(data)
+    b = np.random.default_rng(4).normal(size=pattern.size)
+    condition = np.linalg.cond(dense)
+    assert condition < 1e4
+    assert np.abs(dense @ solver.solve(b) - b).max() < 1e-15 * condition * np.abs(b).max()
+
+
+def test_analyse_takes_cholmod_where_it_is_and_superlu_where_it_is_not(monkeypatch):
+    problem = Problem(10, seed=1)
+    pattern = (problem.lower.indptr.astype(np.int64), problem.rows.astype(np.int64), problem.order)
+    assert isinstance(analyse(*pattern), CholmodSolver)
+    monkeypatch.setitem(__import__("sys").modules, "cvxopt", None)
+    assert isinstance(analyse(*pattern), SuperLUSolver)
+
+
+@pytest.mark.parametrize("metis", [True, False])
+def test_the_order_is_a_permutation_that_saves_fill(metis, monkeypatch):
+    if not metis:
+        monkeypatch.setitem(__import__("sys").modules, "pymetis", None)
+    x, faces = patch(3, cells=16)
+    faces = np.random.default_rng(0).permutation(len(x))[faces]  # a numbering without any locality
+    graph = sp.csr_matrix((np.ones(3 * len(faces)), (faces.ravel(), np.roll(faces, 1, axis=1).ravel())))
+    graph = sp.csr_matrix(((graph + graph.T) > 0).astype(float))
+    order = nested_dissection(graph)
+    assert sorted(order.tolist()) == list(range(len(x)))
+    dense = graph.toarray() * -1.0 + 10 * np.eye(len(x))
+
+    def fill(p: np.ndarray) -> int:
+        return int((np.abs(np.linalg.cholesky(dense[np.ix_(p, p)])) > 1e-14).sum())
+
+    assert fill(order) < 0.7 * fill(np.arange(len(x)))
+
+
+def test_the_order_of_a_tiny_graph():
+    assert nested_dissection(sp.csr_matrix((2, 2))).tolist() == [0, 1]
+    assert nested_dissection(sp.csr_matrix((0, 0))).tolist() == []

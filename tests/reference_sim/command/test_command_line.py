@@ -1,0 +1,55 @@
+"""What all commands share: one line and an exit status, whatever they meet."""
+
+from __future__ import annotations
+
+import errno
+import importlib
+
+import pytest
+
+from reference_sim.command.command_line import command
+
+COMMANDS = (
+    "snug.check", "snug.train", "benchmarks.check", "benchmarks.dataset",
+    "benchmarks.export", "benchmarks.merge", "benchmarks.run", "benchmarks.scaling", "benchmarks.score",
+    "benchmarks.speedup", "reports.build", "reports.check", "reports.compare", "reports.export",
+    "reports.film",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_wrong_word_is_one_line_with_the_name_of_the_command(name, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert importlib.import_module(name).main(["--no-such-option"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"{name}: ") and said.count("\n") == 1
+    assert "--help" in said and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("met", "goes_on", "status", "said"),
+    [
+        (ValueError("a.obj: face 3\n has no area"), "", 2, "a.obj: face 3 has no area"),
+        (FileNotFoundError(errno.ENOENT, "No such file", "a.obj"), "", 2, "a.obj"),
+        (OSError(errno.ENOSPC, "No space left", "a.csv"), "--resume goes on", 1, "kept; --resume goes on"),
+        (KeyboardInterrupt(), "--resume goes on", 130, "interrupted; --resume goes on"),
+        (KeyboardInterrupt(), "", 130, "interrupted; nothing was written"),
+    ],
+)
+def test_what_a_command_meets_is_its_exit_status(met, goes_on, status, said, capsys):
+    @command("some.command", goes_on=goes_on)
+    def main() -> int:
+        raise met
+
+    assert main() == status
+    error = capsys.readouterr().err
+    assert error.startswith("some.command: ") and said in error and error.count("\n") == 1
+
+
+def test_a_fault_of_the_program_is_raised():
+    @command("some.command", bad_input=(FileNotFoundError,))
+    def main() -> int:
+        raise ValueError("shapes (3,) and (4,)")
+
+    with pytest.raises(ValueError, match="shapes"):
+        main()

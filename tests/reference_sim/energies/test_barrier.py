@@ -1,0 +1,262 @@
+"""The barrier and its friction, an energy at a time: derivatives, patterns, line search, refusals."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from reference_sim import Cloth, Material, Obstacle, Potential, TrajectoryError, minimise, simulate
+from reference_sim.energies import (
+    BarrierFriction,
+    BendHinge,
+    ContactBarrier,
+    Energy,
+    Gravity,
+    Inertia,
+    Step,
+    StretchStVK,
+)
+from reference_sim.material import GRAVITY
+from tests.reference_sim.energies.barriers import cuts, folded, sheet, still
+from tests.reference_sim.meshes import box, grid, patch, sphere
+
+pytest.importorskip("ipctk", reason="ipctk is not installed: no barrier to test")
+
+
+def crumpled(distance: float = 3e-3) -> tuple[ContactBarrier, Obstacle, np.ndarray]:
+    """A sheet folded over to 2 mm from itself and 1.5 mm above a rough sphere: pairs of every kind."""
+    x, faces = patch(3, cells=6)
+    cloth = Cloth(0.1 * x, faces, Material())
+    generator = np.random.default_rng(4)
+    y = 0.1 * x[:, [0, 2, 1]]  # horizontal
+    over = y[:, 0] > 0.05
+    y[over] = y[over] * [-1, 1, 1] + [0.1, 2.0e-3, 0.0011]
+    y += generator.uniform(-1e-4, 1e-4, y.shape)
+    ball, ball_faces = sphere(4, radius=0.2)
+    ball += [0.05, -0.2015, 0.05]
+    return ContactBarrier(cloth, distance=distance), Obstacle(ball, ball_faces), y
+
+
+def with_pairs() -> tuple[ContactBarrier, BarrierFriction, np.ndarray]:
+    barrier, obstacle, x = crumpled()
+    friction = BarrierFriction(barrier, coefficient=0.7, speed=0.05)
+    step = still(x, obstacle)
+    for energy in (barrier, friction):
+        energy.prepare(step)
+    kinds = barrier.collisions.pairs(x)[0]
+    assert min(map(len, (kinds.fv_collisions, kinds.ee_collisions, kinds.ev_collisions))) > 0
+    # 0.8 mm is the slip at which friction is fully grown: some pairs have slipped less, some more.
+    return barrier, friction, x + np.random.default_rng(5).normal(0, 3e-4, x.shape)
+
+
+@pytest.mark.parametrize(("which", "force", "stiffness"), [(0, 1e-3, 1.0), (1, 1e-4, 0.1)])
+def test_derivatives_are_those_of_finite_differences(which, force, stiffness):
+    *energies, x = with_pairs()
+    energy = energies[which]
+    gradient, hessian = energy.value_and_gradient(x)[1], energy.sparse_hessian(x)
+    assert np.abs(gradient).max() >= force and np.abs(hessian.data).max() >= stiffness
+    assert abs(hessian - hessian.T).max() <= 1e-12 * np.abs(hessian.data).max()
+    h = 1e-9  # [m]: a hundred-thousandth of the smallest distance
+    for seed in range(3):
+        d = np.random.default_rng(seed).normal(size=x.shape)
+        (above, up), (below, down) = (energy.value_and_gradient(x + s * h * d) for s in (1, -1))
+        # Half the digits are left of a difference; a wrong factor or sign is far beyond that.
+        assert (above - below) / (2 * h) == pytest.approx(np.vdot(gradient, d), rel=1e-4)
+        product = (hessian @ d.ravel()).reshape(-1, 3)
+        assert np.abs((up - down) / (2 * h) - product).max() <= 1e-4 * np.abs(product).max()
+
+
+def test_convexity_takes_out_the_negative_curvature_and_nothing_else():
+    barrier, friction, x = with_pairs()
+    true, half, convex = (barrier.sparse_hessian(x, c).toarray() for c in (0.0, 0.5, 1.0))
+    scale = np.abs(true).max()
+    assert np.linalg.eigvalsh(true)[0] < -1e-3 * scale
+    assert np.linalg.eigvalsh(convex)[0] > -1e-12 * scale
+    assert np.linalg.eigvalsh(convex - true)[0] > -1e-12 * scale
+    assert np.abs(half - (true + convex) / 2).max() <= 1e-12 * scale
+    own = friction.sparse_hessian(x).toarray()
+    assert np.linalg.eigvalsh(own)[0] > -1e-12 * np.abs(own).max()
+
+
+def test_there_is_no_definition_in_torch_and_it_says_so():
+    for energy in with_pairs()[:2]:
+        with pytest.raises(NotImplementedError, match="no definition in torch"):
+            energy.energy(None)
+
+
+def test_hessian_of_a_potential_holds_pairs_that_no_other_term_couples():
+    barrier, friction, x = with_pairs()
+    others: list[Energy] = [StretchStVK(barrier.cloth), BendHinge(barrier.cloth)]
+    whole = Potential([*others, barrier, friction]).hessian(x)
+    parts = Potential(others).hessian(x) + barrier.sparse_hessian(x) + friction.sparse_hessian(x)
+    assert abs(whole - parts).max() <= 1e-12 * np.abs(whole.data).max()
+    assert whole.nnz > Potential(others).hessian(x).nnz
+
+
+def test_a_wider_pattern_is_kept_while_it_serves():
+    barrier, _, x = with_pairs()
+    potential = Potential([StretchStVK(barrier.cloth), barrier])
+    fixed = potential.pattern(np.ones(barrier.cloth.vertex_count, dtype=bool))
+    wide = fixed.covering(fixed.changing(x))
+    assert len(wide.indices) > len(fixed.indices)
+    assert wide.covering(wide.changing(x)) is wide
+    apart = wide.changing(barrier.cloth.rest_positions)
+    assert apart[0].nnz == 0 and wide.covering(apart) is wide and fixed.covering(apart) is fixed
+    assert np.array_equal(np.sort(wide.order), np.arange(wide.size))
+
+
+def test_the_way_of_a_line_search_ends_before_the_first_touch():
+    barrier, obstacle, x = crumpled()
+    barrier.prepare(still(x, obstacle))
+    cloth = barrier.cloth
+    for down in (1e-3, 0.01, 0.5):
+        direction = np.tile([0.0, -down, 0.0], (len(x), 1))
+        share = barrier.largest_step(x, direction)
+        assert 0 < share <= 1 and (share == 1) == (down == 1e-3)
+        assert not barrier.infeasibility(x + share * direction)
+        assert not cuts(x + share * direction, cloth.edges, obstacle.at(0), obstacle.faces).any()
+    assert "cuts" in barrier.infeasibility(x - np.array([0, 0.004, 0]))
+
+
+def test_a_start_that_intersects_is_refused_by_name():
+    cloth = sheet(2, 0.1, (-0.05, 0.0, -0.05))
+    ball, faces = sphere(1, radius=0.02)
+    terms = [StretchStVK(cloth), Gravity(cloth), ContactBarrier(cloth)]
+    words = r"edge \(\d+, \d+\) of the (cloth|body) cuts face \d+ of the (cloth|body)"
+    with pytest.raises(ValueError, match=words):
+        simulate(cloth, terms, obstacle=Obstacle(ball, faces), frames=2)
+    strip, start = folded(5)
+    start[strip.rest_positions[:, 0] > 0.11, 1] -= 0.0175  # the upper half, through the lower
+    with pytest.raises(ValueError, match=r"edge \(\d+, \d+\) of the cloth cuts face \d+ of the cloth"):
+        simulate(strip, [StretchStVK(strip), ContactBarrier(strip)], start=start, frames=2)
+    result = minimise(Potential([StretchStVK(strip), ContactBarrier(strip)]), start)
+    assert result.status == "diverged" and "of the cloth cuts face" in result.reason
+
+
+def test_the_elements_named_are_those_that_cut():
+    cloth = sheet(2, 0.1, (-0.05, 0.0, -0.05))
+    needle, faces = box((0.011, -0.05, 0.013), (0.012, 0.05, 0.014))
+    barrier = ContactBarrier(cloth)
+    x = cloth.rest_positions
+    barrier.prepare(still(x, Obstacle(needle, faces)))
+    words = barrier.infeasibility(x)
+    names = re.fullmatch(r"edge \((\d+), (\d+)\) of the body cuts face (\d+) of the cloth", words)
+    assert names, words
+    a, b, face = map(int, names.groups())
+    assert cuts(needle, np.array([[a, b]]), x, cloth.faces[face : face + 1]).all()
+
+
+def a_press() -> tuple[Cloth, Obstacle]:
+    """A press that closes wholly, and opens again: between its jaws there is no place for a sheet.
+
+    The sheet reaches out of the jaws, so that it would be cut, not buried.
+    """
+    cloth = sheet(4, 0.06, (-0.03, 0.01, 0.4))
+    low, faces = box((-0.019, -0.05, 0.408), (0.021, 0, 0.449))
+    high, _ = box((-0.019, 0.02, 0.408), (0.021, 0.07, 0.449))
+    both = np.concatenate([faces, faces + len(low)])
+    shut = [0, 0.01, 0.0205, 0.0205, 0.01]
+    return cloth, Obstacle(np.stack([np.concatenate([low, high - [0, s, 0]]) for s in shut]), both)
+
+
+def test_a_body_that_leaves_no_room_stops_and_says_so():
+    cloth, press = a_press()
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
+    pressed = simulate(cloth, terms, obstacle=press, frames=5)
+    assert pressed.status == "stalled" and "pins and obstacle came" in pressed.reason
+    assert "frame 2" in pressed.reason
+    assert list(pressed.frame_fields["converged"][[1, 2, 4]]) == [1, 0, 1]
+    assert not cuts(pressed.positions[4], cloth.edges, press.at(4), press.faces).any()
+
+
+def test_a_run_cut_off_where_a_body_had_stopped_is_not_gone_on_with(tmp_path):
+    """No file holds how far the body came: begun at its end, it would have passed the cloth."""
+    cloth, press = a_press()
+    path = tmp_path / "run.vtkhdf"
+    for frames in (2, 3):
+        terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
+        done = simulate(cloth, terms, obstacle=press, frames=frames, path=path, resume=True)
+    assert done.frames == 3 and done.status == "stalled"
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
+    with pytest.raises(TrajectoryError, match=r"frame 2 the obstacle may have stopped .* start again"):
+        simulate(cloth, terms, obstacle=press, frames=5, path=path, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"distance": 0.0}, "distance = 0.0: must be a finite number above 0"),
+        ({"stiffness": np.nan}, "stiffness = nan: must be"),
+        ({"distance": 0.05}, "face 0 is only 0.0236 m high at rest; choose a distance below that"),
+    ],
+)
+def test_impossible_barriers_are_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        ContactBarrier(sheet(3, 0.1, (0, 0, 0)), **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"), [({"coefficient": -0.1}, "must not be negative"), ({"speed": 0.0}, "above 0")]
+)
+def test_impossible_friction_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        BarrierFriction(ContactBarrier(sheet(3, 0.1, (0, 0, 0))), **options)
+
+
+def test_friction_listed_before_its_barrier_is_refused():
+    cloth = sheet(3, 0.1, (0, 0, 0))
+    barrier = ContactBarrier(cloth)
+    with pytest.raises(ValueError, match="list the barrier first"):
+        simulate(cloth, [BarrierFriction(barrier), barrier], frames=2)
+
+
+def test_areas_that_weigh_pairs_are_the_rest_state_of_the_cloth():
+    x, faces = grid(3, 3, width=0.1, depth=0.1)
+    cloth = Cloth(x, faces, Material(), rest_uv=2 * x[:, [0, 2]])
+    barrier = ContactBarrier(cloth)
+    barrier.prepare(still(x, Obstacle(*box((-1, -0.1, -1), (1, -1e-3, 1)))))
+    mesh = barrier.collisions.pairs(x)[1].mesh
+    count = cloth.vertex_count
+    assert mesh.vertex_areas[:count] == pytest.approx(cloth.vertex_areas, rel=1e-12)
+    assert mesh.vertex_areas[count:].max() <= cloth.vertex_areas.mean() * (1 + 1e-12)
+    own = (mesh.edges < count).all(axis=1)
+    assert mesh.edge_areas[own].sum() == pytest.approx(cloth.areas.sum(), rel=1e-12)
+    assert mesh.edge_areas[~own].max() <= mesh.edge_areas[own].mean() * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(100, 150), marks=pytest.mark.slow)], ids=len)
+def test_a_step_that_nobody_chose_ends_free_and_where_it_says(seeds):
+    """Material, distance, step and velocities over decades; the gradient by differences of the energy."""
+    for seed in seeds:
+        random = np.random.default_rng(seed)
+        crumple, obstacle, start = crumpled()
+        stiffness, hinge = 10 ** random.uniform(-2, 2, 2)
+        cloth = Cloth(
+            crumple.cloth.rest_positions, crumple.cloth.faces,
+            Material(young_modulus=70e3 * stiffness, bending_stiffness=3.96e-5 * hinge),
+        )  # fmt: skip
+        dt = 10 ** random.uniform(-3, -0.5)
+        barrier = ContactBarrier(cloth, distance=10 ** random.uniform(-3, -2.3))
+        terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), barrier, Inertia(cloth, dt)]
+        potential = Potential(terms)
+        velocity = 10 ** random.uniform(-2, 1) * random.normal(size=start.shape)
+        potential.prepare(Step(start, velocity, start, dt, obstacle, 1))
+        potential.set_progress(1.0)
+        result = minimise(potential, start, timeout=20.0)
+        x, body = result.positions, obstacle.at(1)
+        assert not cuts(x, cloth.edges, x, cloth.faces).any(), seed
+        assert not cuts(x, cloth.edges, body, obstacle.faces).any(), seed
+        assert result.status in ("converged", "stalled", "max_iterations", "timeout") and result.reason
+        if result.status == "converged":
+            residual = 1e-6 * cloth.masses.mean() * GRAVITY
+            for _ in range(12):
+                d = random.uniform(-1, 1, x.shape)
+                coarse, fine = (_slope(potential, x, d, h) for h in (2e-8, 1e-8))
+                noise = 4e-7 * sum(map(abs, potential.terms(x).values())) + 4 * abs(coarse - fine)
+                assert abs(fine) <= residual * np.abs(d).sum() + noise, seed
+
+
+def _slope(potential: Potential, x: np.ndarray, d: np.ndarray, h: float) -> float:
+    return (potential.value(x + h * d) - potential.value(x - h * d)) / (2 * h)

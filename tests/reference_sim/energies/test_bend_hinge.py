@@ -1,0 +1,112 @@
+"""Hinges folded by hand, through half a turn and flat on themselves, and their scaling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import vectorize
+
+from reference_sim import Cloth, Material
+from reference_sim.energies import BendHinge, Energy
+from reference_sim.energies.bend_hinge import dihedral_angles
+from reference_sim.kernels.lanes import arctan2
+from tests.reference_sim.meshes import patch
+
+
+def curved_cloth() -> Cloth:
+    x, faces = patch(11, cells=4)
+    x[:, 2] = 2 * x[:, 0] * x[:, 1] + x[:, 0] ** 2
+    return Cloth(0.3 * x, faces)
+
+
+def close(found: np.ndarray, expected: np.ndarray, tolerance: float) -> bool:
+    return bool(np.abs(found - expected).max() <= tolerance * np.abs(expected).max())
+
+
+def hinge_at(phi: float) -> np.ndarray:
+    """An edge along x, one wing in the plane z = 0, the other turned by phi about the edge."""
+    return np.array([(0, 0, 0), (1, 0, 0), (0.3, 1, 0), (0.6, -np.cos(phi), -np.sin(phi))])
+
+
+def one_hinge(rest: float) -> BendHinge:
+    # The edge has length 1 and each face half a square metre: scaled by 1/4, k is 2 J.
+    cloth = Cloth(hinge_at(0.0), np.array([(0, 1, 2), (1, 0, 3)]), Material(bending_stiffness=8.0))
+    return BendHinge(cloth, rest_angles=rest)
+
+
+@pytest.mark.parametrize("phi", [-3.1, -1.6, -1e-9, 0.0, 1e-7, 0.5, 1.6, 3.1])
+def test_angle_of_a_hinge_folded_by_hand(phi):
+    energy = one_hinge(0.0)
+    # atan2 keeps the relative accuracy of a small sine: round-off alone.
+    assert dihedral_angles(hinge_at(phi), energy.stencils)[0] == pytest.approx(phi, rel=1e-14, abs=1e-15)
+    assert energy.value_and_gradient(hinge_at(phi))[0] == pytest.approx(phi**2, rel=1e-13, abs=1e-30)
+
+
+@pytest.mark.parametrize("phi", [2.9, 3.1, np.pi - 1e-7, np.pi + 1e-7, 3.2, 3.4])
+@pytest.mark.parametrize("rest", [3.0, -3.0, 0.0])
+def test_a_hinge_passes_through_half_a_turn(phi, rest):
+    """Across phi = pi atan2 jumps by a full turn; energy, torque and stiffness must not notice.
+
+    The energy takes the shorter way round to the rest angle, so only the point opposite to it is a kink.
+    """
+    energy = one_hinge(rest)
+    x = hinge_at(phi)
+    way = (phi - rest + np.pi) % (2 * np.pi) - np.pi
+    value, gradient = energy.value_and_gradient(x)
+    assert value == pytest.approx(way**2, rel=1e-12)
+    turn = np.zeros((4, 3))
+    turn[3] = (0, np.sin(phi), -np.cos(phi))  # dx/dphi
+    assert np.vdot(gradient, turn) == pytest.approx(2 * way, rel=1e-12)  # k (theta - theta_0)
+    curve = np.zeros((4, 3))
+    curve[3] = (0, np.cos(phi), np.sin(phi))  # d2x/dphi2
+    second = turn.ravel() @ energy.hessian_blocks(x)[0] @ turn.ravel() + np.vdot(gradient, curve)
+    assert second == pytest.approx(2.0, rel=1e-12)  # k
+    assert close(gradient, Energy.value_and_gradient(energy, x)[1], 1e-10)
+    assert close(energy.hessian_blocks(x), Energy.hessian_blocks(energy, x), 1e-10)
+
+
+def test_a_hinge_folded_flat_is_finite_and_the_same_in_both_forms():
+    energy = one_hinge(0.0)
+    x = hinge_at(0.0) * [1, 0, 1] + [[0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0.7, 0]]  # both wings on one side
+    value, gradient = energy.value_and_gradient(x)
+    expected_value, expected = Energy.value_and_gradient(energy, x)
+    assert value == pytest.approx(np.pi**2, rel=1e-14) and value == pytest.approx(expected_value, rel=1e-14)
+    assert np.abs(expected).max() > 1.0 and close(gradient, expected, 1e-12)
+
+
+def test_the_default_is_scaled_by_the_rest_shape_of_the_hinge_and_the_printed_form_by_nothing():
+    cloth = curved_cloth()
+    plain, scaled = BendHinge(cloth, scaling="none"), BendHinge(cloth)
+    assert plain.stiffness == pytest.approx(cloth.material.bending_stiffness, rel=1e-15)
+    assert (plain.parameters()["scaling"], scaled.parameters()["scaling"]) == ("none", "length_area")
+    x = cloth.rest_positions
+    for h, (a, b, first, second) in enumerate(cloth.hinges):
+        area = [np.linalg.norm(np.cross(x[b] - x[a], x[tip] - x[a])) / 2 for tip in (first, second)]
+        factor = np.sum((x[b] - x[a]) ** 2) / (4 * sum(area))
+        assert scaled.stiffness[h] == pytest.approx(plain.stiffness[h] * factor, rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"scaling": "area"}, "choose one of length_area, none"),
+        ({"rest_angles": "flat"}, "give an array, a number or 'rest'"),
+        ({"rest_angles": np.zeros(3)}, "shape|broadcast"),
+    ],
+)
+def test_unknown_bending_options_are_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        BendHinge(curved_cloth(), **options)
+
+
+def test_the_arctangent_of_the_kernels_is_that_of_numpy():
+    """All around the circle, near its axes and diagonals, at any size."""
+    generator = np.random.default_rng(4)
+    angles = np.concatenate([generator.uniform(-np.pi, np.pi, 20_000), np.pi / 8 * np.arange(-7, 8)])
+    angles = np.concatenate([angles, angles[-15:] + 1e-9, angles[-15:] - 1e-9, 10.0 ** np.arange(-300, 0, 7)])
+    size = 10 ** generator.uniform(-100, 100, len(angles))
+    y, x = size * np.sin(angles), size * np.cos(angles)
+    y[-5:], x[-5:] = [0.0, -0.0, 0.0, 1.0, -1.0], [1.0, 1.0, -1.0, 0.0, 0.0]
+    found = vectorize(lambda y, x: arctan2(y, x))(y, x)
+    expected = np.arctan2(y, x)
+    assert (np.abs(found - expected) <= 2 * np.spacing(np.abs(expected))).all()

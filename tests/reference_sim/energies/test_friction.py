@@ -1,0 +1,226 @@
+"""Friction is judged as it was minimised: at any frame, of any trajectory, whatever was judged before."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.metrics.energies.energy import energy_series
+from benchmarks.metrics.energies.energy_gap import optimality
+from benchmarks.metrics.energies.time_step import own_terms, prepare
+from benchmarks.metrics.motion.conservation import law_series
+from benchmarks.presets import find_preset
+from benchmarks.scene import BuiltScene
+from benchmarks.scenes import find_scene
+from reference_sim import Cloth, Material, Obstacle, Potential, Trajectory, simulate
+from reference_sim.energies import (
+    BarrierFriction,
+    ContactBarrier,
+    ContactFriction,
+    ContactPenalty,
+    Gravity,
+    Step,
+    StretchStVK,
+)
+from tests.reference_sim.meshes import box
+
+FRAMES = 12
+ANGLE = 0.7  # [rad]: tan is .84, a sheet slides
+TURN = np.array([[np.cos(ANGLE), -np.sin(ANGLE), 0], [np.sin(ANGLE), np.cos(ANGLE), 0], [0, 0, 1]])
+
+
+def on_a_belt(*, barrier: bool = False) -> BuiltScene:
+    """A jagged sheet on a slope whose skin moves across the way down at .3 m/s."""
+    x, z = np.meshgrid(np.linspace(0, 0.2, 5), np.linspace(0, 0.2, 5), indexing="ij")
+    flat = np.stack([x.ravel(), np.zeros(25), z.ravel()], axis=1)
+    a = (np.arange(4)[:, None] * 5 + np.arange(4)).ravel()
+    faces = np.concatenate([np.stack([a, a + 1, a + 6], 1), np.stack([a, a + 6, a + 5], 1)])
+    cloth = Cloth(flat, faces, Material())
+    corners, sides = box((-2, -0.1, -1), (1, 0, 2))
+    across = np.array([0.0, 0.0, 0.01]) * np.arange(FRAMES)[:, None, None]
+    if barrier:
+        contact = ContactBarrier(cloth, self_contact=False)
+        terms = (contact, BarrierFriction(contact))
+    else:
+        penalty = ContactPenalty(cloth)
+        terms = (penalty, ContactFriction(penalty))
+    noise = np.random.default_rng(0).uniform(0.0, 5e-4, len(flat))
+    start = (flat + np.stack([0 * noise, 1.5e-3 + noise, 0 * noise], axis=1)) @ TURN.T
+    return BuiltScene(
+        name="belt",
+        cloth=cloth,
+        energies=(StretchStVK(cloth), Gravity(cloth), *terms),
+        dt=1 / 30,
+        frames=FRAMES,
+        settle=lambda: start,
+        obstacle=Obstacle((corners + across) @ TURN.T, sides),
+    )
+
+
+def on_a_sphere() -> BuiltScene:
+    preset = dataclasses.replace(find_preset("smoke"), sheet_cells=8, sheet_frames=FRAMES)
+    scene = find_scene("sheet_on_sphere").at(preset).build()
+    contact = scene.energies[-1]
+    assert isinstance(contact, ContactPenalty)
+    return dataclasses.replace(scene, energies=(*scene.energies, ContactFriction(contact)))
+
+
+def simulated(scene: BuiltScene) -> Trajectory:
+    trajectory = simulate(
+        scene.cloth,
+        scene.energies,
+        dt=scene.dt,
+        frames=scene.frames,
+        obstacle=scene.obstacle,
+        start=scene.start,
+    )
+    assert trajectory.status == "converged", trajectory.reason
+    assert (trajectory.frame_fields["energy/friction"][-4:] > 1e-6).all()
+    return trajectory
+
+
+SCENES = {"belt": on_a_belt, "sphere": on_a_sphere, "barrier": lambda: on_a_belt(barrier=True)}
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def judged(request) -> tuple[BuiltScene, Trajectory]:
+    scene = SCENES[request.param]()
+    return scene, simulated(scene)
+
+
+def another(x: np.ndarray) -> np.ndarray:
+    """A trajectory that lies a millimetre higher and is judged at the same time."""
+    return x + np.array([0.0, 1e-3, 0.0])
+
+
+def test_the_simulation_ends_each_step_in_its_minimum_also_where_frames_are_jumped(judged):
+    """Frames are taken from all over the trajectory in turn, and again with planes at the frame itself."""
+    scene, trajectory = judged
+    found = optimality(scene, trajectory.positions, samples=FRAMES)
+    assert len(found.gradients) == len(found.refrozen) == FRAMES - 2 and max(found.gradients) <= 1e-6
+    assert max(found.local) <= 1e-12
+
+
+def test_laws_hold_for_the_simulation_beside_another(judged):
+    scene, trajectory = judged
+    x = trajectory.positions
+    _, found, _ = law_series(scene, [another(x), x, another(x)])
+    assert found.residual.max() <= 1e-6 and found.force.max() <= 2e-6 * found.weight
+
+
+def test_energies_beside_others_are_those_of_the_trajectory_alone(judged):
+    scene, trajectory = judged
+    x = trajectory.positions
+    (alone,) = energy_series(scene, [x])
+    _, beside, _ = energy_series(scene, [another(x), x, another(x)[:5]])
+    assert {name: list(series) for name, series in beside.items()} == {
+        name: list(series) for name, series in alone.items()
+    }
+
+
+@pytest.mark.parametrize("kind", ["belt", "barrier"])
+def test_energies_on_a_plane_are_those_that_were_minimised(kind):
+    """A plane is the same wherever it was searched."""
+    scene = SCENES[kind]()
+    trajectory = simulated(scene)
+    x = trajectory.positions
+    _, series = energy_series(scene, [another(x), x])
+    for term in set(scene.terms) - {"inertia"}:
+        recorded = trajectory.frame_fields[f"energy/{term}"]
+        assert series[term][1:] == pytest.approx(recorded[1:], rel=1e-9, abs=1e-15), term
+
+
+def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
+    scene, trajectory = judged
+    x, frame = trajectory.positions, FRAMES - 3
+    own, row = Potential(own_terms(scene)), Potential(own_terms(scene))
+    prepare(scene, own, x, 4)  # a frame of before, far from this one
+    guess = prepare(scene, own, x, frame)
+    for t in range(1, frame + 1):
+        last = prepare(scene, row, x, t)
+    assert np.array_equal(guess, last)
+    at = np.ascontiguousarray(x[frame])
+    assert own.terms(at) == row.terms(at) and own.terms(at)["friction"] > 0
+    assert not np.shares_memory(own.gradient(at), row.gradient(at))
+
+
+def test_own_terms_know_each_other_and_nothing_of_the_scenes():
+    scene = on_a_belt()
+    first, second = own_terms(scene), own_terms(scene)
+    assert [term.name for term in first] == list(scene.terms)
+    everyone = [*scene.energies, *first, *second]
+    assert len(set(map(id, everyone))) == len(everyone)
+    for terms in (scene.energies, first, second):
+        assert terms[3].contact is terms[2]
+    assert first[0].stencils is scene.energies[0].stencils  # nothing heavy is copied
+
+
+def test_friction_without_the_step_before_is_refused():
+    """A step may be prepared alone, since that after it needs no more; it has no energy."""
+    scene = on_a_belt()
+    x = np.repeat(scene.start[None], 9, axis=0)
+    contact, friction = scene.energies[2:]
+    assert isinstance(contact, ContactPenalty) and isinstance(friction, ContactFriction)
+
+    def prepare(frame: int, obstacle: Obstacle | None = scene.obstacle) -> None:
+        step = Step(x[0], 0 * x[0], x[0], scene.dt, obstacle, frame)
+        contact.prepare(step)
+        friction.prepare(step)
+
+    prepare(5)
+    for evaluate in (friction.value_and_gradient, friction.hessian_blocks, friction.scalar_stiffness):
+        with pytest.raises(ValueError, match="step of the frame before"):
+            evaluate(x[0])
+    prepare(6)
+    assert friction.value_and_gradient(x[0])[0] > 0
+    prepare(8)  # 7 was jumped over
+    with pytest.raises(ValueError, match="step of the frame before"):
+        friction.value_and_gradient(x[0])
+    assert scene.obstacle is not None
+    prepare(9, scene.obstacle.refined(2))  # another run's frame 8
+    with pytest.raises(ValueError, match="step of the frame before"):
+        friction.value_and_gradient(x[0])
+    prepare(1)  # a first step needs none
+    assert friction.value_and_gradient(x[0])[0] > 0
+
+
+def test_friction_beside_a_contact_that_is_not_its_own_is_refused():
+    scene = on_a_belt()
+    simulate(scene.cloth, scene.energies, obstacle=scene.obstacle, start=scene.start, frames=2)
+    stranger = ContactPenalty(scene.cloth)
+    terms = [*scene.energies[:2], stranger, scene.energies[3]]
+    with pytest.raises(ValueError, match="its own ContactPenalty before it"):
+        simulate(scene.cloth, terms, obstacle=scene.obstacle, start=scene.start, frames=2)
+
+
+def test_the_first_step_has_the_normal_force_of_the_start():
+    """Vertices alone, all 1 mm deep in the margin of a table that moves: mu 3 k a depth^2 each."""
+    scene = on_a_belt()
+    contact = ContactPenalty(scene.cloth, samples="vertices")
+    friction = ContactFriction(contact, coefficient=0.3)
+    x = (scene.cloth.rest_positions + np.array([0.0, contact.margin - 1e-3, 0.0])) @ TURN.T
+    for frame in (0, 1):
+        step = Step(x, 0 * x, x, scene.dt, scene.obstacle, frame)
+        contact.prepare(step)
+        friction.prepare(step)
+        assert friction.forces == pytest.approx(0.3 * 3 * 3.4e6 * scene.cloth.vertex_areas * 1e-6, rel=1e-9)
+
+
+def test_friction_of_a_step_that_is_frozen_again_is_the_same_and_of_another_past_is_refused():
+    scene = on_a_belt()
+    plain = simulated(scene)
+    given = {"dt": scene.dt, "frames": scene.frames, "obstacle": scene.obstacle, "start": scene.start}
+    again = simulate(scene.cloth, scene.energies, refreeze=1, **given)
+    # A slope is one plane: searched again it is the same, and so is the friction on it.
+    assert again.status == "converged" and np.abs(again.positions - plain.positions).max() < 1e-6
+    potential = Potential(own_terms(scene))
+    x = plain.positions
+    prepare(scene, potential, x, 5)
+    step = Step(x[4] + 1e-3, 0 * x[4], x[5], scene.dt, scene.obstacle, 5)
+    potential.prepare(step)
+    with pytest.raises(ValueError, match="does not know its normal force"):
+        potential.value(x[5])
+    with pytest.raises(ValueError, match="refreeze cannot be resumed"):
+        simulate(scene.cloth, scene.energies, refreeze=1, resume=True, path="no.vtkhdf", **given)

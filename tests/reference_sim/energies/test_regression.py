@@ -1,0 +1,71 @@
+"""The energies of six small scenes, term by term and frame by frame, are those that were kept."""
+
+from __future__ import annotations
+
+import pytest
+
+from reference_sim import Material
+from reference_sim.energies import MODULE_OF
+from tests.reference_sim.energies import regenerate_energies, regression_scenes
+from tests.reference_sim.energies.regenerate_energies import changes, main
+from tests.reference_sim.energies.regression_scenes import SCENES, computed, scales, stored
+
+# Round-off of 1e-13 m at the start moves no term by more than 1e-11, another linear solver by 1e-14; the
+# solver's own tolerance of 1e-10 is below that. 1e-9 leaves room for other processors.
+TOLERANCE = 1e-9
+
+
+@pytest.fixture(scope="module")
+def kept():
+    return stored()
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_energies_are_those_that_were_kept(scene, kept):
+    new, sizes = computed(scene), scales(kept)
+    assert new.keys() == {key for key in kept if key[0] == scene}
+    for (_, frame, term), value in new.items():
+        far = abs(value - kept[scene, frame, term])
+        assert far <= TOLERANCE * sizes[scene, term], (
+            f"{scene}, frame {frame}: {term} {kept[scene, frame, term]!r} -> {value!r} J; if that is meant: "
+            "python tests/reference_sim/energies/regenerate_energies.py"
+        )
+
+
+def test_the_table_holds_every_term_of_the_paper_and_of_contact(kept):
+    terms = {key[2] for key in kept}
+    wanted = {"strain", "spring", "bending", "gravity", "inertia", "collision", "friction", "area_barrier"}
+    assert terms == wanted and {key[0] for key in kept} == set(SCENES) and len(SCENES) == 6
+    assert all(size > 1e-6 for size in scales(kept).values()), "a term that does nothing tests nothing"
+    # What is not here needs ipctk, which is optional, or is no term.
+    assert len(MODULE_OF) == len(wanted) + 4
+
+
+def test_a_change_of_a_millionth_is_seen(kept, monkeypatch):
+    stiffer = Material(young_modulus=70e3 * (1 + 1e-6))
+    monkeypatch.setattr(regression_scenes.Cloth.__init__, "__defaults__", (stiffer, (), None))
+    new, sizes = computed("hanging"), scales(kept)
+    moved = max(abs(v - kept[key]) / sizes["hanging", key[2]] for key, v in new.items())
+    assert 1e-8 < moved < 1e-4
+
+
+def test_the_command_prints_the_change_and_keeps_it_only_when_asked(kept, monkeypatch, tmp_path, capsys):
+    store = tmp_path / "energies.csv"
+    for module in (regression_scenes, regenerate_energies):
+        monkeypatch.setattr(module, "STORE", store)
+        monkeypatch.setattr(module, "SCENES", {"free_fall": SCENES["free_fall"]})
+    assert main([]) == 0 and not store.exists()
+    assert "gravity      frames 0 -> 7" in capsys.readouterr().out
+    assert main(["--write"]) == 0 and "14 energies kept" in capsys.readouterr().out
+    text = store.read_text(encoding="utf-8")
+    assert main(["--write"]) == 0 and "nothing changed" in capsys.readouterr().out
+    assert store.read_text(encoding="utf-8") == text
+
+
+def test_a_moved_term_and_a_lost_frame_are_lines_of_their_own():
+    old = {("a", 1, "x"): 1.0, ("a", 2, "x"): 2.0, ("a", 1, "y"): 1.0}
+    new = {("a", 1, "x"): 1.0, ("a", 2, "x"): 2.002, ("b", 1, "y"): 1.0}
+    lines = changes(old, new)
+    assert any("frame 2: 2 -> 2.002 J (1.0e-03)" in line for line in lines)
+    assert sum("frames" in line for line in lines) == 2 and len(lines) == 3
+    assert changes(old, old) == []

@@ -1,0 +1,125 @@
+"""Arrays of strangers: what is declared is compared with what is there before anything is allocated."""
+
+from __future__ import annotations
+
+import io
+import resource
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+
+from reference_sim.files.array_file import ArrayFileError, array_names, read_array, read_arrays
+
+POSES = np.arange(12.0).reshape(4, 3)
+OTHERS = {
+    "by_columns": np.asfortranarray(POSES),
+    "empty": np.zeros((0, 3)),
+    "one": np.array(30.0),
+    "big_endian": POSES.astype(">f4"),
+    "word": np.array("female"),
+    "letters": np.array([b"a", b"bc"]),
+    "truth": np.array([True, False]),
+}
+
+
+def npy(shape: str, descr: str = "'<f8'", data: bytes = b"", version: tuple[int, int] = (1, 0)) -> bytes:
+    """An .npy file that declares this, and holds those bytes."""
+    header = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}\n".encode("latin-1")
+    length = struct.pack("<H" if version == (1, 0) else "<I", len(header))
+    return b"\x93NUMPY" + bytes(version) + length + header + data
+
+
+def npz(member: bytes, method: int = zipfile.ZIP_DEFLATED) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", method) as archive:
+        archive.writestr("poses.npy", member)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_whole_files_are_read_as_numpy_reads_them(tmp_path, save):
+    save(tmp_path / "a.npz", poses=POSES, **OTHERS)
+    found = read_arrays(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as stored:
+        for name in stored.files:
+            assert found[name].dtype == stored[name].dtype and found[name].flags.writeable
+            np.testing.assert_array_equal(found[name], stored[name])
+        assert list(found) == stored.files == array_names(tmp_path / "a.npz")
+    assert list(read_arrays(tmp_path / "a.npz", ("poses", "absent"))) == ["poses"]
+    for name, array in OTHERS.items():
+        np.save(tmp_path / f"{name}.npy", array)
+        np.testing.assert_array_equal(read_array(tmp_path / f"{name}.npy"), array)
+
+
+def test_an_array_of_objects_is_refused_only_where_it_is_asked_for(tmp_path):
+    np.savez(tmp_path / "a.npz", poses=POSES, gender=np.array(["f", None], dtype=object))
+    assert list(read_arrays(tmp_path / "a.npz", ("poses",))) == ["poses"]
+    with pytest.raises(ArrayFileError, match=r"a\.npz: array 'gender': has type object"):
+        read_arrays(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize(
+    ("shape", "descr", "reason"),
+    [
+        ("(10**30,)", "'<f8'", "Header|malformed"),
+        (f"({10**30},)", "'<f8'", "1e[+]30 of float64, and"),
+        ("(40000, 40000)", "'<f8'", "at most"),
+        ("(-1, 3)", "'<f8'", "shape -1 x 3"),
+        ("(3,)", "'<f8'", "24 bytes, and has 16"),
+        ("(1,)", "'<f8'", "8 bytes, and has 16"),
+        (f"({10**14},)", "'S0'", "type"),
+        ("(2,)", "'|O'", "type object"),
+        ("(2,)", "[('a', '<f8')]", "type"),
+        ("(2,)", "('<f8', (10**9,))", "."),
+        ("(" * 3000, "'<f8'", "."),
+        ("-" * 9000 + "1", "'<f8'", "."),
+    ],
+)
+def test_a_declaration_that_the_file_does_not_bear_out_is_refused(tmp_path, shape, descr, reason):
+    for data, name, read in ((npy(shape, descr, bytes(16)), "a.npy", read_array),
+                             (npz(npy(shape, descr, bytes(16))), "b.npz", read_arrays)):  # fmt: skip
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(ArrayFileError, match=reason) as refusal:
+            read(tmp_path / name)
+        assert str(tmp_path / name) in str(refusal.value) and "\n" not in str(refusal.value)
+
+
+def test_a_small_file_of_a_large_array_takes_no_memory(tmp_path):
+    """Five gigabytes of zeros, in 5 MB: refused by the limit, and by what deflate can pack."""
+    data = npz(npy("(625000000,)", data=bytes(50_000_000)))
+    (tmp_path / "limit.npz").write_bytes(npz(npy("(6250000,)", data=bytes(50_000_000))))
+    with pytest.raises(ArrayFileError, match="40 MB are read at most"):
+        read_arrays(tmp_path / "limit.npz", limit=40_000_000)
+    true, claimed = (struct.pack("<I", n) for n in (50_000_000 + 69, 4_000_000_000))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    (tmp_path / "lie.npz").write_bytes(data.replace(true, claimed))
+    with pytest.raises(ArrayFileError, match="declares"):
+        read_arrays(tmp_path / "lie.npz", limit=1 << 40)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000  # kB
+
+
+def test_archives_that_cannot_be_unpacked_are_refused(tmp_path):
+    whole, path = npz(npy("(2,)", data=bytes(16))), tmp_path / "a.npz"
+    place = whole.index(b"PK\1\2")
+    encrypted = bytearray(whole)
+    encrypted[6] |= 1
+    encrypted[place + 8] |= 1
+    unknown = bytearray(whole)
+    unknown[8:10] = unknown[place + 10 : place + 12] = struct.pack("<H", 93)
+    damaged = bytearray(whole)
+    damaged[60] ^= 16
+    for data, reason in (
+        (bytes(encrypted), "encrypted"),
+        (bytes(unknown), "method 93"),
+        (bytes(damaged), "."),
+        (npz(npy("(2,)", data=bytes(16)), zipfile.ZIP_LZMA), "method 14"),
+        (whole[:-30], "not a zip file"),
+        (b"", "not a zip file"),
+    ):
+        path.write_bytes(data)
+        with pytest.raises(ArrayFileError, match=reason):
+            read_arrays(path)
+    with pytest.raises(ArrayFileError, match="no such file"):
+        read_arrays(tmp_path / "absent.npz")

@@ -1,0 +1,211 @@
+"""Meshes from and for other programs: what is read, in which order and unit, and what is refused in words."""
+
+from __future__ import annotations
+
+import struct
+
+import meshio
+import numpy as np
+import pytest
+
+from reference_sim import Trajectory
+from reference_sim.cloth import MeshError
+from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y_up
+from reference_sim.trajectory.point_cache import write_point_cache
+from tests.reference_sim.meshes import grid, sphere
+
+
+def write(path, positions, faces, kind="triangle"):
+    path.parent.mkdir(exist_ok=True)
+    meshio.write(path, meshio.Mesh(positions, [(kind, np.asarray(faces, dtype=np.int32))]))
+    return path
+
+
+def triangles(positions, faces):
+    """The triangles as a sorted list of corner coordinates, whatever the numbering."""
+    corners = np.round(positions[faces], 5).reshape(len(faces), 3, 3)
+    return sorted(tuple(sorted(map(tuple, t.tolist()))) for t in corners)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".off", ".vtk", ".vtu"])
+def test_each_format_gives_the_triangles_that_were_written(tmp_path, suffix):
+    positions, faces = sphere(1, 0.3)
+    surface = read_mesh(write(tmp_path / f"ball{suffix}", positions, faces))
+    assert surface.positions.dtype == np.float64 and surface.faces.dtype == np.int64
+    assert triangles(surface.positions, surface.faces) == triangles(positions, faces)
+    if suffix != ".stl":  # a list of loose triangles has no numbering to keep
+        np.testing.assert_array_equal(surface.faces, faces)
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtp"])
+def test_polydata_as_paraview_writes_it(tmp_path, suffix):
+    pyvista = pytest.importorskip("pyvista")
+    positions, faces = sphere(1)
+    padded = np.insert(faces, 0, 3, axis=1).ravel()
+    path = tmp_path / f"ball{suffix}"
+    pyvista.PolyData(positions, padded).save(path)
+    np.testing.assert_array_equal(read_mesh(path).faces, faces)
+
+
+def test_quads_are_cut_along_the_diagonal_from_their_first_corner(tmp_path):
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+    surface = read_mesh(write(tmp_path / "square.obj", square, [[0, 1, 2, 3]], "quad"))
+    assert surface.quads == 1
+    assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+def test_texture_coordinates_and_vertex_colours_change_nothing(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 -2/1/1 3\n")
+    surface = read_mesh(path)
+    assert surface.positions.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert surface.faces.tolist() == [[0, 1, 2]]
+
+
+PLY = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nelement face {}\nend_header\n"
+SEAM = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 5 0\nvt 6 1\nvt 5 1\n"
+
+
+def test_a_vertex_on_a_seam_has_a_texture_coordinate_in_each_face(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text(SEAM + "f 1/1 2/2/ 3/3\nf 1/4/9 3/5 -1/-1\n")
+    surface = read_mesh(path)
+    assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert surface.uv.tolist() == [[[0, 0], [1, 0], [1, 1]], [[5, 0], [6, 1], [5, 1]]]
+    path.write_text(SEAM + "f 1/1 2/2 3/3 4/6\n")  # a quad is cut with its coordinates
+    assert read_mesh(path).uv.tolist() == [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [5, 1]]]
+    path.write_text(SEAM + "f 1/1 2/2 3/3\nf 1 3 4\n")
+    assert np.isnan(read_mesh(path).uv).all(axis=(1, 2)).tolist() == [False, True]
+    path.write_text(SEAM + "f 1 2 3\nf 1//2 3//2 4//2\n")
+    assert read_mesh(path).uv is None
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".vtk", ".vtp"])
+def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path, suffix):
+    positions, faces = grid(2, 1)
+    uv, path = 3.0 * positions[:, [0, 2]], tmp_path / f"a{suffix}"
+    if suffix == ".ply":
+        data = {"s": uv[:, 0], "t": uv[:, 1]}
+        meshio.write(path, meshio.Mesh(positions, [("triangle", faces)], point_data=data))
+    else:
+        pyvista = pytest.importorskip("pyvista")
+        surface = pyvista.PolyData(positions, np.insert(faces, 0, 3, axis=1).ravel())
+        surface.active_texture_coordinates = uv
+        surface.save(path)
+    np.testing.assert_allclose(read_mesh(path).uv, uv[faces], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.obj", None, "no such file"),
+        ("a.fbx", "x", "unknown kind of mesh: convert it to one of .obj"),
+        ("a.ply", "rubbish\n", "cannot be read"),
+        ("a.ply", "ply\nformat ascii 1.0\ncomment cut off", "its header does not end"),
+        ("a.ply", PLY.format(10**12, 1), "shorter than .element vertex 1000000000000. says"),
+        ("a.ply", PLY.format(3, 10**30), "shorter than .element face 1000"),
+        ("a.vtk", "rubbish\n", "cannot be read"),
+        ("a.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n", "its header does not end"),
+        ("a.ply", "ply\nelement vertex 9999999\nend_header\n", "shorter than 'element vertex 9999999' says"),
+        ("a.off", "OFF\n", "its header does not end"),
+        ("a.vtk", "DATASET POLYDATA\nPOLYGONS 5 1000000000\n", "shorter than 'POLYGONS 5 1000000000' says"),
+        ("a.vtp", '<Piece NumberOfPoints="99999999"/>', "shorter than 'NumberOfPoints=.99999999' says"),
+        ("a.obj", "v 0 0 0\nf 1 2 99999999999999999999\n", "line 2 is not understood"),
+        ("a.obj", "v 0 0 0\nf 0 1 2\n", "line 2 is not understood"),
+        ("a.obj", "# a mesh\nv 0 0 zero\n", "line 2 is not understood: 'v 0 0 zero'"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\n", "no triangles in it"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1e300 0\nf 1 2 3\n", "vertex 2 is not finite, or farther than"),
+        ("a.obj", "v 0 0\n", "line 1 is not understood: 'v 0 0'"),
+        ("a.obj", SEAM + "f 1 2 9\n", "triangle 0 names a vertex beyond the 4"),
+        ("a.obj", SEAM + "f 1 2 -9\n", "triangle 0 names a vertex beyond the 4"),
+        ("a.obj", SEAM + "f 1/1 2/2 3/7\n", "triangle 0 names a texture coordinate beyond the 6"),
+        ("a.obj", SEAM + "vt\nf 1 2 3\n", "line 11 is not understood: 'vt'"),
+        ("a.off", "OFF\n3 1 0\n0 0\n1 0\n0 1\n3 0 1 2\n", "cannot be read"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 nan\nf 1 2 3\n", "vertex 2 is not finite"),
+        (
+            "a.obj",
+            "".join(f"v {k} {k * k} 0\n" for k in range(5)) + "f 1 2 3 4 5\n",
+            "face 0 has 5 corners: triangulate",
+        ),
+    ],
+)
+def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, capfd, name, text, words):
+    path = tmp_path / name
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(MeshError, match=words) as caught:
+        read_mesh(path)
+    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
+    printed = capfd.readouterr()
+    assert printed.out == printed.err == ""
+
+
+def test_a_sequence_follows_the_numbers_in_its_names(tmp_path):
+    positions, faces = sphere(1)
+    for k in (0, 2, 10, 1):
+        write(tmp_path / "walk" / f"body_{k}.ply", positions + k, faces)
+    (tmp_path / "walk" / "notes.txt").write_text("not a mesh")
+    for pattern in (tmp_path / "walk", tmp_path / "walk" / "body_*.ply"):
+        moving, first = read_sequence(pattern)
+        assert moving.shape == (4, len(positions), 3)
+        np.testing.assert_allclose(moving[:, 0, 0] - positions[0, 0], [0, 1, 2, 10], atol=1e-6)
+        np.testing.assert_array_equal(first.faces, faces)
+    still, _ = read_sequence(tmp_path / "walk" / "body_10.ply")
+    assert still.shape == (1, len(positions), 3)
+
+
+def test_a_sequence_over_folders_follows_their_numbers(tmp_path):
+    positions, faces = sphere(1)
+    for k in (2, 7, 10, 1):
+        write(tmp_path / f"frame_{k}" / "body.ply", positions + k, faces)
+    moving, _ = read_sequence(tmp_path / "frame_*" / "body.ply")
+    np.testing.assert_allclose(moving[:, 0, 0] - positions[0, 0], [1, 2, 7, 10], atol=1e-6)
+
+
+def test_a_sequence_that_does_not_correspond_is_refused(tmp_path):
+    positions, faces = sphere(1)
+    write(tmp_path / "a" / "0.obj", positions, faces)
+    write(tmp_path / "a" / "1.obj", positions, np.roll(faces, 1, axis=0))
+    with pytest.raises(MeshError, match=r"1\.obj: face 0 = .* in 0\.obj: a sequence needs one numbering"):
+        read_sequence(tmp_path / "a")
+    write(tmp_path / "b" / "0.obj", positions, faces)
+    write(tmp_path / "b" / "1.obj", *sphere(2))
+    with pytest.raises(MeshError, match=r"1\.obj: 66 vertices, but 0\.obj has 18"):
+        read_sequence(tmp_path / "b")
+    write(tmp_path / "a" / "2.ply", positions, faces)
+    with pytest.raises(MeshError, match=r"several kinds \(\.obj, \.ply\)"):
+        read_sequence(tmp_path / "a")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(MeshError, match="no mesh in this folder"):
+        read_sequence(tmp_path / "empty")
+    with pytest.raises(MeshError, match="no file matches"):
+        read_sequence(tmp_path / "x_*.obj")
+
+
+def test_units_and_up_axis_keep_handedness():
+    axes = np.eye(3)
+    assert to_metres_y_up(axes, units="cm").tolist() == (0.01 * axes).tolist()
+    turned = to_metres_y_up(axes, units="mm", up="z")
+    assert turned[2].tolist() == [0, 0.001, 0]  # up is up
+    assert np.linalg.det(turned) == pytest.approx(1e-9)
+    for bad in ({"units": "ft"}, {"up": "x"}):
+        with pytest.raises(ValueError, match="choose from"):
+            to_metres_y_up(axes, **bad)
+
+
+def test_point_cache_by_its_bytes(tmp_path):
+    positions, faces = grid(2, 1)
+    moving = np.stack([positions, positions + 0.1, positions + 0.2])
+    trajectory = Trajectory(moving, faces, np.arange(3) / 30, np.zeros(3))
+    cache, mesh = write_point_cache(tmp_path / "sheet.pc2", trajectory)
+    data = cache.read_bytes()
+    assert data[:12] == b"POINTCACHE2\0"
+    assert struct.unpack("<iiffi", data[12:32]) == (1, 6, 0.0, 1.0, 3)
+    samples = np.frombuffer(data[32:], dtype="<f4").reshape(3, 6, 3)
+    np.testing.assert_array_equal(samples, moving.astype(np.float32))
+    surface = read_mesh(mesh)
+    np.testing.assert_array_equal(surface.faces, faces)
+    np.testing.assert_allclose(surface.positions, positions, atol=1e-9)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["sheet.obj", "sheet.pc2"]
+    with pytest.raises(ValueError, match=r"ends in \.pc2"):
+        write_point_cache(tmp_path / "sheet.abc", trajectory)

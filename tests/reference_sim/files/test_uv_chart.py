@@ -1,0 +1,128 @@
+"""A flat rest shape by the faces' corners: one definition for every term, and what is no pattern."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from reference_sim import Cloth, Material
+from reference_sim.cloth import MeshError
+from reference_sim.energies import BendHinge, Gravity, Inertia, StretchSpring, StretchStVK
+from reference_sim.files.mesh_files import Surface
+from reference_sim.files.uv_chart import join_seams, rest_chart, stretches
+from snug.recipes.recipe import DEFAULT
+from snug.training.loss import PhysicsLoss
+from tests.reference_sim.meshes import grid, patch
+from tests.snug.garments.garment_files import doubled_along, own_chart
+
+SHEET = grid(6, 5, width=0.4, depth=0.3)
+RANDOM = np.random.default_rng(3)
+MOVED = SHEET[0] + RANDOM.normal(0, 0.01, SHEET[0].shape)
+
+
+def both():
+    """The sheet at rest as it lies, and at rest in a chart of loose triangles of the same shape."""
+    positions, faces = SHEET
+    return Cloth(positions, faces), Cloth(positions, faces, rest_uv=own_chart(positions, faces))
+
+
+@pytest.mark.parametrize("term", [StretchStVK, StretchSpring, BendHinge, Gravity])
+def test_an_isometric_chart_with_a_seam_on_every_edge_gives_the_same_energies(term):
+    plain, charted = both()
+    (value, gradient), (other, others) = (term(c).value_and_gradient(MOVED.copy()) for c in (plain, charted))
+    assert other == pytest.approx(value, rel=1e-12)
+    np.testing.assert_allclose(others, gradient, atol=1e-12 * np.abs(gradient).max())
+
+
+def test_the_loss_and_the_masses_of_an_isometric_chart_are_the_same():
+    plain, charted = both()
+    np.testing.assert_allclose(charted.masses, plain.masses, rtol=1e-12)
+    np.testing.assert_allclose(Inertia(charted, 0.1).masses, Inertia(plain, 0.1).masses, rtol=1e-12)
+    x = torch.as_tensor(np.stack([MOVED, MOVED + 0.01, MOVED - 0.02])[None])
+    ahead = torch.zeros(1, 3, 3, dtype=x.dtype)
+    one, two = (PhysicsLoss(cloth, DEFAULT, dt=1 / 30)(x, ahead, None) for cloth in (plain, charted))
+    assert one.keys() == two.keys() >= {"strain", "bending", "gravity", "inertia"}
+    for name in one:
+        torch.testing.assert_close(two[name], one[name], rtol=1e-12, atol=1e-15)
+
+
+def test_a_stretched_chart_has_the_energy_of_its_stretch():
+    positions, faces = patch(2)
+    k, material = 1.25, Material()
+    cloth = Cloth(positions, faces, material, rest_uv=own_chart(positions / k, faces))
+    G = 0.5 * (k * k - 1)  # of a square as much longer in both directions
+    density = 0.5 * material.lame_lambda * (2 * G) ** 2 + material.lame_mu * 2 * G * G
+    value, _ = StretchStVK(cloth).value_and_gradient(positions.copy())
+    assert value == pytest.approx(density / k**2, rel=1e-12)  # the unit square, k times smaller at rest
+    assert cloth.masses.sum() == pytest.approx(material.areal_density / k**2, rel=1e-12)
+
+
+def test_a_seam_between_pieces_of_two_sizes_has_the_mean_length():
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    faces = np.array([[0, 1, 2], [2, 1, 3]])
+    chart = own_chart(square, faces)
+    chart[1] *= 3.0
+    cloth = Cloth(square, faces, rest_uv=chart)
+    assert cloth.hinge_lengths == pytest.approx([2 * np.sqrt(2)])
+    assert cloth.hinge_areas == pytest.approx([0.5 + 4.5])
+    assert cloth.edge_lengths == pytest.approx([1, 1, 2 * np.sqrt(2), 3, 3])
+
+
+def test_one_place_a_vertex_is_the_same_as_its_corners():
+    positions, faces = SHEET
+    flat = 1.1 * positions[:, [0, 2]]
+    one, two = (Cloth(positions, faces, rest_uv=uv) for uv in (flat, flat[faces]))
+    for name in ("areas", "Dm_inverse", "masses", "edge_lengths", "hinge_lengths", "hinge_areas"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+def test_vertices_doubled_for_their_chart_are_joined_by_place_and_keep_it():
+    positions, faces = SHEET
+    positions = positions - [0.2, 0.0, 0.0]
+    cut = np.flatnonzero(np.abs(positions[:, 0]) < 1e-9)
+    twice, split = doubled_along(positions, faces, cut)
+    chart = twice[split][:, :, [0, 2]] + np.where(split.max(1) >= len(positions), 9.0, 0.0)[:, None, None]
+    joined, kept, now = join_seams(Surface(twice, split, uv=chart, vertex_data={"w": np.arange(len(twice))}))
+    np.testing.assert_array_equal(joined.positions, positions)
+    np.testing.assert_array_equal(joined.faces, faces)
+    np.testing.assert_array_equal(kept, np.arange(len(positions)))
+    np.testing.assert_array_equal(joined.vertex_data["w"], kept)
+    np.testing.assert_allclose(joined.positions[now], twice)
+    cloth = Cloth(joined.positions, joined.faces, rest_uv=rest_chart(joined, 1.0))
+    np.testing.assert_allclose(cloth.edge_lengths, Cloth(positions, faces).edge_lengths, rtol=1e-12)
+
+
+def test_principal_stretches_of_a_known_map():
+    chart = own_chart(*SHEET)
+    corners = SHEET[0][SHEET[1]] * [1.2, 1.0, 0.7]
+    np.testing.assert_allclose(stretches(corners, chart), np.tile([1.2, 0.7], (len(chart), 1)), rtol=1e-10)
+
+
+def test_a_chart_in_another_unit_is_refused_with_the_scale_that_mends_it():
+    positions, faces = SHEET
+    surface = Surface(positions, faces, uv=own_chart(positions, faces) / 0.25)
+    with pytest.raises(MeshError, match=r"--uv-scale 0\.25 makes them equal"):
+        rest_chart(surface, 1.0)
+    np.testing.assert_allclose(rest_chart(surface, 0.25), own_chart(positions, faces))
+
+
+def test_a_texture_is_no_pattern():
+    positions, faces = SHEET
+    chart = own_chart(positions, faces) * [4.0, 0.25]  # each triangle along its own axes
+    with pytest.raises(MeshError, match=r"that is a texture and no pattern; --rest mesh"):
+        rest_chart(Surface(positions, faces, uv=chart), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda uv: None, "has no UV"),
+        (lambda uv: np.where(np.arange(len(uv))[:, None, None] == 7, np.nan, uv), "triangle 7 has a corner"),
+        (lambda uv: np.where(np.arange(len(uv))[:, None, None] == 4, 0.0, uv), "triangle 4 has no area"),
+    ],
+)
+def test_an_incomplete_chart_is_named(spoil, words):
+    positions, faces = SHEET
+    with pytest.raises(MeshError, match=words):
+        rest_chart(Surface(positions, faces, uv=spoil(own_chart(positions, faces))), 1.0)

@@ -1,0 +1,79 @@
+"""What is refused as the surface of a body, in words that name element and remedy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from reference_sim.cloth import MeshError
+from reference_sim.geometry.closed_mesh import check_closed
+from tests.reference_sim.meshes import box, sphere
+
+BALL, FACES = sphere(1)
+
+
+def turned(face: int) -> np.ndarray:
+    faces = FACES.copy()
+    faces[face] = faces[face, ::-1]
+    return faces
+
+
+def with_vertex(frame: int, vertex: int, place) -> np.ndarray:
+    moving = np.stack([BALL, BALL, BALL])
+    moving[frame, vertex] = place
+    return moving
+
+
+def boxes_sharing_an_edge() -> tuple[np.ndarray, np.ndarray]:
+    x, faces = box((0, 0, 0), (1, 1, 1))
+    y = x + np.array([1, 1, 0])  # its corners 0 and 1 are corners 6 and 7 of the first
+    number = np.concatenate([[6, 7], np.arange(8, 14)])
+    return np.concatenate([x, y[2:]]), np.concatenate([faces, number[faces]])
+
+
+def test_closed_surfaces_pass():
+    check_closed(np.stack([BALL, 2 * BALL]), FACES)
+    two = np.concatenate([BALL, BALL + np.array([5, 0, 0])])
+    check_closed(two[None], np.concatenate([FACES, FACES + len(BALL)]))
+
+
+@pytest.mark.parametrize(
+    ("positions", "faces", "words"),
+    [
+        (BALL, FACES, r"expected \(T, B, 3\) and \(F, 3\)"),
+        (BALL[None], FACES[:, :2], r"expected \(T, B, 3\) and \(F, 3\)"),
+        (BALL[None][:0], FACES, "nothing to touch"),
+        (BALL[None], FACES[:0], "nothing to touch"),
+        (BALL[None], FACES + 1, r"vertex outside 0\.\.17"),
+        (with_vertex(1, 4, np.nan), FACES, "vertex 4 of frame 1 is not finite"),
+        (
+            BALL[None],
+            FACES[1:],
+            r"not closed: edge \(\d+, \d+\) of face \d+ has one face only: fill the hole",
+        ),
+        (BALL[None], turned(3), r"faces disagree: edge \(\d+, \d+\) of face \d+ .*wind all faces outwards"),
+        (BALL[None], FACES[:, ::-1], "inside out .*reverse its faces"),
+        (
+            boxes_sharing_an_edge()[0][None],
+            boxes_sharing_an_edge()[1],
+            r"has 4 faces at edge \((6, 7|7, 6)\)",
+        ),
+    ],
+)
+def test_what_is_no_closed_surface(positions, faces, words):
+    with pytest.raises(MeshError, match=words):
+        check_closed(positions, faces)
+
+
+def test_a_face_that_collapses_on_the_way_is_named_with_its_frame():
+    a, b, c = FACES[5]
+    positions = with_vertex(2, a, 0.5 * (BALL[b] + BALL[c]))
+    with pytest.raises(MeshError, match="face 5 has no area in frame 2: remove it"):
+        check_closed(positions, FACES)
+
+
+def test_a_face_wound_against_its_neighbours_is_among_those_named():
+    with pytest.raises(MeshError) as caught:
+        check_closed(BALL[None], turned(3))
+    edge = [int(n) for n in str(caught.value).split("(")[1].split(")")[0].split(",")]
+    assert set(edge) <= set(FACES[3].tolist())

@@ -1,0 +1,170 @@
+"""Kernels that numba keeps on disk: used again while nothing has changed, never once something has."""
+
+from __future__ import annotations
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from reference_sim.kernels.kernel_cache import KEPT
+
+ROOT = Path(__file__).resolve().parents[3]
+NEAREST = """
+import numpy as np
+from reference_sim.contact.closest_point import FaceTree
+corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+tree = FaceTree(np.array([[0, 1, 2]]), corners.mean(axis=0)[None])
+tree.refit(corners)
+print(*tree.nearest(np.array([[0.25, 0.25, 1.0]])).points[0])
+"""
+FILES = {
+    "deep.py": "from reference_sim.kernels.kernel_cache import njit\n"
+    "@njit(cache=True)\ndef deepest(x):\n    return x + 1\n",
+    "callee.py": "from reference_sim.kernels.kernel_cache import njit\nfrom deep import deepest\n"
+    "@njit(cache=True)\ndef inner(x):\n    return 2 * deepest(x)\n",
+    "other.py": "from reference_sim.kernels.kernel_cache import njit\n"
+    "@njit(cache=True)\ndef power(x):\n    return x**2\n",
+    "constants.py": "FACTOR = 10\n",
+    # A kernel that stands below the first one calls what the file has imported.
+    "caller.py": "from reference_sim.kernels.kernel_cache import njit\nimport other\n"
+    "from callee import inner\nfrom constants import FACTOR\n"
+    "@njit(cache=True)\ndef outer(x):\n    return FACTOR * other.power(helper(x))\n"
+    "@njit(cache=True)\ndef helper(x):\n    return inner(x)\n",
+    "bystander.py": "from reference_sim.kernels.kernel_cache import njit\n"
+    "@njit(cache=True)\ndef nothing(x):\n    return x\n",
+}
+CALL = (
+    "import bystander, caller\nprint(caller.outer(3))\n"
+    "print(sum(caller.outer.stats.cache_hits.values()))\nprint(caller.outer.stats.cache_path)"
+)
+
+
+def run(code: str, path: Path, **environment: str) -> list[str]:
+    """The lines that a new process prints; no compiled Python is kept, which looks at whole seconds only."""
+    variables = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | environment
+    variables |= {"PYTHONPATH": os.pathsep.join([str(path), str(ROOT)])}
+    command = [sys.executable, "-B", "-c", code]
+    done = subprocess.run(command, cwd=path, env=variables, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split("\n")[:-1]
+
+
+def call(path: Path, **environment: str) -> tuple[int, bool, Path]:
+    """10 (2 (3 + 1))^2 at first; whether it came from the disk; where it lies there."""
+    value, hits, place = run(CALL, path, **environment)
+    return int(value), hits == "1", Path(place)
+
+
+@pytest.fixture
+def project(tmp_path):
+    """Kernels that call kernels of other files."""
+    for name, source in FILES.items():
+        (tmp_path / name).write_text(source)
+    return tmp_path
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    source = path.read_text()
+    assert old in source
+    path.write_text(source.replace(old, new))
+
+
+def test_an_edit_two_files_away_from_the_searching_kernel_is_seen(tmp_path):
+    shutil.copytree(
+        ROOT / "reference_sim", tmp_path / "reference_sim", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    assert run(NEAREST, tmp_path) == ["0.25 0.25 0.0"]
+    edit(
+        tmp_path / "reference_sim/geometry/triangle.py",
+        "return best_v, best_w, best",
+        "return 0.0, 1.0, best",
+    )
+    assert run(NEAREST, tmp_path) == ["0.0 1.0 0.0"]
+
+
+def test_every_edit_that_changes_the_result_is_seen_and_the_kernel_before_it_stays(project):
+    assert call(project)[:2] == (640, False)
+    assert call(project)[:2] == (640, True)
+    for name, old, new, value in (
+        ("callee.py", "2 * ", "3 * ", 1440),
+        ("deep.py", "x + 1", "x + 2", 2250),
+        ("other.py", "x**2", "x**3", 33750),
+        ("constants.py", "10", "20", 67500),
+        ("caller.py", "return FACTOR", "return 1 + FACTOR", 67501),
+    ):
+        edit(project / name, old, new)
+        assert call(project)[:2] == (value, False), name
+    edit(project / "caller.py", "return 1 + FACTOR", "return FACTOR")
+    assert call(project)[:2] == (67500, True)
+
+
+def test_an_edit_of_a_file_that_the_kernel_does_not_import_costs_nothing(project):
+    before = call(project)
+    edit(project / "bystander.py", "return x", "return 2 * x")
+    assert call(project) == (640, True, before[2])
+
+
+def test_a_copy_takes_its_compiled_kernels_along(project):
+    call(project)
+    copy = project / "elsewhere" / "copy"
+    shutil.copytree(project, copy)
+    assert call(copy) == (640, True, copy / "__pycache__" / call(project)[2].name)
+
+
+def test_the_users_own_cache_folder_is_respected(project):
+    _, _, place = call(project, NUMBA_CACHE_DIR=str(project / "mine"))
+    assert place.is_relative_to(project / "mine") and not (project / "__pycache__").exists()
+    edit(project / "deep.py", "x + 1", "x + 2")
+    assert call(project, NUMBA_CACHE_DIR=str(project / "mine"))[:2] == (1000, False)
+
+
+def test_where_the_package_cannot_be_written_the_cache_of_the_user_serves(project):
+    (project / "__pycache__").write_text("a file, so that no folder can be made")
+    user = project / "user"
+    _, _, place = call(project, XDG_CACHE_HOME=str(user), HOME=str(user), LOCALAPPDATA=str(user))
+    assert place.is_relative_to(user)
+    assert call(project, XDG_CACHE_HOME=str(user), HOME=str(user), LOCALAPPDATA=str(user))[1]
+
+
+def test_without_any_folder_kernels_are_compiled_in_the_process(project):
+    (project / "no").write_text("a file")
+    code = "import caller\nprint(caller.outer(3), caller.outer.stats.cache_path)"
+    assert run(code, project, NUMBA_CACHE_DIR=str(project / "no")) == ["640 None"]
+
+
+def test_old_folders_go_and_those_of_other_modules_stay(project):
+    for k in range(KEPT + 1):
+        (project / "constants.py").write_text(f"FACTOR = {k}\n")
+        call(project)
+    names = [path.name.rpartition("-")[0] for path in (project / "__pycache__").iterdir()]
+    assert sorted(names) == sorted(["bystander", "callee", "deep", "other"] + ["caller"] * KEPT)
+    assert call(project)[1]
+
+
+def test_the_setting_of_numba_is_left_as_it_was(project):
+    code = "import caller\nfrom numba import config\nprint([config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES])"
+    assert run(code, project) == ["['', '']"]
+
+
+def test_no_file_takes_a_decorator_from_numba_itself():
+    own = "reference_sim/kernels/kernel_cache.py"
+    wrong = []
+    for layer in ("reference_sim", "snug", "benchmarks", "reports"):
+        for path in (ROOT / layer).rglob("*.py"):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            named = {
+                alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names
+            }
+            for node in ast.walk(tree):
+                if isinstance(node, ast.ImportFrom):
+                    named |= {f"{node.module}.{alias.name}" for alias in node.names}
+            named -= {"numba.types", "numba.extending.intrinsic", "numba.extending.overload"}
+            named -= {"numba.core.event.install_recorder"}
+            if any(name.split(".")[0] == "numba" for name in named):
+                wrong.append(path.relative_to(ROOT).as_posix())
+    assert wrong == [own]

@@ -1,0 +1,298 @@
+"""The compiled solver beside what it approximates: energies, factor, iterations, planes, whole roll-outs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.assets.assets import open_assets
+from benchmarks.presets import find_preset
+from benchmarks.scene import BuiltScene
+from benchmarks.scenes import of_garment
+from benchmarks.scenes.long_motion import there_and_back
+from benchmarks.scenes.out_of_distribution import faster
+from benchmarks.scenes.sheet import square_sheet
+from benchmarks.scenes.sheet_on_sphere import sphere
+from reference_sim import Cloth, Material, Obstacle, Potential, simulate
+from reference_sim.energies import AreaBarrier, BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
+from reference_sim.minimise import LBFGS, Newton, lbfgs
+from reference_sim.minimise.compiled.iteration import evaluate
+from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
+from reference_sim.minimise.compiled.scalar_factor import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.minimise.compiled.sliding_obstacle import ROTATION, SlidingObstacle
+from snug.motion.library import make_motion
+from snug.motion.motion import Motion
+from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.reference_sim.meshes import box, patch
+
+DT = 1 / 30
+
+
+def pressed(seed: int, *, pins: tuple[int, ...] = (0, 6)) -> tuple[Potential, np.ndarray]:
+    """All terms in the midst of a step, a moving sheet pressed into a sphere; its guess."""
+    positions, faces = square_sheet(9, 0.3)
+    positions[:, 1] += 0.098
+    cloth = Cloth(positions, faces, Material(), pins=pins)
+    angles = np.random.default_rng(seed).uniform(-1, 1, len(cloth.hinges))
+    terms = [StretchStVK(cloth), BendHinge(cloth, rest_angles=angles), Gravity(cloth), ContactPenalty(cloth)]
+    potential = Potential([*terms, Inertia(cloth, DT)])
+    velocity = np.random.default_rng(seed + 1).normal(0, 0.2, positions.shape)
+    velocity[cloth.pins] = 0.0
+    guess = positions + DT * velocity
+    potential.prepare(Step(positions, velocity, guess, DT, Obstacle(*sphere(0.1, 12))))
+    return potential, guess
+
+
+def in_float32(solver: CompiledLBFGS, x0: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Energies and gradient of the compiled kernels at x0 + u."""
+    solver.max_iterations = 0
+    solver.minimise(x0)  # freezes edges and planes at x0
+    energies, gradient = np.zeros(5), np.empty(u.size, np.float32)
+    target = (solver._terms.inertia.x_hat - x0).astype(np.float32).ravel()
+    evaluate(
+        u.astype(np.float32).ravel(), target, solver._vertices, solver._membrane, solver._lame,
+        solver._hinges, solver._frozen_contact(x0), gradient, solver._scratch, energies,
+    )  # fmt: skip
+    return energies, gradient.reshape(u.shape)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("size", [0.0, 1e-3, 2e-2])
+def test_each_energy_and_its_gradient_is_that_of_its_definition(seed, size):
+    potential, x0 = pressed(seed)
+    u = np.random.default_rng(seed).normal(0, size, x0.shape).astype(np.float32).astype(float)
+    energies, gradient = in_float32(CompiledLBFGS(potential, max_iterations=1), x0, u)
+    values, gradients = zip(*(energy.value_and_gradient(x0 + u) for energy in potential.energies))
+    names = [energy.name for energy in potential.energies]
+    value = dict(zip(names, values))
+    weight = potential.cloth.masses * 9.81
+    value["gravity"] = float(weight @ u[:, 1])  # from x0 on
+    assert value["collision"] > 0
+    order = ("inertia", "gravity", "strain", "bending", "collision")
+    for name, found in zip(order, energies):
+        assert found == pytest.approx(value[name], rel=2e-5, abs=1e-9), name
+    whole = sum(gradients)
+    whole[potential.cloth.pins] = 0.0
+    assert np.abs(gradient - whole).max() < 3e-6 * np.abs(whole).max()
+
+
+@pytest.mark.parametrize("degrees", [-179.9, -120, -60, -1e-3, 0, 1e-3, 44, 46, 89, 91, 150, 179.9])
+def test_a_hinge_has_its_angle_all_the_way_round(degrees):
+    angle = np.radians(degrees)
+    x = np.array([[0, 0, 0], [1, 0, 0], [0.3, 0, 0.8], [0.6, -0.7 * np.sin(angle), -0.7 * np.cos(angle)]])
+    cloth = Cloth(
+        np.array([[0, 0, 0], [1, 0, 0], [0.3, 0, 0.8], [0.6, 0, -0.7]]), np.array([[0, 2, 1], [0, 1, 3]])
+    )
+    potential = Potential([BendHinge(cloth), Inertia(cloth, DT)])
+    energies, gradient = in_float32(CompiledLBFGS(potential, max_iterations=1), x, np.zeros_like(x))
+    value, exact = potential.energies[0].value_and_gradient(x)
+    stiffness = potential.energies[0].stiffness[0]
+    assert value == pytest.approx(0.5 * stiffness * angle**2, rel=1e-9, abs=1e-20)
+    assert energies[3] == pytest.approx(value, rel=1e-6, abs=1e-13 * stiffness)
+    inertia = potential.energies[1].value_and_gradient(x)[1]
+    assert np.abs(gradient - exact - inertia).max() < 1e-5 * max(np.abs(exact + inertia).max(), stiffness)
+
+
+@pytest.mark.parametrize("cells, pinned", [(2, 0), (6, 0), (6, 5)])
+def test_the_factor_solves(cells, pinned):
+    rng = np.random.default_rng(cells + pinned)
+    positions, faces = patch(cells, cells)
+    number = np.full(len(positions), -1)
+    free = np.sort(rng.permutation(len(positions))[pinned:])
+    number[free] = np.arange(len(free))
+    stencils, n = number[faces], len(free)
+    pattern = ScalarPattern(n, [stencils])
+    parts = rng.normal(size=(len(faces), 3, 3))
+    parts = parts @ parts.transpose(0, 2, 1)
+    dense, values = np.eye(n), np.zeros(pattern.entries)
+    values[len(pattern.row_columns) :] = 1.0
+    for stencil, part in zip(stencils, parts):
+        kept = stencil >= 0
+        dense[np.ix_(stencil[kept], stencil[kept])] += part[np.ix_(kept, kept)]
+    places = pattern.places(stencils)
+    np.add.at(values, places[places >= 0], parts[places >= 0])
+    L, D, b = np.empty(len(pattern.rows)), np.empty(n), np.zeros((n, WIDTH))
+    structure = (
+        pattern.row_starts, pattern.row_columns, pattern.factor_rows, pattern.factor_columns, pattern.starts,
+        pattern.rows,
+    )  # fmt: skip
+    room = np.zeros(n), np.empty(n, np.int64)
+    assert factorise(values, *structure, L, D, *room)
+    right = rng.normal(size=(n, 3))
+    b[:, :3] = right[pattern.order]
+    solve(pattern.starts, pattern.rows, L, D, b)
+    solution = np.empty_like(right)
+    solution[pattern.order] = b[:, :3]
+    assert np.abs(dense @ solution - right).max() < 1e-10
+    values[len(pattern.row_columns) :] -= 100.0
+    assert not factorise(values, *structure, L, D, *room)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("iterations", [1, 5, 10])
+def test_iterations_are_those_of_the_exact_solver(seed, iterations):
+    potential, guess = pressed(seed)
+    exact = LBFGS(potential, max_iterations=iterations, finish=False, switch=1e-9).minimise(guess)
+    found = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
+    assert found.iterations == iterations == exact.iterations and found.status == "max_iterations"
+    start, reached = potential.value(guess), potential.value(found.positions)
+    assert start - reached == pytest.approx(start - exact.energy, rel=2e-3)
+    assert np.abs(found.positions - exact.positions).max() < 0.02 * np.abs(exact.positions - guess).max()
+    assert np.array_equal(found.positions[potential.cloth.pins], guess[potential.cloth.pins])
+    assert found.terms == pytest.approx(potential.terms(found.positions), rel=1e-4, abs=1e-8)
+
+
+def test_many_iterations_end_at_the_minimum():
+    potential, guess = pressed(5)
+    found = CompiledLBFGS(potential, max_iterations=400).minimise(guess)
+    least = Newton(potential).minimise(guess)
+    assert least.status == "converged"
+    assert potential.value(found.positions) - least.energy < 1e-6 * (potential.value(guess) - least.energy)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_begins_in_float32_ends_in_a_minimum_of_float64(seed, monkeypatch):
+    potential, guess = pressed(seed)
+    kept: list[np.ndarray] = []
+    found = LBFGS(potential, observe=kept.append).minimise(guess)
+    assert np.array_equal(kept[0], guess) and np.array_equal(kept[-1], found.positions)
+    assert np.array_equal(found.positions, LBFGS(potential).minimise(guess).positions)  # whoever watches
+    monkeypatch.setattr(lbfgs, "LARGEST_COMPILED", 0)
+    in_float64 = LBFGS(potential).minimise(guess)
+    assert found.status == in_float64.status == "converged"
+    assert found.iterations > in_float64.iterations  # more of them, and cheap ones
+    gradient = potential.value_and_gradient(found.positions)[1][potential.cloth.free]
+    assert np.abs(gradient).max() < 1e-6 * 9.81 * potential.cloth.masses.mean()
+    there = Newton(potential).minimise(found.positions)
+    assert there.status == "converged" and np.array_equal(there.positions, found.positions)
+
+
+def test_a_minimiser_that_served_gives_the_bits_of_a_new_one():
+    potential, guess = pressed(1)
+    solver = LBFGS(potential)
+    torn = np.random.default_rng(0).normal(0, 0.1, guess.shape) * potential.cloth.free[:, None]
+    solver.minimise(guess + torn)  # which allows its first direction a hundredth only
+    assert np.array_equal(solver.minimise(guess).positions, LBFGS(potential).minimise(guess).positions)
+
+
+def test_what_it_has_no_kernel_for_is_refused_by_name():
+    potential, _ = pressed(0)
+    cloth = potential.cloth
+    with pytest.raises(ValueError, match="area_barrier"):
+        CompiledLBFGS(Potential([AreaBarrier(cloth), Inertia(cloth, DT)]), max_iterations=5)
+    with pytest.raises(ValueError, match="inertia"):
+        CompiledLBFGS(Potential([StretchStVK(cloth)]), max_iterations=5)
+
+
+def test_energies_that_are_no_numbers_are_a_recorded_failure():
+    potential, guess = pressed(0)
+    guess[40] = 1e30
+    result = CompiledLBFGS(potential, max_iterations=5).minimise(guess)
+    assert result.status == "diverged"
+
+
+def two_boxes(way: float, frames: int) -> Obstacle:
+    """A slab below, and a box that comes down on it from above."""
+    low, faces = box((-0.5, -0.1, -0.5), (0.5, 0.0, 0.5))
+    high, _ = box((-0.1, 0.3, -0.1), (0.1, 0.5, 0.1))
+    both = np.concatenate([faces, faces + len(low)])
+    steps = np.linspace(0, way, frames)
+    return Obstacle(np.stack([np.concatenate([low, high - [0, step, 0]]) for step in steps]), both)
+
+
+def test_a_limb_that_comes_near_is_found_by_the_rotation_and_told_to_neighbours():
+    frames = 40
+    exact = two_boxes(0.28, frames)
+    sliding = SlidingObstacle(exact)
+    points, _ = square_sheet(20, 0.16)
+    points[:, 1] += 0.05 - points[:, 1].mean()
+    late = []
+    for frame in range(frames):
+        near = exact.planes(points, frame)
+        found = sliding.planes(points, frame)
+        distance = [np.linalg.norm(points - planes.points, axis=1) for planes in (near, found)]
+        assert (distance[1] >= distance[0] - 1e-9).all()
+        late.append(int((distance[1] > distance[0] + 1e-3).sum()))
+    assert max(late) > 0  # it is an approximation,
+    assert late[-1] == 0 and max(np.convolve(np.array(late) > 0, np.ones(ROTATION + 1))) <= ROTATION
+
+
+def test_a_rigid_motion_is_followed_exactly_and_repeated_to_the_bit():
+    body, faces = sphere(0.1, 16)
+    turns = np.linspace(0, 2.0, 30)
+    positions = np.stack([
+        body @ np.array([[np.cos(t), 0, np.sin(t)], [0, 1, 0], [-np.sin(t), 0, np.cos(t)]]) + [t, 0, 0]
+        for t in turns
+    ])  # fmt: skip
+    exact, sliding = Obstacle(positions, faces), SlidingObstacle(Obstacle(positions, faces))
+
+    def carried(obstacle):
+        x = np.random.default_rng(0).normal(size=(200, 3))
+        x *= 0.103 / np.linalg.norm(x, axis=1, keepdims=True)
+        x += positions[0].mean(axis=0)
+        for frame in range(1, len(turns)):
+            x = obstacle.transported(x, frame)
+            obstacle.planes(x, frame)
+        return x
+
+    first = carried(sliding)
+    assert np.abs(first - carried(exact)).max() < 1e-9
+    sliding.start_again()
+    assert np.array_equal(first, carried(sliding))
+
+
+@pytest.mark.parametrize("name", ["hanging_sheet", "sheet_on_sphere", "flag"])
+def test_whole_roll_outs_stay_beside_the_exact_ones(name):
+    scene = small_scene(name, cells=10, frames=10)  # later, a flag goes its own way
+    common = {
+        "dt": scene.dt, "frames": scene.frames, "start": scene.start, "velocity": scene.start_velocity,
+        "pin_positions": scene.pin_positions, "max_iterations": 20,
+    }  # fmt: skip
+    exact = simulate(
+        scene.cloth, scene.energies, obstacle=scene.obstacle, method="lbfgs", finish=False, **common
+    )
+    sliding = None if scene.obstacle is None else SlidingObstacle(scene.obstacle)
+    found = simulate(scene.cloth, scene.energies, obstacle=sliding, method=CompiledLBFGS, **common)
+    assert found.frames == exact.frames == 10
+    span = np.abs(exact.positions - exact.positions[0]).max()
+    assert np.abs(found.positions - exact.positions).max() < 0.01 * span
+
+
+def dressed_in_motion(motion: Motion) -> BuiltScene:
+    """A small T-shirt on the package's body in a motion."""
+    preset = replace(find_preset("smoke"), frames=motion.frames)
+    assets = open_assets(preset, [motion], ["tshirt"])
+    return of_garment("tshirt").scene(motion.name).at(preset).build(assets)
+
+
+def roll_out(scene: BuiltScene, obstacle: Obstacle, **options) -> np.ndarray:
+    """Positions (T, V, 3) [m] of ten iterations a step."""
+    found = simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.settle(),
+        obstacle=obstacle, max_iterations=10, **options,
+    )  # fmt: skip
+    assert found.frames == scene.frames, found.reason
+    return found.positions
+
+
+@pytest.mark.parametrize(
+    ("name", "times"),
+    [("run", 4), ("jumping_jack", 4), pytest.param("spin_jump", 1000, marks=pytest.mark.slow)],
+)
+def test_no_limb_is_lost_in_hard_and_long_motions(name, times):
+    """Four times as fast; or there and back for 1,000 frames: depths and distances beside exact planes."""
+    motion = make_motion(name)
+    motion = there_and_back(motion) if times == 1000 else faster(motion, times)
+    scene = dressed_in_motion(motion)
+    assert scene.obstacle is not None
+    exact = roll_out(scene, scene.obstacle, method="lbfgs", finish=False)
+    found = roll_out(scene, SlidingObstacle(scene.obstacle), method=CompiledLBFGS)
+    frames = range(1, scene.frames, max(scene.frames // 100, 1))
+    far = [np.array([scene.obstacle.signed_distance(x[f], f) for f in frames]) for x in (exact, found)]
+    deep = [(d < -5e-3).mean() for d in far]
+    assert deep[1] < deep[0] + 0.01, deep
+    assert far[1].min() > 2 * far[0].min() - 5e-3 and far[1].max() < far[0].max() + 0.05
+    middle = len(frames) // 2  # nothing wears out
+    assert np.abs(far[1]).mean(axis=1)[middle:].mean() < 1.2 * np.abs(far[0]).mean(axis=1)[middle:].mean()

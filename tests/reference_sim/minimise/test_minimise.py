@@ -1,0 +1,385 @@
+"""Minimisers: what they call converged is checked again here by other means; failure is a status."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from reference_sim import GRAVITY, Cloth, Material, Potential, Result, minimise
+from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchSpring, StretchStVK
+from reference_sim.minimise import METHODS, STATUSES, make_minimiser
+from reference_sim.minimise.lbfgs_history import LBFGSHistory
+from reference_sim.minimise.newton import Run
+from tests.reference_sim.meshes import grid, patch, random_rotation
+
+both = pytest.mark.parametrize("method", METHODS)
+TOLERANCE = 1e-6  # relative residual, the default that a result promises
+SHEET, FACES = grid(8, 8, width=0.5, depth=0.5)
+SIDES = np.flatnonzero((SHEET[:, 0] == 0) | (SHEET[:, 0] == 0.5))
+
+
+def hanging() -> tuple[Potential, np.ndarray]:
+    cloth = Cloth(SHEET, FACES, pins=[0, 8])
+    return Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]), SHEET
+
+
+def gradient_by_torch(potential: Potential, x: np.ndarray) -> np.ndarray:
+    """(V, 3) [N] from the definitions alone."""
+    variable = torch.as_tensor(x).clone().requires_grad_(True)
+    sum(energy.energy(variable).sum() for energy in potential.energies).backward()
+    return variable.grad.numpy()
+
+
+def free_hessian(potential: Potential, x: np.ndarray) -> np.ndarray:
+    """Dense, over the free vertices, from the definitions alone."""
+    total = np.zeros((x.size, x.size))
+    for energy in potential.energies:
+        for stencil, block in zip(energy.stencils, Energy.hessian_blocks(energy, x)):
+            places = (3 * stencil[:, None] + np.arange(3)).ravel()
+            total[np.ix_(places, places)] += block
+    free = np.setdiff1d(np.arange(len(x)), potential.cloth.pins)
+    rows = (3 * free[:, None] + np.arange(3)).ravel()
+    return total[np.ix_(rows, rows)]
+
+
+def assert_minimum(potential: Potential, x0: np.ndarray, result: Result) -> None:
+    """Pins still, gradient small and no negative curvature, by another way than the minimiser's own."""
+    x, pins = result.positions, potential.cloth.pins
+    assert result.status == "converged", result.reason
+    assert (x[pins] == x0[pins]).all() and np.isfinite(x).all()
+    gradient = gradient_by_torch(potential, x)
+    gradient[pins] = 0
+    norm = np.abs(gradient).max() / (potential.cloth.masses.mean() * GRAVITY)
+    assert norm <= TOLERANCE
+    # The two gradients differ by round-off of forces of 1 N in vertices of 1e-3 N.
+    assert result.gradient_norm == pytest.approx(norm, abs=1e-9)
+    values = np.linalg.eigvalsh(free_hessian(potential, x))
+    assert values[0] > -1e-10 * values[-1]
+    assert result.energy == pytest.approx(potential.value(x), rel=1e-12, abs=1e-20)
+    assert sum(result.terms.values()) == pytest.approx(result.energy, rel=1e-9, abs=1e-20)
+
+
+@both
+def test_a_sheet_hangs_from_two_corners(method):
+    potential, x0 = hanging()
+    before = x0.copy()
+    result = minimise(potential, x0, method)
+    assert (x0 == before).all()
+    assert_minimum(potential, x0, result)
+    # The two pins carry the whole weight, minus what the lumped masses of the pins carry themselves.
+    carried = gradient_by_torch(potential, result.positions)[potential.cloth.pins]
+    assert carried.sum(axis=0) == pytest.approx([0, potential.cloth.masses.sum() * GRAVITY, 0], abs=1e-6)
+    assert result.iterations > 0 and result.factorisations > 0
+    assert set(result.seconds) >= {"assemble", "factorise", "solve", "evaluate"}
+    assert all(seconds >= 0 for seconds in result.seconds.values())
+
+
+def test_both_methods_find_the_same_minimum_where_there_is_one():
+    """A stretched sheet has one minimum: tolerance 1e-6 weights over a stiffness of 30 N/m, 1e-10 m."""
+    cloth = Cloth(SHEET, FACES, pins=SIDES)
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)])
+    newton, lbfgs = (minimise(potential, 1.3 * SHEET, method) for method in ("newton", "lbfgs"))
+    assert_minimum(potential, 1.3 * SHEET, newton)
+    assert_minimum(potential, 1.3 * SHEET, lbfgs)
+    assert newton.positions == pytest.approx(lbfgs.positions, abs=1e-8)
+
+
+@both
+def test_the_energy_never_rises(method):
+    """A run cut after k iterations is the beginning of a longer one, so the cuts show every accepted step."""
+    potential, x0 = hanging()
+    x0 = x0 + np.random.default_rng(3).normal(0, 0.01, x0.shape) * (x0[:, :1] > 0)
+    start = potential.value(x0)
+    options = {} if method == "newton" else {"finish": False}
+    energies = [start]
+    for k in range(1, 40):
+        result = minimise(potential, x0, method, max_iterations=k, **options)
+        energies.append(result.energy)
+        if result.status == "converged":
+            break
+    steps = np.diff(energies)
+    assert (steps <= 1e-12 * np.abs(energies[:-1])).all(), steps.max()
+    assert energies[-1] < start - 0.01 and len(energies) > 10
+
+
+@pytest.mark.parametrize("energies", [(StretchStVK, BendHinge), (StretchStVK,), (StretchSpring, BendHinge)])
+def test_a_flat_compressed_sheet_is_a_saddle_and_not_an_answer(energies):
+    """Pressed together between two held sides and flat, it is in balance out of its plane, and unstable."""
+    x0 = SHEET * [0.9, 1, 1]
+    cloth = Cloth(SHEET, FACES, pins=SIDES)
+    potential = Potential([energy(cloth) for energy in energies])
+    flat = free_hessian(potential, x0)
+    assert np.linalg.eigvalsh(flat)[0] < 0 and (gradient_by_torch(potential, x0)[:, 1] == 0).all()
+    result = minimise(potential, x0)
+    assert result.status == "stalled" or np.ptp(result.positions[:, 1]) > 0.01
+    if result.status == "converged" and BendHinge in energies:
+        assert_minimum(potential, x0, result)
+    # Flat, the membrane keeps about E2 G^2 / 2 of energy per area; buckled, nearly nothing.
+    assert result.energy < 0.05 * potential.value(x0)
+
+
+@pytest.mark.parametrize("spread", [0.0, 1e-14])
+def test_a_sheet_collapsed_to_a_point_is_no_answer(spread):
+    """F = 0: the force vanishes and every direction falls. The energy there is (lambda + mu)/2 per area."""
+    x, faces = patch(4)
+    cloth = Cloth(x, faces)
+    potential = Potential([StretchStVK(cloth)])
+    m = cloth.material
+    x0 = np.full_like(x, 0.1) + np.random.default_rng(0).normal(0, 1, x.shape) * spread
+    assert potential.value(x0) == pytest.approx((m.lame_lambda + m.lame_mu) / 2, rel=1e-12)
+    result = minimise(potential, x0)
+    assert result.status != "converged" or result.energy < 1e-12
+    # The solver at hand does get away from there, which is more than it promises.
+    assert result.energy < 0.01 * potential.value(x0)
+
+
+@pytest.mark.parametrize("term", [BendHinge, StretchSpring])
+@both
+def test_a_state_without_energy_is_diverged_and_raises_nothing(method, term):
+    """All vertices at one point: a hinge has no normal there, a spring no direction."""
+    cloth = Cloth(SHEET, FACES)
+    result = minimise(Potential([term(cloth), Inertia(cloth, 0.01)]), np.zeros_like(SHEET), method)
+    assert result.status == "diverged" and "not finite" in result.reason
+
+
+@both
+def test_nan_at_the_start_is_diverged(method):
+    potential, x0 = hanging()
+    x0 = x0.copy()
+    x0[5, 1] = np.nan
+    result = minimise(potential, x0, method)
+    assert result.status == "diverged" and "not finite" in result.reason
+
+
+class Poisoned(Energy):
+    """A term that turns into nan once vertex 40 has fallen by 5 cm."""
+
+    name = "poison"
+
+    def __init__(self, cloth: Cloth) -> None:
+        self.cloth, self.stencils = cloth, np.array([[40]])
+
+    def element_energy(self, u):
+        return torch.where(u[..., 0, 1] < -0.05, torch.nan, 0.0) + 0 * u[..., 0, 1]
+
+
+def test_nan_on_the_way_is_never_walked_into_nor_called_converged():
+    potential, x0 = hanging()
+    potential = Potential([*potential.energies, Poisoned(potential.cloth)])
+    result = minimise(potential, x0, max_iterations=20)
+    assert result.status in STATUSES and result.status != "converged"
+    assert np.isfinite(result.positions).all() and np.isfinite(result.energy)
+    assert result.positions[40, 1] >= -0.05
+
+
+@both
+def test_too_few_iterations_is_said(method):
+    potential, x0 = hanging()
+    options = {} if method == "newton" else {"finish": False}
+    result = minimise(potential, x0, method, max_iterations=3, **options)
+    assert result.status == "max_iterations" and result.iterations == 3
+    assert "3 iterations" in result.reason and result.gradient_norm > TOLERANCE
+
+
+def test_few_iterations_assemble_no_hessian_that_nobody_uses(monkeypatch):
+    assembled = []
+    assemble = Run.assemble
+    monkeypatch.setattr(Run, "assemble", lambda run, share: assembled.append(share) or assemble(run, share))
+    potential, x0 = crumpled()
+    results = [
+        minimise(potential, x0, max_iterations=1, start_projected=projected) for projected in (False, True)
+    ]
+    assert assembled == [0.0, 0.15, 0.3, 0.6, 1.0, 1.0]  # one after another until one will do; then that one
+    assert [result.factorisations for result in results] == [5, 1]
+    assert (results[0].positions == results[1].positions).all()
+    assert {result.status for result in results} == {"max_iterations"}
+    assert_minimum(potential, x0, minimise(potential, x0, start_projected=True))
+
+
+def test_converged_in_the_very_last_iteration_is_converged():
+    potential, x0 = crumpled()
+    iterations = minimise(potential, x0).iterations
+    assert_minimum(potential, x0, minimise(potential, x0, max_iterations=iterations))
+    assert minimise(potential, x0, max_iterations=iterations - 1).status == "max_iterations"
+
+
+@both
+def test_too_little_time_is_said(method):
+    potential, x0 = hanging()
+    result = minimise(potential, x0, method, timeout=0.0)
+    assert result.status == "timeout" and result.gradient_norm > TOLERANCE
+
+
+@both
+def test_a_cloth_without_a_minimum_is_not_converged(method):
+    """Gravity and nothing to hold it: the potential has no lower bound."""
+    cloth = Cloth(SHEET, FACES)
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)])
+    result = minimise(potential, SHEET, method, max_iterations=15)
+    assert result.status in STATUSES and result.status != "converged"
+
+
+@pytest.mark.parametrize("rest_angles", [0.0, "rest"])
+def test_an_unpinned_cloth_finds_its_rest_shape_somewhere(rest_angles):
+    """Six rigid motions cost nothing: a singular Hessian at the minimum is no saddle."""
+    x = SHEET.copy()
+    if rest_angles == "rest":
+        x[:, 1] = SHEET[:, 0] ** 2
+    cloth = Cloth(x, FACES)
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth, rest_angles=rest_angles)])
+    x0 = (x + np.random.default_rng(2).normal(0, 0.01, x.shape)) @ random_rotation(3).T + 0.4
+    result = minimise(potential, x0)
+    assert_minimum(potential, x0, result)
+    # Nothing pushes or turns an unpinned cloth as a whole: the centre stays up to the solver's shifts.
+    centred = result.positions - result.positions.mean(axis=0)
+    rest = x - x.mean(axis=0)
+    u, _, vt = np.linalg.svd(rest.T @ centred)
+    turn = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+    # A gradient of 1e-6 weights (4e-9 N) over the softest bending mode (1e-4 N/m): 40 micrometres.
+    assert np.abs(rest @ turn - centred).max() < 4e-5
+
+
+@both
+def test_both_methods_bring_an_unpinned_cloth_to_a_minimum(method):
+    x, faces = patch(1)
+    cloth = Cloth(x, faces)
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth)])
+    x0 = x + np.random.default_rng(1).normal(0, 0.02, x.shape)
+    result = minimise(potential, x0, method)
+    assert_minimum(potential, x0, result)
+    assert result.energy < 1e-9 * potential.value(x0)
+
+
+@both
+def test_at_rest_there_is_nothing_to_do(method):
+    cloth = Cloth(SHEET, FACES, pins=SIDES)
+    result = minimise(Potential([StretchStVK(cloth), BendHinge(cloth)]), SHEET, method)
+    assert result.status == "converged" and result.iterations == 0
+    assert np.abs(result.positions - SHEET).max() == 0
+
+
+@both
+def test_a_cloth_with_every_vertex_pinned_stays(method):
+    cloth = Cloth(SHEET, FACES, pins=range(len(SHEET)))
+    result = minimise(Potential([StretchStVK(cloth), Gravity(cloth)]), 1.1 * SHEET, method)
+    assert result.status == "converged" and (result.positions == 1.1 * SHEET).all()
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_the_tolerance_is_in_vertex_weights_whatever_the_stiffness(factor):
+    material = Material(young_modulus=70e3 * factor)
+    cloth = Cloth(SHEET, FACES, material, pins=SIDES)
+    potential = Potential([StretchStVK(cloth), Gravity(cloth), Inertia(cloth, 1 / 30)])
+    assert_minimum(potential, 1.2 * SHEET, minimise(potential, 1.2 * SHEET))
+
+
+def test_one_minimiser_serves_again_and_gives_the_same_bits():
+    potential, x0 = hanging()
+    newton = make_minimiser(potential)
+    first = newton.minimise(x0)
+    newton.minimise(x0 + 0.01)
+    again = newton.minimise(x0)
+    assert (again.positions == first.positions).all() and again.iterations == first.iterations
+
+
+def crumpled() -> tuple[Potential, np.ndarray]:
+    """A step of a sheet that is far from any minimum: its Hessian is indefinite for a while."""
+    cloth = Cloth(SHEET, FACES)
+    inertia = Inertia(cloth, 1 / 30)
+    x0 = SHEET + np.random.default_rng(5).normal(0, 0.02, SHEET.shape)
+    inertia.x_hat = x0
+    return Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), inertia]), x0
+
+
+@pytest.mark.parametrize("case", [hanging, crumpled])
+def test_a_factorisation_used_again_saves_others_and_ends_in_a_minimum(case):
+    potential, x0 = case()
+    kept: list[np.ndarray] = []
+    fresh = minimise(potential, x0)
+    again = minimise(potential, x0, reuse=True, observe=kept.append)
+    assert_minimum(potential, x0, again)
+    # 16 or 18 of 20 where the sheet hangs: that much is round-off.
+    assert again.factorisations <= 0.9 * fresh.factorisations and again.iterations > again.factorisations
+    assert len(kept) <= again.iterations + 1  # every step that was kept is an iteration
+    assert (np.diff([potential.value(x) for x in kept]) <= 1e-12 * abs(again.energy)).all()
+
+
+def test_no_matrix_is_factorised_twice_and_no_step_measured_twice():
+    """A fence forbids the second half of every step, so that none is a full one."""
+
+    class Fence(Poisoned):
+        def largest_step(self, x, direction):
+            asked.append((x.tobytes(), direction.tobytes()))
+            return 0.5
+
+    potential, x0 = crumpled()
+    potential = Potential([*potential.energies, Fence(potential.cloth)])
+    newton, asked, factorised = make_minimiser(potential, max_iterations=25), [], []
+    factorise = newton.hessian._solver.factorise
+    newton.hessian._solver.factorise = lambda data: factorised.append(data.tobytes()) or factorise(data)
+    assert newton.minimise(x0).iterations == 25
+    assert len(set(factorised)) == len(factorised) > 25
+    assert len(set(asked)) == len(asked) >= 25
+
+
+def test_without_a_preconditioner_newton_takes_over_at_once():
+    potential, x = hanging()
+    minimiser = make_minimiser(potential, "lbfgs")
+    minimiser.preconditioner.factorise = lambda data: False
+    assert_minimum(potential, x, minimiser.minimise(x))
+    alone = make_minimiser(potential, "lbfgs", finish=False)
+    alone.preconditioner.factorise = lambda data: False
+    assert alone.minimise(x).status == "stalled"
+
+
+def test_lbfgs_and_its_finish_share_iterations_and_clock(monkeypatch):
+    potential, x0 = hanging()
+    result = minimise(potential, x0, "lbfgs", max_iterations=30, patience=20)
+    assert (result.status, result.iterations) == ("max_iterations", 30)
+    ticks = iter(range(100_000))
+    monkeypatch.setattr("time.perf_counter", lambda: float(next(ticks)))  # a second for every look at it
+    cut = minimise(potential, x0, "lbfgs", patience=10, switch=1e-6, timeout=90)
+    assert cut.status == "timeout" and cut.iterations > 10
+    assert next(ticks) < 90 + 40
+
+
+def test_a_watchdog_ends_when_time_is_up(monkeypatch):
+    """A sheet 1e4 times as stiff as cotton goes up to 40 steps before it looks back."""
+    cloth = Cloth(SHEET, FACES, Material(young_modulus=7e8), pins=[0, 8])
+    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)])
+    x0 = SHEET + 1e-4 * np.random.default_rng(0).standard_normal(SHEET.shape)
+    monkeypatch.setattr(Run, "late", lambda self, timeout: self.iterations >= 45)
+    result = minimise(potential, x0)
+    assert result.status == "timeout" and result.iterations <= 46
+
+
+def test_unknown_names_are_refused():
+    potential, x0 = hanging()
+    with pytest.raises(ValueError, match=r"unknown minimiser 'bfgs': choose one of newton, lbfgs"):
+        minimise(potential, x0, "bfgs")
+    with pytest.raises(TypeError, match="tolerence"):
+        minimise(potential, x0, tolerence=1e-3)
+
+
+@pytest.mark.parametrize("memory", [0, 1, 5, 20])
+def test_the_two_loop_recursion_is_the_update_of_a_dense_matrix(memory):
+    """H <- (I - rho s y^T) H (I - rho y s^T) + rho s s^T for the pairs remembered, oldest first."""
+    generator = np.random.default_rng(1)
+    first, history, pairs = generator.uniform(1, 2, 12), LBFGSHistory(memory), []
+    for k in range(9):
+        s = generator.normal(size=12)
+        y = (
+            s * generator.uniform(1, 5, 12) * (-1 if k == 6 else 1)
+        )  # one pair of negative curvature is left out
+        history.add(s, y)
+        pairs += [] if k == 6 else [(s, y)]
+    assert len(history) == min(memory, 8)
+    H = np.diag(1 / first)
+    for s, y in pairs[-memory:] if memory else []:
+        V = np.eye(12) - np.outer(y, s) / (s @ y)
+        H = V.T @ H @ V + np.outer(s, s) / (s @ y)
+    g = generator.normal(size=12)
+    assert history.direction(g, lambda q: q / first) == pytest.approx(-H @ g, rel=1e-12, abs=1e-12)
+    history.clear()
+    assert history.direction(g, lambda q: q / first) == pytest.approx(-g / first, rel=1e-15)

@@ -1,0 +1,340 @@
+"""The moving body: contact planes and distances against a sphere and against brute force, and bad meshes."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from reference_sim import MeshError, Obstacle
+from reference_sim.minimise.compiled.sliding_obstacle import SlidingObstacle
+from tests.reference_sim.meshes import box, random_rotation, sphere
+
+RADIUS = 0.3
+SPHERE, FACES = sphere(4, RADIUS)
+
+
+def directions(count: int, seed: int) -> np.ndarray:
+    d = np.random.default_rng(seed).normal(size=(count, 3))
+    return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+
+def around(count: int, seed: int, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points at random distances between low and high from the true sphere, and those distances [m]."""
+    distance = np.random.default_rng(seed + 100).uniform(low, high, count)
+    return (RADIUS + distance)[:, None] * directions(count, seed), distance
+
+
+def sagitta(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """How far below the true sphere the deepest face of the mesh lies [m]."""
+    corner = vertices[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return RADIUS - float(np.einsum("fi,fi->f", normal, corner[:, 0]).min())
+
+
+def closest_on_triangles(point: np.ndarray, corner: np.ndarray) -> np.ndarray:
+    """(F, 3) closest point of every triangle (F, 3, 3): the foot if inside, else the best on a side."""
+    a, b, c = corner.transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    foot = point - normal * (((point - a) * normal).sum(1) / (normal**2).sum(1))[:, None]
+    best, distance = foot.copy(), np.full(len(foot), np.inf)
+    inside = np.ones(len(foot), dtype=bool)
+    for p, q in ((a, b), (b, c), (c, a)):
+        inside &= (np.cross(q - p, foot - p) * normal).sum(1) >= 0
+        t = np.clip(((point - p) * (q - p)).sum(1) / ((q - p) ** 2).sum(1), 0, 1)
+        candidate = p + t[:, None] * (q - p)
+        length = np.linalg.norm(point - candidate, axis=1)
+        best[length < distance] = candidate[length < distance]
+        distance = np.minimum(distance, length)
+    best[inside] = foot[inside]
+    return best
+
+
+def brute_force(
+    points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, allowed: np.ndarray
+) -> np.ndarray:
+    """(S,) distance of each point to the nearest face that allowed (S, F) lets it meet."""
+    corner = vertices[faces]
+    result = [
+        np.linalg.norm(closest_on_triangles(p, corner[ok]) - p, axis=1).min()
+        for p, ok in zip(points, allowed)
+    ]
+    return np.array(result)
+
+
+def test_planes_of_a_sphere():
+    obstacle = Obstacle(SPHERE, FACES)
+    points, distance = around(300, 1, -0.1, 0.2)
+    planes = obstacle.planes(points, 0)
+    assert np.linalg.norm(planes.normals, axis=1) == pytest.approx(1.0, rel=1e-14)
+    d = np.einsum("si,si->s", planes.normals, points - planes.points)
+    exact = brute_force(points, SPHERE, FACES, np.ones((300, len(FACES)), dtype=bool))
+    # The plane gives the signed distance at the sample's own place: round-off alone.
+    assert np.abs(d) == pytest.approx(exact, abs=1e-14)
+    depth = sagitta(SPHERE, FACES)
+    assert depth < 2e-3
+    # The mesh lies inside the true sphere, by no more than the sagitta.
+    assert (d - distance > -1e-14).all() and (d - distance < depth).all()
+    # A chord of length e deviates by e / 2R from the tangent; these are 3 cm long at most.
+    cosine = np.einsum("si,si->s", planes.normals, points / np.linalg.norm(points, axis=1, keepdims=True))
+    assert cosine.min() > 1 - 0.01
+
+
+def test_the_place_on_the_face_is_the_plane_point():
+    planes = Obstacle(SPHERE, FACES).planes(around(50, 2, -0.02, 0.02)[0], 0)
+    place = np.einsum("sa,sai->si", planes.barycentric, SPHERE[FACES[planes.faces]])
+    assert place == pytest.approx(planes.points, abs=1e-14)
+    assert planes.barycentric.sum(axis=1) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_normals_point_outwards_on_the_surface_itself():
+    """At distance zero there is no direction to the sample: the smooth normal of the mesh takes over."""
+    obstacle = Obstacle(SPHERE, FACES)
+    points = np.concatenate([SPHERE[::7], SPHERE[FACES[::5]].mean(axis=1)])
+    normals = obstacle.planes(points, 0).normals
+    radial = points / np.linalg.norm(points, axis=1, keepdims=True)
+    assert np.einsum("si,si->s", normals, radial).min() > 0.99
+    # Just below and just above the skin the normal stays the same: contact has no jump there.
+    for shift in (-1e-5, 1e-5):
+        moved = obstacle.planes(points + shift * radial, 0).normals
+        assert np.einsum("si,si->s", normals, moved).min() > 0.98
+
+
+def test_planes_at_edges_and_corners_of_a_box():
+    obstacle = Obstacle(*box((0, 0, 0), (1, 1, 1)))
+    points = np.array([(0.5, 1.3, 0.4), (1.3, 1.4, 0.5), (1.2, 1.2, 1.1), (0.5, 0.9, 0.4)])
+    planes = obstacle.planes(points, 0)
+    assert planes.points == pytest.approx(np.array([(0.5, 1, 0.4), (1, 1, 0.5), (1, 1, 1), (0.5, 1, 0.4)]))
+    away = np.array([(0, 1, 0), (0.6, 0.8, 0), (2 / 3, 2 / 3, 1 / 3), (0, 1, 0)])
+    assert planes.normals == pytest.approx(away, abs=1e-12)
+
+
+def test_signed_distance_of_a_sphere_and_of_a_box():
+    obstacle = Obstacle(SPHERE, FACES)
+    points, distance = around(400, 3, -0.14, 0.5)
+    found = obstacle.signed_distance(points, 0)
+    gap = found - distance
+    assert (gap > -1e-14).all() and (gap < sagitta(SPHERE, FACES)).all()
+    assert (found < 0).sum() > 50 and (found > 0).sum() > 50
+
+    points = np.random.default_rng(4).uniform(-0.3, 0.5, (400, 3))
+    outside = np.maximum(np.maximum(-points, points - [0.2, 0.25, 0.28]), 0)
+    inside = np.minimum(points, np.array([0.2, 0.25, 0.28]) - points).min(axis=1)
+    exact = np.where(inside > 0, -inside, np.linalg.norm(outside, axis=1))
+    assert (inside > 0).sum() > 5
+    found = Obstacle(*box((0, 0, 0), (0.2, 0.25, 0.28))).signed_distance(points, 0)
+    assert found == pytest.approx(exact, abs=1e-14)
+
+
+def test_signed_distance_deep_inside_a_thick_body():
+    points = np.array([(0.0, 0.01, 0.02), (0.1, 0, 0), (0, -0.12, 0)])
+    found = Obstacle(SPHERE, FACES).signed_distance(points, 0)
+    assert found == pytest.approx(np.linalg.norm(points, axis=1) - RADIUS, abs=sagitta(SPHERE, FACES))
+
+
+def bent(vertices: np.ndarray) -> np.ndarray:
+    """A bar bent by half a turn, so that its two ends come near each other."""
+    angle = np.pi * vertices[:, 0]
+    radius = 0.35 + vertices[:, 1]
+    return np.column_stack([radius * np.sin(angle), radius * np.cos(angle), vertices[:, 2]])
+
+
+def bar() -> tuple[np.ndarray, np.ndarray]:
+    """A straight bar of length 1.1 m, 0.16 m thick, rounded."""
+    x, faces = sphere(3)
+    return x * [0.55, 0.08, 0.08], faces
+
+
+@pytest.mark.parametrize("region", [0.15, 0.3])
+def test_a_sample_meets_only_faces_near_its_own_place_at_rest(region):
+    rest, faces = bar()
+    obstacle = Obstacle(bent(rest), faces, rest_positions=rest, region=region)
+    generator = np.random.default_rng(5)
+    rest_points = rest[faces].mean(axis=1)[generator.integers(len(faces), size=150)]
+    rest_points = rest_points + generator.normal(0, 0.01, rest_points.shape)
+    # Half of the samples have stayed with the bar, half have wandered to where another part of it is nearer.
+    points = bent(rest_points)
+    points[::2] = points[generator.permutation(150)[:75]] + generator.normal(0, 0.02, (75, 3))
+
+    near = np.linalg.norm(rest[faces].mean(axis=1)[None] - rest_points[:, None], axis=2) <= region
+    assert near.any(axis=1).all()
+    allowed = brute_force(points, bent(rest), faces, near)
+    anywhere = brute_force(points, bent(rest), faces, np.ones_like(near))
+    assert (allowed > anywhere + 1e-3).sum() > 20 and (allowed == anywhere).sum() > 20
+    planes = obstacle.planes(points, 0, rest_points)
+    assert near[np.arange(150), planes.faces].all()
+    assert np.linalg.norm(points - planes.points, axis=1) == pytest.approx(allowed, abs=1e-14)
+    # Without rest points, and on a body without a rest pose, the rule is off.
+    for free in (obstacle.planes(points, 0), Obstacle(bent(rest), faces).planes(points, 0, rest_points)):
+        assert np.linalg.norm(points - free.points, axis=1) == pytest.approx(anywhere, abs=1e-14)
+
+
+def column(height: float = 1.0, radius: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    """An upright cylinder with flat ends, of rings 1 cm apart."""
+    rings, around = np.linspace(-height, height, 201), 2 * np.pi * np.arange(48) / 48
+    circle = radius * np.column_stack([np.cos(around), np.zeros(48), np.sin(around)])
+    vertices = [circle + np.array([0, y, 0]) for y in rings] + [np.array([[0, -height, 0], [0, height, 0]])]
+    k = np.arange(48)
+    after, low = (k + 1) % 48, len(rings) * 48
+    faces = [np.column_stack([np.full(48, low), k, after])]
+    for ring in range(len(rings) - 1):
+        a, b, c, d = ring * 48 + k, ring * 48 + after, (ring + 1) * 48 + k, (ring + 1) * 48 + after
+        faces += [np.column_stack([a, c, b]), np.column_stack([b, c, d])]
+    top = (len(rings) - 1) * 48
+    faces.append(np.column_stack([np.full(48, low + 1), top + after, top + k]))
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def heights(obstacle: Obstacle, points: np.ndarray, home: tuple[float, float, float]) -> np.ndarray:
+    """n.(x - c) of samples that were all at `home` at rest."""
+    planes = obstacle.planes(points, 0, np.tile(home, (len(points), 1)))
+    assert np.linalg.norm(planes.normals, axis=1) == pytest.approx(1.0, rel=1e-12)
+    return np.einsum("si,si->s", planes.normals, points - planes.points)
+
+
+@pytest.mark.parametrize("kind", [lambda obstacle: obstacle, SlidingObstacle])
+def test_beside_the_border_of_its_faces_a_sample_meets_a_ball(kind):
+    """Samples at the side of a column at rest may meet 20 cm of it up and down, and have moved along it."""
+    rest, faces = column()
+    obstacle = kind(Obstacle(rest, faces, rest_positions=rest, region=0.2))
+    home = 0.1, 0.003, 0.0  # its uppermost face ends at 0.2 m
+
+    def at(along: float, depth: float) -> float:
+        return heights(obstacle, np.array([[0.1 - depth, 0.2 + along, 0.0]]), home)[0]
+
+    for depth in (0.03, 0.01, 0.002, -0.002, -0.03):  # on its faces: the distance to the skin, signed
+        assert at(-0.05, depth) == pytest.approx(-depth, abs=3e-4)
+    for depth in (0.03, 0.01, 0.002, -0.002, -0.03):  # far beyond them: no contact
+        assert at(0.1, depth) > 0.03
+    # Just beyond them the skin goes on as the tangent, and bends away as a ball of 10 cm.
+    assert at(0.003, 0.01) == pytest.approx(-0.01, abs=3e-4)
+    for along, depth in ((0.01, 0.01), (0.02, 0.02), (0.03, 0.01), (0.04, 0.04)):
+        way = np.array([0.1 - depth, along])  # to the sample from the ball's far end, 10 cm below the border
+        expected = np.array([-depth, along]) @ way / np.linalg.norm(way)
+        assert at(along, depth) == pytest.approx(expected, abs=3e-4)
+        assert (expected < 0) == (along**2 + (depth - 0.05) ** 2 < 0.05**2)
+
+
+def test_contact_fades_where_a_sample_slides_off_the_border_of_its_faces():
+    rest, faces = column()
+    obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.2)
+    along = np.arange(0.1, 0.4, 1e-4)
+    for depth in (0.002, 0.005, 0.01, 0.02):
+        points = np.column_stack([np.full_like(along, 0.1 - depth), along, np.zeros_like(along)])
+        height = np.minimum(heights(obstacle, points, (0.1, 0.003, 0.0)), 0.004)
+        assert np.abs(np.diff(height)).max() < 3e-4
+        assert height[0] == pytest.approx(-depth, abs=1e-4) and height[-1] == 0.004
+
+
+def test_no_sample_outside_a_dressed_body_is_in_contact():
+    """Samples of a cuff on a bent bar, displaced at random by some centimetres along it and off it."""
+    rest, faces = bar()
+    obstacle = Obstacle(bent(rest), faces, rest_positions=rest, region=0.1)
+    generator = np.random.default_rng(11)
+    cuff = rest[np.abs(rest[:, 0]) < 0.15]
+    homes = cuff[generator.integers(len(cuff), size=4000)]
+    points = bent(homes + generator.normal(0, [0.12, 0.02, 0.02], homes.shape))
+    planes = obstacle.planes(points, 0, homes)
+    height = np.einsum("si,si->s", planes.normals, points - planes.points)
+    distance = obstacle.signed_distance(points, 0)
+    assert (height < 0.004).sum() > 500
+    assert (height[distance > 0.015] > 0.004).all()
+    # And whoever is inside, nearest to a face that it may meet, is in contact by the exact depth.
+    own = (distance < 0) & (np.linalg.norm(points - planes.points, axis=1) < np.abs(distance) + 1e-9)
+    assert own.sum() > 300
+    assert height[own] == pytest.approx(distance[own], abs=1e-9)
+
+
+def test_what_samples_may_meet_is_found_also_from_a_few_of_them():
+    """The faces searched are those that some sample may meet, up to the very rim of the region."""
+    rest, faces = bar()
+    obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.2)
+    centroids = rest[faces].mean(axis=1)
+    rest_points = centroids[centroids[:, 0] < -0.45]
+    points = rest_points + np.array([0.17, 0.0, 0.01])  # the nearest faces are near the rim of the region
+    allowed = np.linalg.norm(centroids[None] - rest_points[:, None], axis=2) <= 0.2
+    exact = brute_force(points, rest, faces, allowed)
+    planes = obstacle.planes(points, 0, rest_points)
+    assert np.linalg.norm(points - planes.points, axis=1) == pytest.approx(exact, abs=1e-14)
+    assert exact.min() < 0.05
+
+
+def test_two_kinds_of_samples_do_not_disturb_each_other():
+    rest, faces = bar()
+    obstacle = Obstacle(bent(rest), faces, rest_positions=rest, region=0.15)
+    left = rest[rest[:, 0] < -0.3]
+    above = bent(left) + np.array([0.0, 0.0, 0.01])
+    first = obstacle.planes(above, 0, left)
+    second = obstacle.planes(bent(rest), 0, rest)
+    again = obstacle.planes(above, 0, left)
+    # Where two faces are equally near either may answer, with the same point.
+    assert again.points == pytest.approx(first.points, abs=1e-14)
+    assert again.normals == pytest.approx(first.normals, abs=1e-9)
+    assert np.linalg.norm(second.points - bent(rest), axis=1).max() < 1e-12
+    place = np.einsum("sa,sai->si", second.barycentric, bent(rest)[faces[second.faces]])
+    assert place == pytest.approx(second.points, abs=1e-12)
+
+
+def test_each_frame_has_its_own_surface_and_the_last_one_stays():
+    moving = SPHERE + np.array([0.0, 0.1, 0.0]) * np.arange(3)[:, None, None]
+    obstacle = Obstacle(moving, FACES)
+    assert obstacle.frames == 3 and Obstacle(SPHERE, FACES).frames == 1
+    point = np.array([[0.0, 0.5, 0.0]])
+    for frame, expected in ((0, 0.2), (1, 0.1), (2, 0.0), (3, 0.0), (9, 0.0), (1, 0.1)):
+        # The pole is a vertex of the mesh, so the distance is that of the true sphere.
+        assert obstacle.signed_distance(point, frame) == pytest.approx([expected], abs=1e-12)
+        assert obstacle.planes(point, frame).points[0, 1] == pytest.approx(0.5 - expected, abs=1e-12)
+        assert (obstacle.at(frame) == moving[min(frame, 2)]).all()
+
+
+def test_carried_is_exact_for_a_rigid_motion():
+    turn, shift = random_rotation(8), np.array([0.4, -0.2, 0.7])
+    obstacle = Obstacle(np.stack([SPHERE, SPHERE @ turn.T + shift]), FACES)
+    points, _ = around(200, 6, -0.1, 0.3)
+    # Round-off of barycentric places and frames, at 1 m from the origin.
+    assert obstacle.transported(points, 1) == pytest.approx(points @ turn.T + shift, abs=1e-12)
+
+
+def test_carried_keeps_height_over_the_nearest_face_of_a_bending_bar():
+    rest, faces = bar()
+    obstacle = Obstacle(np.stack([rest, bent(rest)]), faces, rest_positions=rest, region=0.15)
+    centroid = rest[faces].mean(axis=1)
+    corner = rest[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    points = centroid + 0.01 * normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    carried = obstacle.transported(points, 1, points)
+    planes = obstacle.planes(carried, 1, points)
+    corner = bent(rest)[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    expected = corner.mean(axis=1) + 0.01 * normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    # Faces of an elongated, convex body: each centroid's own face is the nearest one.
+    assert carried == pytest.approx(expected, abs=1e-12)
+    assert np.median(np.linalg.norm(carried - planes.points, axis=1)) == pytest.approx(0.01, rel=1e-3)
+
+
+def spoiled(value: float) -> np.ndarray:
+    positions = np.stack([SPHERE, SPHERE])
+    positions[1, 7, 2] = value
+    return positions
+
+
+REFUSED = {
+    "open": (SPHERE, FACES[:-1], {}, "not closed: edge ("),
+    "inside out": (SPHERE, FACES[:, ::-1], {}, "inside out"),
+    "one face turned": (SPHERE, np.concatenate([FACES[:-1], FACES[-1:, ::-1]]), {}, "edge ("),
+    "nan": (spoiled(np.nan), FACES, {}, "vertex 7 of frame 1 is not finite"),
+    "infinity": (spoiled(np.inf), FACES, {}, "vertex 7 of frame 1 is not finite"),
+    "shape": (SPHERE[:, :2], FACES, {}, "expected (T, B, 3)"),
+    "shape of faces": (SPHERE, FACES[:, :2], {}, "expected (T, B, 3)"),
+    "index": (SPHERE[:-1], FACES, {}, f"outside 0..{len(SPHERE) - 2}"),
+    "rest shape": (SPHERE, FACES, {"rest_positions": SPHERE[:-1]}, "rest_positions"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_mesh_that_is_no_body_is_refused_with_a_reason(name):
+    positions, faces, more, message = REFUSED[name]
+    with pytest.raises(MeshError, match=re.escape(message)):
+        Obstacle(positions, faces, **more)

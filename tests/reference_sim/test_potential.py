@@ -1,0 +1,171 @@
+"""The sum of terms against dense sums made here, the sparse pattern with pins, and ablation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from reference_sim import Cloth, Potential
+from reference_sim.energies import (
+    AreaBarrier,
+    BendHinge,
+    ContactPenalty,
+    Energy,
+    Gravity,
+    Inertia,
+    Step,
+    StretchSpring,
+    StretchStVK,
+)
+from tests.reference_sim.meshes import grid, patch
+
+
+def bent_cloth(pins: tuple[int, ...] = ()) -> Cloth:
+    x, faces = patch(31, cells=4)
+    return Cloth(0.3 * x, faces, pins=pins)
+
+
+def all_terms(cloth: Cloth) -> list[Energy]:
+    contact = ContactPenalty(cloth)
+    contact.points = contact.rest_samples - [0.0, 0.0, 0.001]  # 3 mm deep at rest
+    contact.normals[:] = (0.0, 0.0, 1.0)
+    terms = [StretchStVK(cloth), StretchSpring(cloth), BendHinge(cloth), Gravity(cloth), Inertia(cloth, 0.01)]
+    return [*terms, contact, AreaBarrier(cloth, threshold=1.5)]
+
+
+def crumpled(cloth: Cloth) -> np.ndarray:
+    return cloth.rest_positions + np.random.default_rng(1).normal(0, 0.002, cloth.rest_positions.shape)
+
+
+def dense_sum(energies: list[Energy], x: np.ndarray) -> np.ndarray:
+    """(3V, 3V): every element's block, from the definition by autodiff, added where its vertices are."""
+    total = np.zeros((x.size, x.size))
+    for energy in energies:
+        for stencil, block in zip(energy.stencils, Energy.hessian_blocks(energy, x)):
+            places = (3 * stencil[:, None] + np.arange(3)).ravel()
+            np.add.at(total, np.ix_(places, places), block)  # a stencil may name a vertex twice
+    return total
+
+
+def test_hessian_is_the_dense_sum_of_all_terms():
+    cloth = bent_cloth()
+    energies, x = all_terms(cloth), crumpled(cloth)
+    expected = dense_sum(energies, x)
+    hessian = Potential(energies).hessian(x)
+    assert hessian.format == "csc" and hessian.shape == expected.shape
+    assert (abs(hessian - hessian.T)).max() == 0
+    # Sums of the same numbers in another order, after autodiff's own round-off.
+    assert np.abs(hessian.toarray() - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+def test_each_term_alone_has_the_hessian_of_its_own_blocks():
+    cloth = bent_cloth()
+    x = crumpled(cloth)
+    for energy in all_terms(cloth):
+        expected = dense_sum([energy], x)
+        found = Potential([energy]).hessian(x).toarray()
+        assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("pins", [(0,), (3, 4, 17, 24), tuple(range(1, 25))])
+def test_the_pattern_of_free_vertices_is_a_part_of_the_whole(pins):
+    cloth = bent_cloth(pins)
+    energies, x = all_terms(cloth), crumpled(cloth)
+    potential = Potential(energies)
+    free = np.ones(cloth.vertex_count, dtype=bool)
+    free[cloth.pins] = False
+    pattern = potential.pattern(free)
+    assert pattern is potential.pattern(free.copy())  # built once
+    rows = (3 * np.flatnonzero(free)[:, None] + np.arange(3)).ravel()
+    expected = dense_sum(energies, x)[np.ix_(rows, rows)]
+    data = pattern.assemble(x)
+    size = np.abs(expected).max()
+    assert pattern.size == len(rows)
+    assert np.abs(pattern.symmetric(data).toarray() - expected).max() < 1e-12 * size
+    assert np.abs(np.tril(pattern.lower(data).toarray()) - np.tril(expected)).max() < 1e-12 * size
+    assert data[pattern.diagonal] == pytest.approx(expected.diagonal(), rel=1e-12)
+    assert sorted(pattern.order.tolist()) == list(range(pattern.size))
+    # CSC as a factorisation reads it: rows of a column in order, the diagonal stored.
+    for column in range(pattern.size):
+        stored = pattern.indices[pattern.indptr[column] : pattern.indptr[column + 1]]
+        assert (np.diff(stored) > 0).all() and column in stored
+
+
+def test_the_scalar_pattern_is_the_sum_of_scalar_stiffnesses():
+    cloth = bent_cloth((0, 7))
+    energies, x = all_terms(cloth), crumpled(cloth)
+    free = np.ones(cloth.vertex_count, dtype=bool)
+    free[cloth.pins] = False
+    pattern = Potential(energies).pattern(free, block=1)
+    expected = np.zeros((len(x), len(x)))
+    for energy in energies:
+        if energy.has_scalar_stiffness:
+            elements, blocks = energy.scalar_stiffness(x)
+            assert np.abs(blocks).max() > 0
+            for stencil, block in zip(energy.stencils[elements], blocks):
+                np.add.at(expected, np.ix_(stencil, stencil), block)
+    expected = expected[np.ix_(free, free)]
+    assert np.linalg.eigvalsh(expected)[0] > 0  # what a preconditioner must be
+    found = pattern.symmetric(pattern.assemble(x)).toarray()
+    assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
+
+
+def test_value_and_gradient_are_sums_and_terms_names_them():
+    cloth = bent_cloth()
+    energies, x = all_terms(cloth), crumpled(cloth)
+    potential = Potential(energies)
+    parts = [Energy.value_and_gradient(energy, x) for energy in energies]
+    assert all(abs(value) > 0 for value, _ in parts)
+    assert potential.value(x) == pytest.approx(sum(value for value, _ in parts), rel=1e-12)
+    expected = sum(gradient for _, gradient in parts)
+    assert np.abs(potential.gradient(x) - expected).max() < 1e-11 * np.abs(expected).max()
+    names = ["strain", "spring", "bending", "gravity", "inertia", "collision", "area_barrier"]
+    assert list(potential.terms(x)) == names
+    assert list(potential.terms(x).values()) == pytest.approx([value for value, _ in parts], rel=1e-12)
+
+
+def test_leaving_a_term_out_takes_away_that_term_and_nothing_else():
+    cloth = bent_cloth()
+    energies, x = all_terms(cloth), crumpled(cloth)
+    whole = Potential(energies)
+    for k, energy in enumerate(energies):
+        rest, alone = Potential(energies[:k] + energies[k + 1 :]), Potential([energy])
+        assert rest.value(x) + alone.value(x) == pytest.approx(whole.value(x), rel=1e-13)
+        left = rest.gradient(x) + alone.gradient(x) - whole.gradient(x)
+        assert np.abs(left).max() < 1e-12 * np.abs(whole.gradient(x)).max()
+        assert abs(rest.hessian(x) + alone.hessian(x) - whole.hessian(x)).max() < 1e-12 * 1e3
+        assert energy.name not in rest.terms(x)
+
+
+def test_prepare_reaches_every_term():
+    cloth = bent_cloth()
+    energy = Inertia(cloth, 0.01)
+    previous, velocity = crumpled(cloth), np.ones_like(cloth.rest_positions)
+    Potential([Gravity(cloth), energy]).prepare(Step(previous, velocity, previous, 0.01))
+    assert energy.x_hat == pytest.approx(previous + 0.01, rel=1e-15)
+
+
+def test_positions_need_not_be_contiguous_or_double():
+    cloth = bent_cloth()
+    potential, x = Potential(all_terms(cloth)), crumpled(cloth)
+    assert potential.value(np.asfortranarray(x)) == potential.value(x)
+    single = x.astype(np.float32)
+    assert potential.value(single) == potential.value(single.astype(np.float64))
+    assert potential.gradient(single).dtype == np.float64
+
+
+def test_energies_of_different_cloths_are_refused():
+    with pytest.raises(ValueError, match="'gravity' was built on another cloth"):
+        Potential([StretchStVK(bent_cloth()), Gravity(bent_cloth())])
+
+
+def test_a_potential_without_terms_is_refused():
+    with pytest.raises(ValueError, match="at least one energy"):
+        Potential([])
+
+
+def test_contact_without_an_obstacle_is_refused_when_it_is_prepared():
+    x, faces = grid(2, 2)
+    cloth = Cloth(x, faces)
+    with pytest.raises(ValueError, match="needs an obstacle"):
+        Potential([ContactPenalty(cloth)]).prepare(Step(x, 0 * x, x, 0.1))

@@ -1,0 +1,350 @@
+"""Backward Euler against its exact discrete answers, and the loop around it: pins, files, failures.
+
+The recurrences are those of the scheme itself, not of the continuous problem; so what is left is round-off
+and the minimiser's tolerance, which each test states.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+
+import h5py
+import numpy as np
+import pytest
+import torch
+
+from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, simulate
+from reference_sim.command.summary import summary
+from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Energy, Gravity, StretchStVK
+from reference_sim.progress import progress_bar
+from tests.reference_sim.meshes import box, grid, patch, random_rotation
+
+SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
+DOWN = np.array([0.0, -GRAVITY, 0.0])
+
+
+def terms_of(cloth: Cloth) -> list[Energy]:
+    return [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
+
+
+def potential_energy(energies: list[Energy], x: np.ndarray) -> float:
+    """[J] from the definitions alone."""
+    return sum(float(energy.energy(torch.as_tensor(x)).sum()) for energy in energies)
+
+
+# Exact answers
+
+
+@pytest.mark.parametrize("guess", ["previous", "extrapolated"])
+def test_free_fall_is_the_discrete_parabola(guess):
+    """x_n = x_0 + n dt v_0 + g dt^2 n (n + 1) / 2 for every vertex: nothing is strained on the way."""
+    cloth = Cloth(SHEET, FACES)
+    start = SHEET @ random_rotation(1).T
+    v0, dt = np.array([0.3, 1.0, -0.2]), 1 / 30
+    result = simulate(
+        cloth,
+        terms_of(cloth),
+        start=start,
+        velocity=np.tile(v0, (len(SHEET), 1)),
+        frames=31,
+        dt=dt,
+        guess=guess,
+    )
+    assert result.status == "converged", result.reason
+    n = np.arange(31)[:, None, None]
+    exact = start + n * dt * v0 + DOWN * dt**2 * n * (n + 1) / 2
+    # Round-off of positions of 5 m, thirty times; the parabola itself is 0.16 m away by then.
+    assert result.positions == pytest.approx(exact, abs=1e-11)
+    assert np.abs(exact[-1] - (start + v0 + DOWN / 2)).max() > 0.1
+
+
+def test_falling_without_velocity_kept_is_a_ladder():
+    cloth = Cloth(SHEET, FACES)
+    result = simulate(cloth, terms_of(cloth), frames=11, dt=0.02, quasi_static=True)
+    n = np.arange(11)[:, None, None]
+    assert result.positions == pytest.approx(SHEET + n * DOWN * 0.02**2, abs=1e-13)
+
+
+def tumbling(frames: int = 16, dt: float = 1 / 60) -> tuple[Cloth, list[Energy], Trajectory, np.ndarray]:
+    """An unpinned crumpled sheet thrown with a spin, and its velocities (T, V, 3) as the scheme has them."""
+    x, faces = patch(5, cells=5)
+    cloth = Cloth(0.3 * x, faces)
+    generator = np.random.default_rng(2)
+    start = 0.33 * x @ random_rotation(3).T + generator.normal(0, 0.004, x.shape)
+    v0 = np.cross([2.0, -1.0, 3.0], start) + np.array([0.5, 2.0, 0.0]) + generator.normal(0, 0.1, x.shape)
+    energies = terms_of(cloth)
+    result = simulate(cloth, energies, start=start, velocity=v0, frames=frames, dt=dt, tolerance=1e-10)
+    assert result.status == "converged", result.reason
+    v = np.concatenate([v0[None], np.diff(result.positions, axis=0) / dt])
+    return cloth, energies, result, v
+
+
+def test_momentum_and_angular_momentum_balance():
+    """P' - P = dt sum F, L' = L - dt sum m v x v' + dt tau(x'); the weight is the only outer force."""
+    cloth, _, result, v = tumbling()
+    m, dt, x = cloth.masses[:, None], 1 / 60, result.positions
+    P = (m * v).sum(axis=1)
+    # A gradient of 1e-10 weights at each of 36 vertices for 17 ms, against momenta of 0.01 N s.
+    tolerance = 1e-10 * 36 * cloth.masses.mean() * GRAVITY * dt + 1e-15
+    assert np.diff(P, axis=0) == pytest.approx(np.tile(dt * m.sum() * DOWN, (15, 1)), abs=2 * tolerance)
+    L = np.cross(x, m * v).sum(axis=1)
+    lost = np.cross(m * v[:-1], v[1:]).sum(axis=1)
+    torque = np.cross(x[1:], m * DOWN).sum(axis=1)
+    assert np.abs(lost).max() > 1e-3  # the scheme's own loss is no small number here
+    assert L[1:] == pytest.approx(L[:-1] - dt * lost + dt * torque, abs=2 * tolerance)
+
+
+def test_each_step_pays_for_its_change_of_velocity():
+    """Phi' + |v' - v|^2_M / 2 <= Phi + |v|^2_M / 2: backward Euler never gains energy."""
+    cloth, energies, result, v = tumbling()
+    m = cloth.masses[:, None]
+    phi = np.array([potential_energy(energies, x) for x in result.positions])
+    before = phi[:-1] + 0.5 * (m * v[:-1] ** 2).sum(axis=(1, 2))
+    after = phi[1:] + 0.5 * (m * np.diff(v, axis=0) ** 2).sum(axis=(1, 2))
+    assert (after <= before + 1e-12 * np.abs(before)).all()
+    kinetic = 0.5 * (m * v**2).sum(axis=(1, 2))
+    assert (np.diff(phi + kinetic) < 0).all()  # and with membrane modes excited it truly loses some
+
+
+def test_a_stretched_membrane_rings_at_the_discrete_frequency():
+    """z_{n+1} = (2 z_n - z_{n-1}) / (1 + omega_h^2 dt^2) with the eigenvalue of the mesh's own Laplacian."""
+    cells, stretch, amplitude, dt = 8, 1.2, 1e-5, 0.01
+    flat, faces = grid(cells, cells)
+    border = np.flatnonzero((flat[:, [0, 2]] % 1 == 0).any(axis=1))
+    cloth = Cloth(flat, faces, pins=border)
+    mode = np.sin(np.pi * flat[:, 0]) * np.sin(np.pi * flat[:, 2])
+    start = stretch * flat
+    start[:, 1] = amplitude * mode
+    start[border, 1] = 0
+    result = simulate(cloth, [StretchStVK(cloth)], start=start, frames=50, dt=dt, tolerance=1e-12)
+    assert result.status == "converged", result.reason
+
+    material, h = cloth.material, 1 / cells
+    tension = (material.lame_lambda + material.lame_mu) * (stretch**2 - 1)
+    square = tension / material.areal_density * (4 / h**2) * 2 * np.sin(np.pi * h / 2) ** 2
+    z = [amplitude, amplitude / (1 + square * dt**2)]
+    while len(z) < 50:
+        z.append((2 * z[-1] - z[-2]) / (1 + square * dt**2))
+    assert min(z) < -0.1 * amplitude  # it swings through
+    # The membrane stiffens with the slope squared: (pi amplitude)^2 = 1e-9 of the answer.
+    assert result.positions[:, :, 1] == pytest.approx(np.outer(z, mode), abs=1e-8 * amplitude)
+    assert result.positions[:, :, [0, 2]] == pytest.approx(np.tile(start[:, [0, 2]], (50, 1, 1)), abs=1e-9)
+
+
+def test_in_a_taut_state_the_first_guess_does_not_matter():
+    cloth = Cloth(SHEET, FACES, pins=np.flatnonzero((SHEET[:, 0] == 0) | (SHEET[:, 0] == 0.4)))
+    start = SHEET * [1.2, 1, 1]
+    runs = [
+        simulate(cloth, terms_of(cloth), start=start, frames=20, guess=guess, tolerance=1e-9)
+        for guess in ("previous", "extrapolated")
+    ]
+    assert all(run.status == "converged" for run in runs)
+    assert np.ptp(runs[0].positions[-1][:, 1]) > 1e-3
+    # 1e-9 weights over a stiffness of 10 N/m, twenty steps.
+    assert runs[0].positions == pytest.approx(runs[1].positions, abs=1e-10)
+
+
+def test_substeps_are_smaller_steps_of_which_every_other_is_kept():
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    halved = simulate(cloth, terms_of(cloth), frames=6, dt=1 / 30, substeps=2)
+    fine = simulate(cloth, terms_of(cloth), frames=11, dt=1 / 60)
+    assert halved.positions == pytest.approx(fine.positions[::2], abs=1e-12)
+    assert halved.times == pytest.approx(fine.times[::2], rel=1e-14)
+
+
+# Pins
+
+
+def test_pins_stay_to_the_last_bit_where_the_start_has_them():
+    cloth = Cloth(SHEET, FACES, pins=[0, 6, 20])
+    start = SHEET @ random_rotation(7).T + 0.1
+    result = simulate(cloth, terms_of(cloth), start=start, frames=8, velocity=np.ones_like(start))
+    assert (result.positions[:, cloth.pins] == start[cloth.pins]).all()
+    assert np.abs(result.positions[-1] - start).max() > 0.01
+
+
+def test_pins_move_where_they_are_told_and_take_the_cloth_along():
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+
+    def handles(frame: int) -> np.ndarray:
+        return SHEET[[0, 6]] + np.array([0, 0.01, 0]) * frame
+
+    result = simulate(cloth, terms_of(cloth), frames=40, pin_positions=handles)
+    assert result.status == "converged", result.reason
+    for frame in range(1, 40):
+        assert (result.positions[frame][cloth.pins] == handles(frame)).all()
+    free = np.setdiff1d(np.arange(len(SHEET)), cloth.pins)
+    assert (result.positions[-1, free, 1] - result.positions[-6, free, 1] > 0.0).mean() > 0.9
+
+
+def test_a_cloth_without_free_vertices_is_a_puppet():
+    cloth = Cloth(SHEET, FACES, pins=range(len(SHEET)))
+    result = simulate(cloth, terms_of(cloth), frames=3, pin_positions=lambda frame: SHEET + 0.1 * frame)
+    assert result.status == "converged" and (result.positions[2] == SHEET + 0.2).all()
+
+
+# What comes out
+
+
+def test_the_record_of_a_run():
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    energies = terms_of(cloth)
+    result = simulate(cloth, energies, frames=5, dt=0.02)
+    assert result.positions.shape == (5, 49, 3) and (result.positions[0] == SHEET).all()
+    assert result.times == pytest.approx(0.02 * np.arange(5), rel=1e-15)
+    assert result.frame_seconds.shape == (5,) and (result.frame_seconds[1:] > 0).all()
+    assert (result.faces == FACES).all()
+    fields = result.frame_fields
+    assert {"iterations", "factorisations", "gradient_norm", "converged"} <= set(fields)
+    assert all(values.shape == (5,) for values in fields.values())
+    assert (fields["converged"] == 1).all() and (fields["gradient_norm"][1:] <= 1e-6).all()
+    for energy in energies:
+        series = [float(energy.energy(torch.as_tensor(x)).sum()) for x in result.positions[1:]]
+        assert fields[f"energy/{energy.name}"][1:] == pytest.approx(series, rel=1e-10, abs=1e-15)
+    x_hat = 2 * result.positions[1] - result.positions[0]
+    inertia = 0.5 / 0.02**2 * (cloth.masses[:, None] * (result.positions[2] - x_hat) ** 2).sum()
+    assert fields["energy/inertia"][2] == pytest.approx(inertia, rel=1e-10)
+    assert set(result.provenance["terms"]) == {"strain", "bending", "gravity", "inertia"}
+    assert result.provenance["dt_s"] == 0.02 and result.provenance["guess"] == "extrapolated"
+
+
+def test_two_runs_give_the_same_bits_also_with_the_same_terms():
+    """A term may remember the step before, as lagged friction does; not the run before."""
+    cloth = Cloth(SHEET, FACES)
+    contact = ContactPenalty(cloth)
+    energies = [*terms_of(cloth), contact, ContactFriction(contact)]
+    table = Obstacle(*box((-1, -1, -1), (2, -0.002, 2)))
+    pushed = np.tile([1.0, 0.0, 0.0], (len(SHEET), 1))
+    runs = [simulate(cloth, energies, obstacle=table, velocity=pushed, frames=8) for _ in range(2)]
+    assert runs[0].frame_fields["energy/friction"][-1] > 0
+    assert (runs[0].positions == runs[1].positions).all()
+
+
+def test_the_file_grows_frame_by_frame_and_is_readable_at_any_time(tmp_path):
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    path = tmp_path / "run.vtkhdf"
+
+    def spy(frame: int) -> np.ndarray:
+        """Called before each frame: what a reader would find at that time."""
+        shutil.copy(path, tmp_path / f"at{frame}")
+        return SHEET[[0, 6]]
+
+    result = simulate(cloth, terms_of(cloth), frames=5, pin_positions=spy, path=path)
+    for frame in range(1, 5):
+        found = Trajectory.load(tmp_path / f"at{frame}")
+        assert found.frames == frame and found.status == "unfinished"
+        assert (found.positions == result.positions[:frame]).all()
+    whole = Trajectory.load(path)
+    assert whole.status == "converged" and whole.reason == result.reason
+    assert (whole.positions == result.positions).all()
+    assert whole.provenance["terms"] == result.provenance["terms"]
+    for name, values in result.frame_fields.items():
+        np.testing.assert_array_equal(whole.frame_fields[name], values)
+
+
+# Failures
+
+
+class Poison(Energy):
+    """A term that turns into nan once vertex 24 has fallen by 5 cm."""
+
+    name = "poison"
+
+    def __init__(self, cloth: Cloth) -> None:
+        self.cloth, self.stencils = cloth, np.array([[24]])
+
+    def element_energy(self, u):
+        return torch.where(u[..., 0, 1] < -0.05, torch.nan, 0.0) + 0 * u[..., 0, 1]
+
+
+def test_divergence_is_recorded_and_not_raised(tmp_path):
+    cloth = Cloth(SHEET, FACES)
+    path = tmp_path / "run.vtkhdf"
+    result = simulate(cloth, [*terms_of(cloth), Poison(cloth)], frames=20, path=path)
+    assert result.status == "diverged" and "not finite" in result.reason
+    # 5 cm are fallen through in frame 3 of 1/30 s: g dt^2 n (n + 1) / 2 > 0.05. Frames 0 to 2 are whole; the
+    # guess of frame 3, which keeps the velocity of frame 2, is still above: frame 4 has no finite start.
+    assert result.reason.startswith(f"frame {result.frames}: ")
+    assert 3 <= result.frames <= 4 and np.isfinite(result.positions).all()
+    found = Trajectory.load(path)
+    assert found.status == "diverged" and found.frames == result.frames and found.reason == result.reason
+
+
+def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    result = simulate(cloth, terms_of(cloth), frames=4, max_iterations=1)
+    assert result.frames == 4 and result.status == "max_iterations"
+    assert result.reason.startswith("frame 1: ")
+    assert (result.frame_fields["converged"][1:] == 0).all()
+    assert (result.frame_fields["gradient_norm"][1:] > 1e-6).all()
+
+
+def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):
+    """A million metres away positions have 1e-10 m of round-off, and forces more than 1e-6 weights."""
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    path, far = tmp_path / "far.vtkhdf", SHEET + np.array([1e6, 0.0, 0.0])
+    result = simulate(cloth, terms_of(cloth), start=far, frames=4, path=path)
+    residual, relaxed = (result.frame_fields[name] for name in ("gradient_norm", "relaxed"))
+    assert result.status == "converged" and result.frame_fields["converged"].all()
+    np.testing.assert_array_equal(relaxed[1:], residual[1:] > 1e-6)
+    first = int(np.flatnonzero(relaxed)[0])
+    said = f"frame {first}: round-off: residual {residual[first]:.1e} above tolerance 1.0e-06"
+    assert result.reason.startswith(said) and Trajectory.load(path).reason == result.reason
+    assert f"round-off  {relaxed.sum():.0f} frames above the tolerance, first {said}" in summary(
+        result, None, frames=4
+    )
+    with h5py.File(path, "r+") as file:  # a run that was killed
+        file["benchmark"].attrs["status"] = "unfinished"
+    again = simulate(cloth, terms_of(cloth), start=far, frames=5, path=path, resume=True)
+    assert again.status == "converged" and again.reason == result.reason
+    near = simulate(cloth, terms_of(cloth), frames=4)
+    assert near.reason == "" and not near.frame_fields["relaxed"].any()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"guess": "skinned"}, "choose one of previous, extrapolated, body_transported"),
+        ({"guess": "body_transported"}, "body_transported needs an obstacle"),
+        ({"frames": 0}, "frames = 0: must be at least 1"),
+        ({"substeps": 0}, "substeps = 0: must be at least 1"),
+        ({"start": SHEET[:-1]}, "start has shape (48, 3): expected finite (49, 3)"),
+        ({"start": np.full_like(SHEET, np.nan)}, "start has shape"),
+        ({"velocity": SHEET[:, :2]}, "velocity has shape (49, 2): expected finite (49, 3)"),
+        ({"dt": 0.0}, "dt = 0.0: must be a finite number of seconds above 0"),
+        ({"dt": np.nan}, "dt = nan"),
+        ({"dt": 1e300}, "dt / substeps = 1e+300 s: give 1e-07 to 10000 s"),
+        ({"substeps": 10**9}, "dt / substeps = 3.33e-11 s: give 1e-07 to 10000 s"),
+        ({"tolerance": np.nan}, "tolerance = nan: give a finite number above 0"),
+        ({"tolerance": np.inf}, "tolerance = inf: give"),
+        ({"tolerance": -1e-6, "method": "newton"}, "tolerance = -1e-06: give"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_before_any_file_is_written(options, message, tmp_path):
+    cloth = Cloth(SHEET, FACES)
+    with pytest.raises(ValueError, match=re.escape(message)):
+        simulate(cloth, terms_of(cloth), **({"frames": 2, "path": tmp_path / "run"} | options))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_option_is_refused():
+    cloth = Cloth(SHEET, FACES)
+    with pytest.raises(TypeError, match="gravity"):
+        simulate(cloth, terms_of(cloth), gravity=9.81)
+
+
+def test_one_frame_is_the_start_alone():
+    cloth = Cloth(SHEET, FACES)
+    result = simulate(cloth, terms_of(cloth), frames=1)
+    assert result.frames == 1 and (result.positions[0] == SHEET).all() and result.status == "converged"
+
+
+def test_progress_in_a_log_is_a_few_lines(capsys):
+    """A terminal is redrawn ten times a second, which in a file would be a line each."""
+    with progress_bar(total=50, unit="frame") as bar:
+        for _ in range(50):
+            time.sleep(0.01)
+            bar.update()
+    assert 1 <= capsys.readouterr().err.count("\r") <= 3

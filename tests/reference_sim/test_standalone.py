@@ -1,0 +1,112 @@
+"""The simulator by itself: no import circle, no heavy package that it does not need, no need of cvxopt."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from reference_sim import Trajectory, energies
+from reference_sim.energies import MODULE_OF
+
+ROOT = Path(__file__).resolve().parents[2]
+UNNEEDED = (
+    "torch", "vtk", "vtkmodules", "pyvista", "typst", "pandas", "matplotlib", "skfem", "meshio", "ipctk",
+    "snug", "benchmarks", "reports",
+)  # fmt: skip
+# A sheet that a rising tetrahedron lifts, with friction, into a file.
+SIMULATION = """
+import sys
+sys.modules.update(dict.fromkeys(sys.argv[2:]))
+import numpy as np
+from reference_sim import Cloth, Obstacle, Trajectory, simulate
+from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Gravity, StretchStVK
+x, z = np.meshgrid(np.linspace(-0.2, 0.2, 7), np.linspace(-0.2, 0.2, 7))
+sheet = np.stack([x.ravel(), 0 * x.ravel(), z.ravel()], axis=1)
+corner = (np.arange(6)[:, None] * 7 + np.arange(6)).ravel()
+faces = np.concatenate([[[k, k + 7, k + 1], [k + 1, k + 7, k + 8]] for k in corner])
+tip = np.array([[0, -0.01, 0], [0.1, -0.2, 0], [-0.1, -0.2, 0.1], [-0.1, -0.2, -0.1]])
+body = np.stack([tip + [0, 0.01 * k, 0] for k in range(4)])
+cloth = Cloth(sheet, faces)
+contact = ContactPenalty(cloth)
+terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), contact, ContactFriction(contact)]
+obstacle = Obstacle(body, np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]]))
+result = simulate(cloth, terms, frames=4, obstacle=obstacle, path=sys.argv[1], tolerance=1e-10)
+assert result.status == "converged", result.reason
+assert result.frame_fields["energy/collision"][-1] > 0
+assert Trajectory.load(sys.argv[1]).frames == 4
+print(*sorted(name.split(".")[0] for name, module in sys.modules.items() if module is not None))
+"""
+
+
+def simulation(path: Path, *absent: str) -> set[str]:
+    """Packages loaded by a process that simulates into the file, where some cannot be imported."""
+    command = [sys.executable, "-c", SIMULATION, str(path), *absent]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.split())
+
+
+def test_a_simulation_with_contact_loads_nothing_that_it_does_not_need(tmp_path):
+    loaded = simulation(tmp_path / "a.vtkhdf")
+    assert {"numba", "h5py", "cvxopt"} < loaded
+    assert loaded.isdisjoint(UNNEEDED)
+
+
+def test_without_the_packages_of_its_solver_it_ends_at_the_same_place(tmp_path):
+    """cvxopt is under the GPL: whoever leaves it out gets the same result, more slowly."""
+    results = []
+    for absent in ((), ("cvxopt",), ("cvxopt", "pymetis")):
+        path = tmp_path / f"{len(absent)}.vtkhdf"
+        assert simulation(path, *absent).isdisjoint(absent)
+        results.append(Trajectory.load(path))
+    assert np.ptp(results[0].positions[:, :, 1]) > 0.01
+    for other in results[1:]:
+        # A residual of 1e-10 vertex weights, against a stiffness of at least m/dt^2: 1e-12 m a frame.
+        assert np.abs(other.positions - results[0].positions).max() < 1e-10
+
+
+def imported(path: Path, module: str, modules: set[str]) -> Iterator[str]:
+    """Modules of the package that a file imports, those inside functions and for types alone included."""
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            parts = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            base = ".".join([*parts, *([node.module] if node.module else [])])
+            for alias in node.names:
+                name = f"{base}.{alias.name}"
+                yield from {name if name in modules else base} & modules - {module}
+        elif isinstance(node, ast.Import):
+            yield from {alias.name for alias in node.names} & modules - {module}
+
+
+def test_every_lazy_name_is_defined_by_one_module_of_its_package():
+    package = ROOT / "reference_sim/energies"
+    defined: dict[str, list[str]] = {}
+    for path in package.glob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                defined.setdefault(node.name, []).append(path.stem)
+    assert {name: defined[name] for name in MODULE_OF} == {name: [file] for name, file in MODULE_OF.items()}
+    nodes = ast.walk(ast.parse((package / "__init__.py").read_text(encoding="utf-8")))
+    named = [alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names]
+    assert sorted(named) == sorted([*MODULE_OF, "TYPE_CHECKING", "import_module"])
+    assert sorted(energies.__all__) == sorted(MODULE_OF)
+    for name in MODULE_OF:
+        assert getattr(energies, name).__name__ == name
+
+
+def test_no_module_imports_itself_by_a_circle():
+    files = {}
+    for path in (ROOT / "reference_sim").rglob("*.py"):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        files[".".join(parts).removesuffix(".__init__")] = path
+    above = {name: set(imported(path, name, set(files))) for name, path in files.items()}
+    assert "reference_sim.minimise.descent" in above["reference_sim.minimise.newton"]
+    while free := {name for name, needs in above.items() if not needs}:
+        above = {name: needs - free for name, needs in above.items() if name not in free}
+    assert not above, f"circles among or above {sorted(above)}"

@@ -1,0 +1,189 @@
+"""The trajectory file: what goes in comes out, nothing half-written counts, and VTK itself reads it."""
+
+from __future__ import annotations
+
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from reference_sim import Trajectory, TrajectoryError, TrajectoryWriter
+from tests.reference_sim.meshes import grid
+
+REST, FACES = grid(4, 3)
+
+
+def wave(frames: int = 5) -> Trajectory:
+    phase = np.arange(frames)[:, None]
+    positions = np.tile(REST, (frames, 1, 1))
+    positions[:, :, 1] = 0.1 * np.sin(3 * REST[:, 0] + phase) / 3  # no float32 holds these
+    return Trajectory(
+        positions=positions,
+        faces=FACES,
+        times=np.arange(frames) / 30,
+        frame_seconds=np.array([np.nan, *np.linspace(0.1, 0.2, frames - 1)]),
+        status="stalled",
+        reason="frame 3: no step lowers the energy",
+        provenance={"dt_s": 1 / 30, "terms": {"strain": {"mu": 11.1}}, "list": [1, None, "two"]},
+        frame_fields={"energy/strain": np.arange(frames) / 7, "iterations": np.arange(frames, dtype=float)},
+    )
+
+
+def assert_same(found: Trajectory, expected: Trajectory) -> None:
+    assert found.positions.dtype == np.float64 and found.positions.shape == expected.positions.shape
+    for name in ("positions", "faces", "times", "frame_seconds"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
+    assert (found.status, found.reason) == (expected.status, expected.reason)
+    assert found.provenance == expected.provenance
+    assert set(found.frame_fields) == set(expected.frame_fields)
+    for name, values in expected.frame_fields.items():
+        np.testing.assert_array_equal(found.frame_fields[name], values, err_msg=name)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 5])
+def test_what_is_saved_is_loaded_to_the_last_bit(tmp_path, frames):
+    wave(frames).save(tmp_path / "wave.vtkhdf")
+    assert_same(Trajectory.load(tmp_path / "wave.vtkhdf"), wave(frames))
+    wave(frames).save(str(tmp_path / "again.vtkhdf"))  # a path may be a string
+    assert_same(Trajectory.load(str(tmp_path / "again.vtkhdf")), wave(frames))
+
+
+def test_time_step_and_count_of_frames():
+    assert wave(5).frames == 5 and wave(5).dt == pytest.approx(1 / 30)
+    assert np.isnan(wave(1).dt)
+
+
+def test_saving_replaces_a_file_whole_and_leaves_nothing_else(tmp_path):
+    path = tmp_path / "wave.vtkhdf"
+    wave(5).save(path)
+    wave(2).save(path)
+    assert Trajectory.load(path).frames == 2
+    assert [p.name for p in tmp_path.iterdir()] == ["wave.vtkhdf"]
+
+
+def test_a_save_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
+    path = tmp_path / "wave.vtkhdf"
+    wave(3).save(path)
+    extend = TrajectoryWriter.extend
+
+    def fail_when_written(self, *args):
+        extend(self, *args)
+        raise RuntimeError("the disk is full")
+
+    monkeypatch.setattr(TrajectoryWriter, "extend", fail_when_written)
+    with pytest.raises(RuntimeError, match="the disk is full"):
+        wave(5).save(path)
+    assert_same(Trajectory.load(path), wave(3))
+    assert [p.name for p in tmp_path.iterdir()] == ["wave.vtkhdf"]
+
+
+def test_an_unfinished_file_gives_its_whole_frames(tmp_path):
+    """A copy taken between two frames is what a killed run leaves behind."""
+    whole = wave(5)
+    with TrajectoryWriter(tmp_path / "live", FACES, {"seed": 3}, vertex_count=len(REST)) as writer:
+        for k in range(3):
+            fields = {name: values[k] for name, values in whole.frame_fields.items()}
+            writer.append(whole.positions[k], whole.times[k], whole.frame_seconds[k], fields)
+            shutil.copy(tmp_path / "live", tmp_path / f"copy{k}")
+        writer.finish("converged", "")
+    for k in range(3):
+        found = Trajectory.load(tmp_path / f"copy{k}")
+        assert found.status == "unfinished" and found.reason
+        assert found.provenance == {"seed": 3}
+        np.testing.assert_array_equal(found.positions, whole.positions[: k + 1])
+        np.testing.assert_array_equal(found.times, whole.times[: k + 1])
+        np.testing.assert_array_equal(found.frame_seconds, whole.frame_seconds[: k + 1])
+        np.testing.assert_array_equal(found.frame_fields["energy/strain"], np.arange(k + 1) / 7)
+    assert Trajectory.load(tmp_path / "live").status == "converged"
+
+
+def test_a_half_written_frame_does_not_count(tmp_path):
+    wave(4).save(tmp_path / "cut")
+    with h5py.File(tmp_path / "cut", "r+") as file:
+        # The count is written last: as if the run had died while frame 3 was being appended.
+        file["benchmark"].attrs["frames"] = 3
+    found = Trajectory.load(tmp_path / "cut")
+    assert found.frames == len(found.times) == len(found.frame_seconds) == 3
+    assert found.frame_fields["iterations"].tolist() == [0, 1, 2]
+
+
+def test_a_field_that_begins_late_is_nan_before(tmp_path):
+    with TrajectoryWriter(tmp_path / "late", FACES, {}, vertex_count=len(REST)) as writer:
+        writer.append(REST, 0.0)
+        writer.append(REST, 0.1, 0.5, {"energy/strain": 2.0})
+        writer.finish("ok", "")
+    found = Trajectory.load(tmp_path / "late")
+    np.testing.assert_array_equal(found.frame_fields["energy/strain"], [np.nan, 2.0])
+    np.testing.assert_array_equal(found.frame_seconds, [np.nan, 0.5])
+
+
+def test_what_is_no_trajectory_is_named_with_its_path(tmp_path):
+    with pytest.raises(TrajectoryError, match=r"absent\.vtkhdf: no such trajectory file"):
+        Trajectory.load(tmp_path / "absent.vtkhdf")
+    (tmp_path / "text.vtkhdf").write_text("not HDF5")
+    with pytest.raises(TrajectoryError, match=r"text\.vtkhdf: not a VTKHDF trajectory"):
+        Trajectory.load(tmp_path / "text.vtkhdf")
+    with h5py.File(tmp_path / "other.vtkhdf", "w") as file:
+        file["numbers"] = [1, 2, 3]
+    with pytest.raises(TrajectoryError, match=r"other\.vtkhdf: not a VTKHDF trajectory"):
+        Trajectory.load(tmp_path / "other.vtkhdf")
+    with pytest.raises(TrajectoryError, match=r": not a VTKHDF trajectory"):
+        Trajectory.load(tmp_path)
+    assert issubclass(TrajectoryError, ValueError)
+
+
+def vtk_frames(path) -> tuple[list[float], list[np.ndarray], list[np.ndarray]]:
+    """Times, points and faces of every step, read by VTK's own reader."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    times, points, faces = [], [], []
+    for step in range(reader.GetNumberOfSteps()):
+        reader.SetStep(step)
+        reader.Update()
+        mesh = reader.GetOutputDataObject(0)
+        assert mesh.GetClassName() == "vtkPolyData" and mesh.GetNumberOfPolys() == len(FACES)
+        assert mesh.GetNumberOfCells() == len(FACES)
+        offsets = vtk_to_numpy(mesh.GetPolys().GetOffsetsArray())
+        assert offsets.tolist() == list(range(0, 3 * len(FACES) + 1, 3))
+        times.append(reader.GetTimeValue())
+        points.append(vtk_to_numpy(mesh.GetPoints().GetData()).copy())
+        faces.append(vtk_to_numpy(mesh.GetPolys().GetConnectivityArray()).reshape(-1, 3).copy())
+    return times, points, faces
+
+
+def test_vtk_steps_through_time_with_the_right_points(tmp_path):
+    expected = wave(5)
+    expected.save(tmp_path / "wave.vtkhdf")
+    times, points, faces = vtk_frames(tmp_path / "wave.vtkhdf")
+    assert times == pytest.approx(expected.times.tolist(), rel=1e-15)
+    for k in range(5):
+        assert points[k].dtype == np.float64
+        np.testing.assert_array_equal(points[k], expected.positions[k])
+        np.testing.assert_array_equal(faces[k], FACES)
+
+
+def test_vtk_reads_a_file_that_is_still_being_written(tmp_path):
+    whole = wave(4)
+    with TrajectoryWriter(tmp_path / "live.vtkhdf", FACES, {}, vertex_count=len(REST)) as writer:
+        for k in range(3):
+            writer.append(whole.positions[k], whole.times[k])
+        shutil.copy(tmp_path / "live.vtkhdf", tmp_path / "copy.vtkhdf")
+    _, points, _ = vtk_frames(tmp_path / "copy.vtkhdf")
+    assert len(points) == 3
+    np.testing.assert_array_equal(points[2], whole.positions[2])
+
+
+def test_pyvista_reads_it(tmp_path):
+    import pyvista
+
+    wave(3).save(tmp_path / "wave.vtkhdf")
+    reader = pyvista.get_reader(tmp_path / "wave.vtkhdf")
+    reader.reader.SetStep(2)
+    mesh = reader.read()
+    assert mesh.n_points == len(REST) and mesh.n_cells == len(FACES)
+    np.testing.assert_array_equal(mesh.points, wave(3).positions[2])

@@ -1,0 +1,149 @@
+"""The PDF as a reader of PDFs sees it: where words lie, how large they are, how full pages are."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.results.run_folder import RunFolder
+from reports import build
+from reports.document.document import document
+from reports.run.read import read_run
+from reports.tables.tables import make_tables
+from tests.reports.report_folder import METHODS, SCENES, TERMS, all_rows, declaration, row, sheet, write_mesh
+
+pdfium = pytest.importorskip("pypdfium2", reason="the test extra is not installed")
+
+CM = 72.0 / 2.54
+MARGIN = 2.0 * CM
+SLACK = 1.0  # [pt] by which boxes may reach over a margin or into each other
+MOST_PAGES = 12
+LONG = "x" * 60 + "_with_a_name_as_long_as_a_run_lets_it_be"
+HOSTILE = ("#strong[markup] $x$ *b* _i_ @ref <b>&amp;", "quo\"ted 'name' `raw`", "裙子/夏天-βήτα", LONG)
+
+
+def few():
+    return [r for r in all_rows() if r.method in ("simulation", "snug")]
+
+
+def many():
+    """More networks, stress tests and skips than there is room for."""
+    rows = all_rows()
+    for k in range(14):
+        for scene in SCENES:
+            for metric, unit in (("energy/total", "J"), ("curvature/error", "1/m"), ("cost/frame", "ms")):
+                rows.append(row(scene, f"network-{k}", metric, 1.0 + k, unit=unit))
+            rows.append(row(scene, f"network-{k}", "dynamics/amplitude", 1e-9 * k, unit="1"))
+    skips = {"value": None, "status": "skipped", "reason": "it moves a garment with a body's joints " * 3}
+    rows += [row(f"sheet_{k}", f"network-{k}", suite="speed", garment="", **skips) for k in range(20)]
+    outcome = {"suite": "extremes", "method": "simulation", "metric": "outcome", "unit": "vertex weights"}
+    rows += [
+        row(f"case_{k}", value=None, status="stalled", reason="collapsed " * 30, **outcome) for k in range(30)
+    ]
+    return rows
+
+
+def hostile():
+    renamed = {"snug": HOSTILE[0], "pbns": HOSTILE[3], "supervised": HOSTILE[2]}
+    scenes = {
+        SCENES[0]: f"tshirt/{HOSTILE[1]}",
+        "hanging_sheet": HOSTILE[2],
+        "stiff": LONG,
+        "teleport": LONG + "y",
+    }
+    return [
+        dataclasses.replace(
+            r, method=renamed.get(r.method, r.method), family=renamed.get(r.family, r.family),
+            scene=scenes.get(r.scene, r.scene), reason=r.reason and f"{r.reason}: {HOSTILE[0]} {LONG}",
+        )
+        for r in all_rows()
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=[few, many, hostile])
+def report(request, tmp_path_factory):
+    """The pages of a report; that of many methods has roll-outs."""
+    run, rows = RunFolder(tmp_path_factory.mktemp("run")), request.param()
+    run.write_rows(rows)
+    run.write_config(declaration(rows, preset="smoke", commit="abc", started="2030-01-02T03:04:05+00:00"))
+    for scene in {r.scene for r in rows if r.garment} if request.param is many else ():
+        write_mesh(run.trajectory_path(scene, "body"), *sheet(0.0), {})
+        for method in {r.method for r in rows} & {*METHODS, *HOSTILE}:
+            fields = {f"energy/{t}": np.linspace(0, v, 5) for t, v in TERMS.items()}
+            write_mesh(run.trajectory_path(scene, method), *sheet(0.1), fields)
+    read, problems = read_run(run), []
+    made = make_tables(read)
+    build.typeset(run, document(read, made, build.draw(run, read, [], problems), problems))
+    assert not problems
+    found = pdfium.PdfDocument(run.report_path)
+    yield found
+    found.close()
+
+
+def words(page) -> list[tuple[str, np.ndarray]]:
+    """Each word and its box (left, bottom, right, top) [pt]."""
+    text = page.get_textpage()
+    found, letters, boxes = [], "", []
+    for k in range(text.count_chars() + 1):
+        letter = text.get_text_range(k, 1) if k < text.count_chars() else " "
+        box = text.get_charbox(k) if letter.strip() else None
+        apart = boxes and box is not None and (box[0] - boxes[-1][2] > 1.5 or box[0] < boxes[-1][0] - 1.0)
+        if (box is None or apart) and boxes:
+            own = np.array(boxes)
+            found.append((letters, np.concatenate([own[:, :2].min(axis=0), own[:, 2:].max(axis=0)])))
+            letters, boxes = "", []
+        if box is not None:
+            letters, boxes = letters + letter, [*boxes, box]
+    return found
+
+
+def test_no_word_lies_over_a_margin_or_over_another(report):
+    for page in report:
+        found = words(page)
+        boxes = np.array([box for _, box in found])
+        width, height = page.get_size()
+        out = [word for word, box in found if box[0] < MARGIN - SLACK or box[2] > width - MARGIN + SLACK]
+        assert not out and boxes[:, 1].min() > 0.0 and boxes[:, 3].max() < height
+        low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
+        high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
+        over = np.triu(((high - low) > SLACK).all(axis=-1), 1)
+        assert not over.any(), [(found[a][0], found[b][0]) for a, b in np.argwhere(over)]
+
+
+def test_no_letter_is_smaller_than_7_points(report):
+    for page in report:
+        text = page.get_textpage()
+        sizes = [
+            pdfium.raw.FPDFText_GetFontSize(text, k)
+            for k in range(text.count_chars())
+            if text.get_text_range(k, 1).strip()
+        ]
+        assert min(sizes) > 6.99
+
+
+def test_pages_are_few_and_full(report):
+    """Of all but the last no third is blank at a stretch; the header and the footer do not count."""
+    assert len(report) <= MOST_PAGES
+    for page in list(report)[:-1]:
+        image = page.render(scale=0.5).to_numpy().min(axis=(1, 2))
+        inner = image[int(0.06 * len(image)) : int(0.94 * len(image))]
+        inked = np.flatnonzero(np.concatenate([[0], inner, [0]]) < 230)
+        assert np.diff(inked).max() < len(image) / 3
+
+
+def test_names_stand_as_they_are(report):
+    text = " ".join("".join(word for word, _ in words(page)) for page in report)
+    bare = "".join(text.split())
+    assert "裙" not in bare  # of no font: it would be an empty box
+    if "U+88D9" in bare:
+        for name in (*HOSTILE[:2], "U+88D9U+5B50/U+590FU+5929-βήτα"):
+            assert "".join(name.split()) in bare
+    assert "simulation" in bare.lower()
+
+
+def test_what_failed_is_said_on_page_one(report):
+    first = " ".join(word for word, _ in words(report[0]))
+    assert "What went worst." in first
+    assert ("failed" in first and "skipped" in first) or "timeout" in first

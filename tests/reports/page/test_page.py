@@ -1,0 +1,379 @@
+"""The page of a run: one file that fetches nothing, true to the positions, safe with any name."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+import shutil
+import subprocess
+import zlib
+from hashlib import sha256
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.metrics.surface import curvature
+from benchmarks.results.run_folder import RunFolder
+from reports.page.choice import groups
+from reports.page.pack import Pack
+from reports.page.vertex_values import area_change, depth, distance, mean_curvature, skin_of
+from reports.page.write import write_page
+from reports.run.read import read_run, read_trajectory
+from reports.tables.tables import make_tables
+from tests.reports.report_folder import declaration, row, sheet, skipped, write_mesh
+
+NASTY = '</script><script>window.hacked=1</script><img src=x onerror="window.hacked=1">\'" & мантия 裾'
+CLIPS, WHOLE = ("tshirt/walk@clip", "skirt/walk@clip"), "tshirt/walk"
+METHODS = {"simulation": 0.0, "skinning": 0.02, "snug": 0.01, "pbns": 0.03, "newton-4": 0.001}
+ACTIONS = Path(__file__).with_name("page_actions.js")
+
+
+def rows_of_page():
+    rows = []
+    for scene in (WHOLE, *CLIPS):
+        part = {"part": "clip"} if scene in CLIPS else {}
+        for number, method in enumerate(METHODS):
+            rows.append(row(scene, method, "cost/frame", 1.0 + number, unit="ms", **part))
+            rows.append(row(scene, method, "energy/total", 2.0 + number, **part))
+            if method != "simulation":
+                rows.append(row(scene, method, "curvature/error", 9.0 / number, unit="1/m", **part))
+    failed = {"value": None, "status": "failed", "reason": f"diverged {NASTY}"}
+    rows.append(row(WHOLE, NASTY, "energy/total", **failed))
+    rows.append(row(WHOLE, "supervised", "energy/total", value=None, status="timeout", reason="over 30 s"))
+    return [*rows, skipped(scene="hanging_sheet", suite="speed")]
+
+
+def block() -> tuple[np.ndarray, np.ndarray]:
+    """Corners (8,3) and faces (12,3) of the unit cube."""
+    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, np.array([half for a, b, c, d in squares for half in ((a, b, c), (a, c, d))])
+
+
+def moving(height: float, scene: str = WHOLE) -> tuple[np.ndarray, np.ndarray]:
+    """A sheet that swings, (T,V,3) and (F,3); in no scene as in another."""
+    x, faces = sheet(height)
+    turn = np.linspace(0.0, 1.0, len(x))[:, None]
+    x[:, :, 2] += (0.05 + 0.001 * len(scene)) * np.sin(8.0 * x[:, :, 0] + 5.0 * turn)
+    return x, faces
+
+
+def steps(cloth: np.ndarray) -> np.ndarray:
+    """One-step errors (T,V) [mm], from 0 to 3 over the vertices; of the first two frames none are known."""
+    known = np.repeat(np.linspace(0.0, 3.0, cloth.shape[1])[None], len(cloth), axis=0)
+    known[:2] = np.nan
+    return known
+
+
+def make_folder(path: Path) -> RunFolder:
+    run = RunFolder(path)
+    run.write_rows(rows_of_page())
+    run.write_config(declaration(rows_of_page(), preset="smoke", commit=NASTY))
+    for scene in (WHOLE, *CLIPS):
+        corners, faces = block()
+        body = np.repeat((0.5 * corners - [0.0, 0.0, 0.5])[None], len(sheet(0.0)[0]), axis=0)
+        write_mesh(run.trajectory_path(scene, "body"), body, faces, {})
+        for method, height in METHODS.items():
+            cloth, faces = moving(height, scene)
+            energies = {"energy/total": np.linspace(1.0, 2.0, len(cloth))}
+            write_mesh(run.trajectory_path(scene, method), cloth, faces, energies)
+            if scene in CLIPS:
+                np.savez(run.curves_path(scene, method), **{"step/vertices": steps(cloth)})
+        np.save(run.rest_areas_path(scene), np.full(len(faces), 0.4 / 3 * 0.5 / 3 / 2))
+    return run
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> RunFolder:
+    run = make_folder(tmp_path_factory.mktemp("page"))
+    write(run)
+    return run
+
+
+def write(run: RunFolder, **options) -> list[str]:
+    """The page alone, without a PDF; returns what could not be read."""
+    problems: list[str] = []
+    data = read_run(run)
+    tables = make_tables(data)
+    write_page(run, data, tables, problems, lambda path: read_trajectory(run, path, problems), **options)
+    return problems
+
+
+def texts_of(page: str) -> dict[str, str]:
+    return dict(re.findall(r'<script type="text/plain" id="(\w+)">([^<]*)</script>', page))
+
+
+def content_of(run: RunFolder) -> dict:
+    text = texts_of(run.page_path.read_text(encoding="utf-8"))["content"]
+    return json.loads(zlib.decompress(base64.b64decode(text)))
+
+
+def arrays_of(run: RunFolder, scene: str, method: str) -> dict[str, np.ndarray]:
+    where = content_of(run)["scenes"][scene]["methods"][method]
+    return unpacked(where["arrays"], texts_of(run.page_path.read_text(encoding="utf-8"))[where["text"]])
+
+
+def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
+    """The arrays of a pack, frame by frame as data.js has them."""
+    data, found = zlib.decompress(base64.b64decode(text)), {}
+    for name, entry in entries.items():
+        shape = tuple(entry["shape"])
+        size = int(np.prod(shape))
+        if entry["kind"] == "positions":
+            low, high = np.frombuffer(data, np.uint8, 2 * size, entry["at"]).reshape(2, *shape).astype(int)
+            left = low + 256 * high
+            left = np.where(left % 2, -(left + 1) // 2, left // 2)
+            steps = np.zeros((shape[0] + 2, *shape[1:]), dtype=int)
+            for k in range(shape[0]):
+                moved = steps[k + 1] - steps[k] if k > 1 else 0
+                steps[k + 2] = (steps[k + 1] + moved + left[k]) % 65536
+            found[name] = np.array(entry["low"]) + entry["step"] * steps[2:]
+        elif entry["kind"] == "values":
+            levels = np.frombuffer(data, np.uint8, size, entry["at"]).reshape(shape).cumsum(0) % 256
+            part = (levels - 128.0) / 127.0 if entry["signed"] else levels / 255.0
+            found[name] = entry["full"] * part * np.abs(part)
+        else:
+            kind = "<f4" if entry["kind"] == "numbers" else "<u4"
+            found[name] = np.frombuffer(data, kind, size, entry["at"]).reshape(shape)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("frames", "far", "least"), [(1, 30.0, 0.0), (3, 30.0, 0.0), (40, 30.0, 0.0), (9, 0.5, 1e-4)]
+)
+def test_positions_are_off_by_half_a_step_at_most(frames, far, least):
+    random = np.random.default_rng(1)
+    positions = 0.01 * far * random.normal(size=(frames, 50, 3)).cumsum(axis=0)
+    positions[-1, 0], positions[0, 1] = far, -far  # as far apart as can be, from one frame to the next
+    pack = Pack()
+    pack.positions("x", positions)
+    step = pack.entries["x"]["step"]
+    assert step == pytest.approx(max(2.0 * far / 65535, least))
+    error = np.abs(unpacked(pack.entries, pack.text())["x"] - positions)
+    assert error.max() <= 0.5 * step * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_values_are_off_by_less_than_a_hundredth_and_finer_where_small(signed):
+    random = np.random.default_rng(2)
+    values = random.exponential(size=(20, 60)) * (random.choice([-1, 1], size=(20, 60)) if signed else 1)
+    values[3, 4] = np.nan
+    pack = Pack()
+    pack.values("v", values, signed=signed)
+    found, values[3, 4] = unpacked(pack.entries, pack.text())["v"], 0.0
+    full = np.abs(values).max()
+    assert np.abs(found - values).max() <= full / 100
+    small = np.abs(values) < 0.01 * full
+    assert np.abs(found - values)[small].max() <= full / 1000
+
+
+def test_curvature_is_that_of_a_sphere_and_of_the_metric():
+    around, down = np.meshgrid(np.arange(40) * np.pi / 20, np.linspace(0.3, np.pi - 0.3, 40))
+    ring = [np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)]
+    globe = 0.5 * np.stack(ring, axis=-1).reshape(1, -1, 3)
+    line, column = np.meshgrid(np.arange(39), np.arange(40), indexing="ij")
+    a, b = (40 * line + column).ravel(), (40 * line + (column + 1) % 40).ravel()
+    faces = np.concatenate([np.stack([a, b, a + 40], axis=1), np.stack([b, b + 40, a + 40], axis=1)])
+    found = mean_curvature(globe, faces)[0]
+    inner = found > 0.0
+    assert inner.sum() == 38 * 40
+    assert np.abs(found[inner] - 2.0).max() < 0.05
+    crumpled = globe + np.random.default_rng(3).normal(scale=0.02, size=(2, *globe.shape[1:]))
+    declared = np.stack([curvature.mean_curvature(x, faces)[0] for x in crumpled])
+    np.testing.assert_allclose(mean_curvature(crumpled, faces)[:, inner], declared[:, inner], rtol=1e-9)
+
+
+def test_change_of_area_distance_and_depth_have_their_known_values():
+    x, faces = sheet(0.0)
+    rest = np.full(len(faces), 0.4 / 3 * 0.5 / 3 / 2)
+    np.testing.assert_allclose(area_change(1.1 * x, faces, rest), 21.0, rtol=1e-9)
+    np.testing.assert_allclose(distance(x[:2] + np.array([0.0, 0.003, 0.004]), x), 5.0, rtol=1e-9)
+    corners, box = block()
+    points = np.array([[0.5, 0.5, 0.98], [0.5, 0.5, 1.02], [0.01, 0.3, 0.4]])
+    skin = skin_of(np.stack([corners + 1.0, corners]), box)
+    np.testing.assert_allclose(depth(points, skin, 1), [20.0, 0.0, 10.0], atol=1e-9)
+    assert skin_of(corners, box[1:]) is None
+
+
+def test_the_page_holds_the_roll_outs_of_the_run(folder):
+    found = arrays_of(folder, WHOLE, "snug")
+    cloth, faces = moving(METHODS["snug"])
+    assert np.array_equal(found["faces"], faces)
+    assert np.abs(found["positions"] - cloth).max() <= 5e-5
+    np.testing.assert_allclose(found["times"], np.arange(len(cloth)) / 30.0, rtol=1e-6)
+    np.testing.assert_allclose(found["energy/total"], np.linspace(1.0, 2.0, len(cloth)), rtol=1e-6)
+    np.testing.assert_allclose(found["distance"], 10.0, rtol=1e-2)
+    assert {"curvature", "area", "depth"} <= found.keys()
+
+
+def test_one_step_errors_are_kept_and_frames_that_nobody_judged_are_named(folder):
+    scenes = content_of(folder)["scenes"]
+    entry = scenes[CLIPS[0]]["methods"]["snug"]["arrays"]["step"]
+    assert entry["unknown"] == [0, 1]
+    found = arrays_of(folder, CLIPS[0], "snug")["step"]
+    np.testing.assert_allclose(found[2:], np.nan_to_num(steps(found))[2:], atol=0.03)
+    assert "step" not in scenes[WHOLE]["methods"]["snug"]["arrays"]
+    assert scenes[CLIPS[0]]["methods"]["snug"]["arrays"]["curvature"]["unknown"] == []
+
+
+def test_scenes_of_one_motion_share_the_body(folder):
+    assert len({scene["body"]["text"] for scene in content_of(folder)["scenes"].values()}) == 1
+
+
+def test_clips_come_first_and_leading_methods_before_others(folder):
+    order = [(group.scene, list(group.paths)) for group in groups(folder, read_run(folder))]
+    leading = ["simulation", "skinning", "snug", "pbns"]
+    assert order == [
+        *((scene, leading) for scene in CLIPS), *((scene, ["newton-4"]) for scene in CLIPS),
+        (WHOLE, leading), (WHOLE, ["newton-4"]),
+    ]  # fmt: skip
+
+
+def test_what_does_not_fit_is_left_out_and_said(tmp_path):
+    run = make_folder(tmp_path)
+    write(run, budget=1)
+    page = run.page_path.read_text(encoding="utf-8")
+    assert content_of(run)["scenes"] == {} and "0 of 15 roll-outs can be shown" in page
+    size = run.page_path.stat().st_size + 12_000
+    write(run, budget=size)
+    page = run.page_path.read_text(encoding="utf-8")
+    kept = content_of(run)["scenes"]
+    assert run.page_path.stat().st_size <= size
+    count = sum(len(scene["methods"]) for scene in kept.values())
+    assert 0 < count < 15 and f"{count} of 15 roll-outs" in page and f"{WHOLE} (5)" in page
+    assert next(iter(kept)) == CLIPS[0]
+
+
+class Markup(HTMLParser):
+    """Open elements, attributes and the texts outside scripts; an end without a start is an error."""
+
+    EMPTY = ("meta", "link", "input", "img")
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.attributes: list[tuple[str, str, str]] = []
+        self.text = ""
+
+    def handle_starttag(self, tag, attributes):
+        self.attributes += [(tag, name, value or "") for name, value in attributes]
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag, tag
+
+    def handle_data(self, data):
+        if "script" not in self.open and "style" not in self.open:
+            self.text += data
+
+
+def test_the_page_is_well_formed_and_asks_for_nothing(folder):
+    page, markup = folder.page_path.read_text(encoding="utf-8"), Markup()
+    markup.feed(page)
+    assert markup.open == []
+    linked = [value for _, name, value in markup.attributes if name in ("src", "href", "action", "data")]
+    assert linked == ["data:,"]
+    assert not re.search(r"\b(fetch|XMLHttpRequest|WebSocket|importScripts|import)\b\s*\(", page)
+    addresses = set(re.findall(r"(?:https?:)?//[\w.]+\.\w+[^'\" ]*", re.sub(r">[\w+/=]{99,}<", "><", page)))
+    assert addresses == {"http://www.w3.org/2000/svg"}
+
+
+def test_a_browser_may_run_the_own_script_alone(folder):
+    page = folder.page_path.read_text(encoding="utf-8")
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)
+    assert policy and policy[1].startswith("default-src 'none'; ")
+    for tag in ("script", "style"):
+        (text,) = re.findall(rf"<{tag}>(.*?)</{tag}>", page, re.S)
+        digest = base64.b64encode(sha256(text.encode()).digest()).decode()
+        assert f"{tag}-src 'sha256-{digest}';" in policy[1]
+
+
+def test_names_with_markup_stay_text(folder):
+    page, markup = folder.page_path.read_text(encoding="utf-8"), Markup()
+    markup.feed(page)
+    assert NASTY not in page and html.escape(NASTY) in page and NASTY in markup.text
+    assert not any(tag == "img" or name.startswith("on") for tag, name, _ in markup.attributes)
+    assert content_of(folder)["methods"][NASTY]["label"] == NASTY
+
+
+def test_what_did_not_run_stands_at_the_top(folder):
+    page = folder.page_path.read_text(encoding="utf-8")
+    head = page[: page.index("<main>")]
+    assert "Not every cell ended well: 1 failed, 1 timeout, 1 skipped." in head
+    assert "over 30 s" in head and "no body here" in head and 'class="trouble wrong"' in head
+
+
+def test_tables_sort_by_numbers_and_define_their_columns(folder):
+    table = next(t for t in content_of(folder)["tables"] if t["name"] == "energies_by_scene")
+    total = table["columns"][-1]
+    assert total["definition"] == "definition of energy/total; lower is better"
+    values = [line[-1] for line in table["rows"] if line[1] == WHOLE]
+    assert [value[:2] for value in values] == [[f"{2 + k:.2f}", 2.0 + k] for k in range(len(METHODS))]
+
+
+def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(tmp_path):
+    run = make_folder(tmp_path)
+    cloth, faces = moving(0.0)
+    cloth[3:] = np.nan
+    write_mesh(run.trajectory_path(WHOLE, "snug"), cloth, faces, {})
+    run.trajectory_path(WHOLE, "pbns").write_bytes(b"no mesh")
+    run.rest_areas_path(WHOLE).write_bytes(b"no areas")
+    (problem,) = write(run)
+    assert "pbns.vtkhdf" in problem
+    found = arrays_of(run, WHOLE, "snug")
+    assert len(found["positions"]) == 3 and "area" not in found
+    assert "pbns" not in content_of(run)["scenes"][WHOLE]["methods"]
+    first = run.page_path.read_bytes()
+    assert "pbns.vtkhdf" in first.decode()
+    write(run)
+    assert run.page_path.read_bytes() == first
+
+
+def in_browser(path: Path, script: str, folder: Path) -> dict:
+    """What the script found in the page, opened from disk in a browser without a window."""
+    page = path.read_text(encoding="utf-8")
+    digest = base64.b64encode(sha256(script.encode()).digest()).decode()
+    page = page.replace("script-src '", f"script-src 'sha256-{digest}' '", 1)
+    copy = folder / "page.html"
+    copy.write_text(page.replace("<body>", f"<body><script>{script}</script>", 1), encoding="utf-8")
+    command = [
+        str(shutil.which("chromium") or shutil.which("chromium-browser")), "--headless", "--no-sandbox",
+        "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+        "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update",
+        "--disable-sync", f"--user-data-dir={folder / 'profile'}", "--virtual-time-budget=400000",
+        "--window-size=1400,1000", "--dump-dom", copy.as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=170)
+    (text,) = re.findall(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
+    return json.loads(html.unescape(text))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not (shutil.which("chromium") or shutil.which("chromium-browser")), reason="no chromium on this machine"
+)
+def test_a_person_can_use_it(folder, tmp_path):
+    found = in_browser(folder.page_path, ACTIONS.read_text(encoding="utf-8"), tmp_path)
+    assert found["wrong"] == [] and not found["hacked"]
+    assert found["panes"] == ["Simulation", "Skinning alone", "SNUG", "PBNS"]
+    assert found["shades"] > 8
+    assert (found["first"], found["right"], found["home"]) == (2, 3, 0)
+    assert (found["playing"], found["paused"]) == ("Pause", "Play") and found["played"]
+    assert found["clock"] == "0.07 s · 3 of 5"
+    assert found["added"] == "newton-4" and found["withAdded"][-1] == "Newton, 4 iterations"
+    assert found["pointed"] == "pbns" and "pbns" in found["withPointed"] and len(found["withPointed"]) == 4
+    assert found["focused"] == "pbns"
+    assert found["turned"] and found["scale"] == "Mean curvature [1/m]"
+    assert found["colours"] == ["plain", "curvature", "area", "step", "distance", "depth"]
+    assert found["unjudged"] == ["step not judged"] * 4 and found["judged"] == [""] * 4
+    directions, columns = zip(found["up"], found["down"])
+    assert directions == ("ascending", "descending")
+    numbers = [[float(text) for text in column] for column in columns]
+    assert numbers[0] == numbers[1][::-1] == sorted(numbers[0]) and len(set(numbers[0])) == len(METHODS)
+    assert found["definition"] == "Frame: definition of cost/frame."
+    assert found["scene"] == WHOLE and len(found["panesThere"]) == 4 and found["curves"] == 4

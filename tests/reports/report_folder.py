@@ -1,0 +1,187 @@
+"""A small run folder for tests of the report: rows of every suite, trajectories and models."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.results.run_folder import FORMAT, Row
+from reference_sim import Trajectory
+from reports.run.rows import Run, run_data
+from snug.networks.trained_model import find_kind
+
+TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
+METHODS = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
+SCENES = ("tshirt/walk", "tshirt/jump")
+FRAMES = 5
+
+# What rows and run.json declare of the methods in these tests; any other is a network of its own.
+SOLVERS = {"newton": "Newton", "lbfgs": "L-BFGS", "vbd": "VBD"}
+DECLARED: dict[str, dict[str, Any]] = {
+    "simulation": {"label": "Simulation", "role": "reference"},
+    "simulation-perturbed-1e-9": {
+        "label": "Simulation, start moved", "role": "reference-variant", "family": "simulation-perturbed",
+    },
+    "direct-optimisation": {"label": "Vertices optimised directly", "role": "bound"},
+    "skinning": {"label": "Skinning alone", "role": "baseline"},
+    "untrained": {"label": "SNUG, untrained", "role": "baseline", "seeded": True},
+    "snug": {"label": "SNUG"},
+    "pbns": {"label": "PBNS"},
+    "supervised": {"label": "Supervised"},
+    "snug+cleanup": {"label": "SNUG, cleaned up", "base": "snug", "pairing_group": "snug"},
+    **{
+        f"snug-{name}": {
+            "role": "ablation", "base": "snug", "pairing_group": "snug", "label": f"SNUG, {name}",
+        }
+        for name in ("no-bending", "no-noise", "noise-alone", "no-inertia", "no-strain", "springs", "window6")
+    },
+    **{
+        f"{name}-{k}": {"role": "solver", "family": name, "level": k, "label": f"{words}, {k} iterations"}
+        for name, words in SOLVERS.items()
+        for k in (1, 2, 4, 5, 8, 10, 16, 20)
+    },
+    **{
+        f"{base}+lbfgs-{k}": {
+            "role": "warm-started", "family": f"{base}+lbfgs", "level": k, "base": base,
+            "label": f"{base.upper()} + L-BFGS, {k} iterations",
+        }
+        for base in ("snug", "skinning")
+        for k in (1, 4)
+    },
+}  # fmt: skip
+TABLES = {
+    "energy": "energies", "curvature": "curvature", "cost": "cost", "distance": "penetration",
+    "penetration": "penetration", "gap": "speed", "step": "speed", "gradient": "speed",
+    "roll_out": "extrapolation", "conservation": "conservation", "dynamics": "dynamics", "train": "training",
+}  # fmt: skip
+TITLES = {
+    "gap/energy": "Energy gap",
+    "gap/relative": "Relative gap",
+    "curvature/error": "Curvature error",
+    "energy/total": "Total",
+    "roll_out/drift": "Drift",
+}
+BETTER_LOWER = ("energy/strain", "energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
+
+
+def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *, seed=0, **more) -> Row:
+    """A row with the columns that its scene and method declare."""
+    own = DECLARED.get(method, {})
+    network = own.get("role", "network") in ("network", "ablation", "warm-started")
+    garment, _, motion = scene.partition("/")
+    declared = {
+        "role": own.get("role", "network"), "family": own.get("family", method), "base": own.get("base", ""),
+        "level": own.get("level"),
+        "seeded": own.get("seeded", network) and not metric.startswith("cost/"),
+        "pairing_group": own.get("pairing_group", method if network else ""),
+        "garment": garment if motion else "", "motion": motion, "part": "whole" if motion else "",
+    }  # fmt: skip
+    more = {"suite": "garments", "unit": "J", **declared, **more}
+    return Row(scene=scene, method=method, seed=seed, metric=metric, value=value, **more)
+
+
+def skipped(reason="no body here", **more) -> Row:
+    return row(value=None, status="skipped", reason=reason, **more)
+
+
+def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
+    """What run.json says of these rows."""
+    metrics = {r.metric: r for r in sorted(rows, key=lambda r: r.metric == "energy/total")}
+    cases = {
+        r.scene: {
+            "suite": r.suite, "scene": r.scene, "metric": r.metric, "description": "",
+        }
+        for r in rows
+        if r.metric in ("check", "outcome")
+    }  # fmt: skip
+    return {
+        "format": FORMAT,
+        "metrics": {
+            name: {
+                "unit": r.unit, "title": TITLES.get(name, name.partition("/")[2].capitalize()),
+                "definition": f"definition of {name}", "table": TABLES.get(name.partition("/")[0], ""),
+                "lower_is_better": True if name in BETTER_LOWER else None,
+                "arbitrary_zero": name in ("energy/gravity", "energy/total"),
+                "of": "machine" if name.startswith("cost/") else "answer",
+            }
+            for name, r in metrics.items()
+        },
+        "methods": {name: {"label": own["label"]} for name, own in DECLARED.items()},
+        "scenes": {r.scene: {} for r in sorted(rows, key=lambda r: r.garment != "tshirt") if r.garment},
+        "cases": cases,
+        **more,
+    }  # fmt: skip
+
+
+def run_of(rows: Sequence[Row], **more) -> Run:
+    return run_data(declaration(rows, **more), rows)
+
+
+def write_mesh(path: Path, positions: np.ndarray, faces: np.ndarray, fields: dict[str, np.ndarray]) -> None:
+    """A trajectory file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    mesh(positions, faces, fields).save(path)
+
+
+def mesh(positions: np.ndarray, faces: np.ndarray, fields: dict[str, np.ndarray]) -> Trajectory:
+    times = np.arange(len(positions)) / 30.0
+    return Trajectory(positions, faces, times, np.zeros(len(positions)), frame_fields=fields)
+
+
+def sheet(height: float) -> tuple[np.ndarray, np.ndarray]:
+    """A 4 x 4 sheet in the xy plane at z = height, (T,V,3) and (F,3)."""
+    x, y = np.meshgrid(np.linspace(0, 0.4, 4), np.linspace(1.0, 1.5, 4))
+    points = np.stack([x.ravel(), y.ravel(), np.full(16, height)], axis=1)
+    corner = (np.arange(3)[:, None] * 4 + np.arange(3)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + 1, corner + 5], 1), np.stack([corner, corner + 5, corner + 4], 1)]
+    )
+    return np.repeat(points[None], FRAMES, axis=0), faces
+
+
+def write_model(path: Path, kind: str, **last: float) -> None:
+    """The header of a safetensors file, with a short history; best at step 3 on held-out motions."""
+    history = [{"step": s, "seconds": 0.1 * s, "loss": 2.0 / s, **last} for s in (1, 2, 4)]
+    said = {"kind": kind, "unit": find_kind(kind).unit, "history": history}
+    said["summary"] = {"training_frames": 90, "validation": {"best_step": 3}}
+    header = json.dumps({"__metadata__": {"snug": json.dumps(said)}}).encode()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(struct.pack("<Q", len(header)) + header)
+
+
+def all_rows() -> list[Row]:
+    """Two scenes on a body, a truncated solver, a scene without a body, checks and stress tests."""
+    rows = []
+    for number, scene in enumerate(SCENES):
+        for method, factor in METHODS.items():
+            for term, value in TERMS.items():
+                rows.append(row(scene, method, f"energy/{term}", factor * value * (1 + number)))
+            rows.append(row(scene, method, "energy/total", factor * (1 + number)))
+            rows.append(row(scene, method, "cost/frame", 10.0 / factor, unit="ms"))
+            if method != "simulation":
+                rows.append(row(scene, method, "curvature/error", factor, unit="1/m"))
+        for metric in ("energy/strain", "cost/frame"):
+            failed = {"value": None, "status": "failed", "reason": "diverged at step 7"}
+            rows.append(row(scene, "supervised", metric, **failed))
+    for cut in (1, 4):
+        more = {"suite": "speed", "method": f"newton-{cut}"}
+        rows.append(row(SCENES[0], metric="cost/frame", unit="ms", value=2.0 * cut, **more))
+        rows.append(row(SCENES[0], metric="curvature/error", unit="1/m", value=3.0 / cut, **more))
+        rows.append(row(SCENES[0], metric="energy/total", value=1.5 - cut * 0.2, **more))
+        rows.append(row("hanging_sheet", metric="energy/strain", value=0.0, **more))
+    rows.append(row("free_fall", "simulation", "energy/gravity", -0.5, suite="speed"))
+    rows.append(skipped(scene="hanging_sheet", suite="speed"))
+    check = {"suite": "validation", "method": "simulation", "metric": "check", "unit": "m"}
+    rows.append(row("falls_freely", value=1e-15, expected=0.0, tolerance=1e-12, **check))
+    rows.append(row("zero_modes", value=6.0, expected=6.0, tolerance=0.0, **check))
+    more = {"status": "failed", "reason": "off", "expected": 0.28350664, "tolerance": 1e-4}
+    rows.append(row("sag", value=0.3, **check, **more))
+    case = {"suite": "extremes", "method": "simulation", "metric": "outcome", "unit": "vertex weights"}
+    rows.append(row("stiff", value=3e-7, **case))
+    rows.append(row("teleport", value=None, status="timeout", reason="over 30 s", **case))
+    return rows

@@ -1,0 +1,273 @@
+"""Effects, their intervals and p-values over motions and seeds, and Holm's correction, by known answers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from reports.statistics import significance
+from reports.statistics.means import Mean, mean_of, pair
+from reports.statistics.significance import (
+    MORE,
+    OPEN,
+    TIE,
+    TIED,
+    Effect,
+    effect,
+    holm,
+    standing,
+    within_uncertainty,
+)
+from tests.reports.report_folder import row, run_of
+
+
+def mean_over(grid, method="snug"):
+    """Of rows with the values grid[motion][seed]."""
+    rows = [
+        row(f"tshirt/{m}", method, value=float(value), seed=s)
+        for m, values in enumerate(np.atleast_2d(grid))
+        for s, value in enumerate(values)
+    ]
+    mean = mean_of(run_of(rows).frame, method, "energy/strain")
+    assert mean is not None
+    return mean
+
+
+ONE = np.array((1.0, 1.3, 1.1))
+LESS = ONE * (0.98, 0.985, 0.975)  # 2 % below with every seed, between which there are 30 %
+NOISE = 0.02  # relative, of an error that 10,000 draws estimate; three standard deviations
+
+
+def t_interval(value, error, freedom):
+    return value + stats.t.ppf((0.025, 0.975), freedom) * error
+
+
+def test_of_one_motion_the_interval_is_welchs_over_seeds():
+    """Numbers that are not all positive: sqrt(s1^2/n1 + s2^2/n2) and its degrees of freedom by hand."""
+    one, other = ONE - 1.2, np.array((0.9, 1.5, 1.0, 1.1)) - 0.7
+    parts = [values.var(ddof=1) / len(values) for values in (one, other)]
+    freedom = sum(parts) ** 2 / sum(part**2 / (len(v) - 1) for part, v in zip(parts, (one, other)))
+    found = effect(mean_over(one), mean_over(other, "pbns"))
+    assert not found.ratio and found.covers == "seeds" and found.shown == one.mean() - other.mean()
+    assert found.freedom == pytest.approx(freedom, rel=3 * NOISE)
+    low, high = t_interval(found.shown, math.sqrt(sum(parts)), found.freedom)
+    assert found.interval == pytest.approx((low, high), abs=NOISE * (high - low))
+
+
+def test_of_one_seed_the_interval_is_of_pairs_of_motions():
+    """Motions are drawn for both at once, so what one of them asks of both is no scatter."""
+    one, other = np.array([[0.1], [5.0], [-3.0], [9.0]]), np.array([[0.0], [4.8], [-3.2], [8.9]])
+    apart = (one - other).ravel()
+    found = effect(mean_over(one), mean_over(other, "pbns"))
+    low, high = t_interval(apart.mean(), apart.std(ddof=1) / 2.0, 3)
+    assert found.covers == "motions" and found.freedom == pytest.approx(3.0)
+    assert found.interval == pytest.approx((low, high), abs=NOISE * (high - low))
+
+
+def test_seeds_of_a_pairing_group_are_drawn_at_once_and_others_by_themselves():
+    alike = effect(mean_over(LESS, "snug-no-inertia"), mean_over(ONE))
+    logs = np.log(LESS) - np.log(ONE)
+    low, high = np.exp(t_interval(logs.mean(), logs.std(ddof=1) / math.sqrt(3.0), 2))
+    assert alike.interval == pytest.approx((low, high), rel=NOISE) and alike.p_value() < 0.05
+    later = [row(method="snug-no-inertia", value=v, seed=k) for k, v in enumerate(LESS, 1)]
+    later = mean_of(run_of(later).frame, "snug-no-inertia", "energy/strain")
+    for other in (mean_over(LESS, "pbns"), mean_over([*LESS, 1.1], "snug-no-inertia"), later):
+        assert effect(other, mean_over(ONE)).p_value() > 0.5  # other networks and seeds draw other numbers
+    rows = [row(method="snug-no-inertia", value=LESS[k], seed=k) for k in (2, 0, 1)]
+    turned = mean_of(run_of(rows).frame, "snug-no-inertia", "energy/strain")
+    assert effect(turned, mean_over(ONE)) == alike  # by their number, not their order
+
+
+@pytest.mark.parametrize(("method", "freed"), [("simulation", 1 / 3), ("pbns", 1 + 1 / 3)])
+def test_one_number_beside_several_seeds(method, freed):
+    """What no seed changes is a known number; what could have seeds is one draw more of the same scatter."""
+    found = effect(mean_over([[-0.4]], method), mean_over(ONE - 1.2))
+    half = stats.t.ppf(0.975, 2) * ONE.std(ddof=1) * math.sqrt(freed)
+    assert found.interval[1] - found.interval[0] == pytest.approx(2.0 * half, rel=NOISE)
+    assert found.freedom == pytest.approx(2.0)
+
+
+def random_means(random, motions, seeds, spread, paired):
+    """Two means of a crossed design: what a motion asks of both, and of each; seeds; and a rest."""
+    shared = random.normal(0.0, 5.0, (motions, 1))
+    shapes = {"motions": (motions, 1), "seeds": (1, seeds), "rest": (motions, seeds)}
+    means = []
+    for name in ("one", "other"):
+        parts = (random.normal(0.0, spread[part], shape) for part, shape in shapes.items())
+        grid = sum(parts, shared)
+        cells = {(str(m), s): float(grid[m, s]) for m in range(motions) for s in range(seeds)}
+        group = "both" if paired else name
+        means.append(Mean(float(grid.mean()), None, motions, seeds, True, cells=cells, pairing_group=group))
+    return means
+
+
+def covered(paired, spread, times=400):
+    random = np.random.default_rng(3)
+    intervals = [effect(*random_means(random, 4, 3, spread, paired)).interval for _ in range(times)]
+    return np.mean([low <= 0.0 <= high for low, high in intervals])
+
+
+@pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.parametrize("spread", [(1.0, 1.0, 0.0), (1.0, 0.3, 0.3), (0.3, 1.0, 0.3)])
+def test_of_four_motions_and_three_seeds_95_percent_of_the_intervals_hold_the_truth(
+    paired, spread, monkeypatch
+):
+    spread = dict(zip(("motions", "seeds", "rest"), spread))
+    assert 0.90 <= covered(paired, spread) <= 0.98
+    if spread["seeds"] == 1.0:
+        return
+    # Seeds alone cover too little where motions scatter.
+    weights = significance._weights
+    monkeypatch.setattr(
+        significance, "_weights", lambda n, s: np.full((10_000, n), 1.0 / n) if s == 0 else weights(n, s)
+    )
+    assert covered(paired, spread) < 0.9
+
+
+def test_the_same_numbers_give_the_same_interval_and_the_interval_agrees_with_the_p_value():
+    random = np.random.default_rng(5)
+    spread = {"motions": 1.0, "seeds": 1.0, "rest": 0.2}
+    signs = set()
+    for _ in range(40):
+        one, other = random_means(random, 4, 3, spread, True)
+        found = effect(one, other)
+        low, high = found.interval
+        signs.add(found.p_value() < 0.05)
+        assert (found.p_value() < 0.05) == (not low <= float(found.ratio) <= high)
+    assert signs == {True, False}
+    significance._weights.cache_clear()
+    assert effect(one, other) == found
+
+
+def test_positive_numbers_are_compared_by_their_factors():
+    sound, broken = mean_over((0.36, 0.35, 0.37)), mean_over((1e7, 2e3, 6e6), "pbns")
+    found = effect(sound, broken)
+    logs = [np.log([*mean.cells.values()]) for mean in (sound, broken)]
+    assert found.ratio and found.shown == pytest.approx(np.exp(logs[0].mean() - logs[1].mean()))
+    assert found.p_value() < 0.05  # though the spread of what broke is larger than the difference
+    low, high = found.interval
+    assert 0.0 < low < found.shown < high < 1.0
+    back = effect(broken, sound)
+    assert np.log(back.interval) == pytest.approx(-np.log((high, low)), rel=3 * NOISE)
+    # A claimed factor lies on the interval's end where its p-value is the level.
+    assert found.p_value(factor=1.0 / high) == pytest.approx(0.05)
+    assert found.p_value(factor=1.01 / high) > 0.05 > found.p_value(factor=0.99 / high)
+    assert not effect(mean_over((0.0, 1.0)), mean_over((1.0, 1.0), "pbns")).ratio
+
+
+def test_where_nothing_is_repeated_there_is_no_interval_and_no_p_value():
+    for other, equal in ((1.0 - 1.01 * TIE, False), (1.0 - 0.99 * TIE, True)):
+        found = effect(mean_over(1.0), mean_over(other, "pbns"))
+        assert found.interval is None and found.p_value() is None and found.covers == ""
+        assert found.equal() == equal
+    assert effect(mean_over(0.0), mean_over(0.0, "pbns")).equal()
+    assert not effect(mean_over(0.0), mean_over(1e-9, "pbns")).equal()
+
+
+def test_what_is_the_same_with_every_motion_was_not_repeated():
+    """A training has one time, whatever the motions that its network is tested on; a size is one number."""
+    times = [np.repeat([values], 4, axis=0) for values in (ONE, 50.0 * ONE)]
+    several = effect(mean_over(times[0]), mean_over(times[1], "pbns"))
+    alone = effect(mean_over(times[0][:1]), mean_over(times[1][:1], "pbns"))
+    assert several.covers == "seeds" and several.interval == pytest.approx(alone.interval, rel=1e-9)
+    for cut in (np.s_[:, :1], np.s_[:, [0, 0, 0]]):
+        found = effect(mean_over(times[0][cut]), mean_over(times[1][cut], "pbns"))
+        assert (found.covers, found.interval, found.p_value()) == ("", None, None)
+
+
+def test_what_every_motion_repeats_exactly_is_certain():
+    twice = effect(mean_over([[1.0], [2.0], [4.0]]), mean_over([[2.0], [4.0], [8.0]], "pbns"))
+    assert twice.covers == "motions" and twice.interval == pytest.approx((0.5, 0.5))
+    assert twice.p_value() == pytest.approx(0.0)
+    same = mean_over([[1.0], [2.0], [4.0]])
+    assert effect(same, replace(same, pairing_group="")).p_value() == 1.0
+
+
+def test_equal_is_what_lies_in_the_tie_with_all_of_its_interval():
+    near, wide = 1.0 + np.array((-0.001, 0.0, 0.001)), 1.0 + np.array((-0.3, 0.0, 0.3))
+    assert effect(mean_over(near), mean_over(near[::-1], "pbns")).equal()
+    assert not effect(mean_over(wide), mean_over(wide[::-1], "pbns")).equal()
+    hundredth = effect(mean_over(near / 100.0), mean_over(near, "pbns"))
+    assert hundredth.equal(factor=100.0) and not hundredth.equal()
+
+
+def test_holm_by_hand():
+    """Four tests: the least times 4, the next times 3 ...; never less than one before it, never above one."""
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.6, 0.9]) == [1.0, 1.0] and holm([0.04]) == [0.04] and holm([]) == []
+    # Bonferroni's first step, then larger levels: 11 of 12 at .004 each would all stay, at .0045 none.
+    assert max(holm([0.004] * 12)) < 0.05 < min(holm([0.0045] * 12))
+
+
+def test_over_scenes_and_seeds_that_are_left_in_both():
+    """A seed that diverged is in no mean; scenes that one of the two lacks are in neither."""
+    rows = [row(f"tshirt/{m}", value=1.0 + m + 0.1 * s, seed=s) for m in range(3) for s in range(3)]
+    rows += [row(f"tshirt/{m}", "pbns", value=2.0 + m + 0.1 * s, seed=s) for m in range(2) for s in range(2)]
+    rows += [row("tshirt/0", "pbns", value=None, seed=2, status="diverged", reason="no end")]
+    one, other = pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
+    assert set(one.cells) == {(f"tshirt/{m}", s) for m in range(2) for s in range(3)}
+    assert set(other.cells) == {(f"tshirt/{m}", s) for m in range(2) for s in range(2)} and (
+        other.asked,
+        other.lacking,
+    ) == (9, 5)
+    found = effect(one, other)
+    assert found.covers == "motions and seeds" and not found.complete
+    rows = [r for r in rows if r.scene != "tshirt/2"]
+    one, other = pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
+    assert one.complete and not effect(one, other).complete and not effect(other, one).complete
+
+
+def test_a_difference_within_what_another_reference_would_change():
+    rows = [row(method=method, value=v) for method, v in (("snug", 1.0), ("pbns", 1.3))]
+    frame = run_of(rows).frame
+    assert not within_uncertainty(*pair(frame, "snug", "pbns", "energy/strain"))  # nobody measured it
+    for moved, within in ((0.1, False), (0.2, True)):
+        one, other = pair(frame.assign(uncertainty=moved), "snug", "pbns", "energy/strain")
+        assert one.uncertainty == moved and within_uncertainty(one, other) == within
+        assert not within_uncertainty(one, other, factor=3.0)
+
+
+def test_what_another_reference_does_to_both_methods_moves_them_not_apart():
+    twins = ("simulation-refrozen", "simulation-perturbed-1e-4")
+
+    def within(changes: dict[str, tuple[tuple[float, ...], ...]], factor: float = 1.0) -> bool:
+        rows = [
+            replace(
+                row(f"tshirt/{scene}", method, value=value, seed=seed),
+                uncertainty=max(map(abs, moved), default=None), moved=tuple(zip(twins, moved)),
+            )
+            for method, value in (("snug", 1.0), ("pbns", 1.3))
+            for scene, moved in enumerate(changes[method])
+            for seed in range(2)
+        ]  # fmt: skip
+        return within_uncertainty(*pair(run_of(rows).frame, "snug", "pbns", "energy/strain"), factor)
+
+    both = ((0.5, -0.4), (-0.2, 0.3))
+    assert not within({"snug": both, "pbns": both})
+    assert within({"snug": both, "pbns": both}, factor=1.5)  # 1.5 and 1.3, .25 and .15 apart
+    assert within({"snug": both, "pbns": ((0.5, -0.4), (-0.2, -0.35))})  # 0 and .65 apart: .325
+    assert not within({"snug": both, "pbns": ((0.5, -0.4), (-0.2, -0.2))})  # .25
+    assert within({"snug": both, "pbns": ((), ())})  # the simulation beside a network: .4
+    # Nobody knows what each does in one of the scenes: both add up.
+    rows = run_of([row(method=m, value=v) for m, v in (("snug", 1.0), ("pbns", 1.3))]).frame
+    one, other = pair(rows.assign(uncertainty=0.2), "snug", "pbns", "energy/strain")
+    assert within_uncertainty(one, other)
+
+
+def test_one_rule_says_how_two_means_stand():
+    one, other = (Mean(value, None, 1, 3, 3) for value in (1.0, 1.2))
+
+    def stands(value: float, p: float | None, moved: float = 0.0, *, one_seed: bool = False) -> str:
+        error = None if p is None else 0.01
+        found = Effect(value, ratio=True, error=error, freedom=10.0, one_seed=one_seed)
+        return standing(replace(one, uncertainty=moved), other, found, p)
+
+    assert [stands(0.01, p) for p in (None, 0.04, 0.06)] == [TIED, MORE, TIED]  # all within 5 %
+    assert [stands(0.20, p) for p in (None, 0.04, 0.06)] == [MORE, MORE, OPEN]
+    assert [stands(-0.20, p) for p in (None, 0.04, 0.06)] == [significance.LESS, significance.LESS, OPEN]
+    assert stands(0.20, 1e-6, moved=0.21) == TIED and stands(0.20, 1e-6, moved=0.19) == MORE
+    assert stands(0.20, 1e-6, one_seed=True) == stands(0.01, 0.5, moved=0.21, one_seed=True) == OPEN

@@ -1,0 +1,175 @@
+"""Two runs compared: noise is no change, a planted one is found, and the exit status says which."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.results.run_folder import RunFolder
+from reports import compare as command
+from reports.compare import compare
+from tests.reports.report_folder import declaration, row, run_of
+
+SCENES = ("tshirt/walk", "tshirt/jump", "tshirt/bow", "tshirt/kick")
+SEEDS = (0, 1, 2)
+
+
+def rows_of(draw: int = 0, **factors: float):
+    """A network whose seeds scatter by 3 %, a simulation, a solver with a time, a check."""
+    scatter = np.random.default_rng(draw).normal(1.0, 0.03, (len(SCENES), len(SEEDS)))
+    factor = {"snug": 1.0, "lbfgs-4": 1.0, "time": 1.0, **factors}
+    rows = []
+    for i, scene in enumerate(SCENES):
+        rows.append(row(scene, "simulation", "energy/strain", 1.0 + i))
+        rows.append(row(scene, "lbfgs-4", "energy/strain", factor["lbfgs-4"] * (1.3 + i), uncertainty=0.01))
+        rows.append(row(scene, "lbfgs-4", "curvature/mean", 5.0 + i, unit="1/m"))
+        rows += [
+            row(scene, "snug", "energy/strain", factor["snug"] * (2.0 + i) * scatter[i, seed], seed=seed)
+            for seed in SEEDS
+        ]
+    timed = {"suite": "speed", "method": "lbfgs-4"}
+    rows.append(row("flag", metric="cost/frame", unit="ms", value=10.0 * factor["time"], **timed))
+    rows.append(row("flag", metric="cost/spread", unit="%", value=4.0, **timed))
+    rows.append(row("flag", metric="cost/frame_worst", unit="ms", value=20.0 * factor["time"] ** 3, **timed))
+    check = {"suite": "validation", "method": "simulation", "metric": "check", "unit": "m"}
+    return [*rows, row("sag", value=0.28, expected=0.28, tolerance=1e-3, **check)]
+
+
+def found(one, other, **options):
+    return [
+        (c.verdict, c.place, c.method, c.metric)
+        for c in compare(run_of(one), run_of(other), **options).changes
+    ]
+
+
+def test_the_same_run_and_another_draw_of_the_seeds_are_no_change():
+    assert found(rows_of(), rows_of()) == []
+    for draw in range(1, 8):
+        assert found(rows_of(), rows_of(draw)) == []
+
+
+def test_of_many_means_that_scatter_none_is_a_change():
+    def many(draw: int):  # another seed moves all motions alike
+        values = np.random.default_rng(draw).normal(10.0, 3.0, (80, len(SEEDS)))
+        return [
+            row(scene, "snug", f"energy/{k}", values[k, seed], seed=seed)
+            for k in range(len(values)) for scene in SCENES[:2] for seed in SEEDS
+        ]  # fmt: skip
+
+    assert found(many(1), many(2)) == []
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.3, "worse"), (0.7, "better")])
+def test_a_network_that_moved_beyond_its_seeds_is_found(factor, verdict):
+    assert found(rows_of(), rows_of(1, snug=factor)) == [(verdict, "tshirt", "snug", "energy/strain")]
+
+
+def test_what_the_uncertainty_or_5_percent_covers_is_no_change():
+    assert found(rows_of(), rows_of(**{"lbfgs-4": 1.1})) == [("worse", "tshirt", "lbfgs-4", "energy/strain")]
+    assert found(rows_of(), rows_of(**{"lbfgs-4": 1.04})) == []
+    unsure = [
+        dataclasses.replace(r, uncertainty=0.5) if r.method == "lbfgs-4" else r
+        for r in rows_of(**{"lbfgs-4": 1.1})
+    ]
+    assert found(rows_of(), unsure) == []
+
+
+def test_where_zero_is_a_choice_no_change_hangs_on_it():
+    """All gravity energies are higher by 50 J, or by none: the same change is found in both."""
+
+    def heights(more: float, zero: float):
+        rows = [row(s, "simulation", "energy/gravity", zero + 1.0 + i) for i, s in enumerate(SCENES)]
+        rows += [row(s, "skinning", "energy/gravity", zero + 2.0 + i) for i, s in enumerate(SCENES)]
+        return rows + [
+            row(s, "lbfgs-4", "energy/gravity", zero + 1.1 + i + more) for i, s in enumerate(SCENES)
+        ]
+
+    for zero in (0.0, 50.0):
+        assert found(heights(0.0, zero), heights(0.04, zero)) == []  # 4 % of what skinning has more
+        moved = [("changed", "tshirt", "lbfgs-4", "energy/gravity")]
+        assert found(heights(0.0, zero), heights(0.06, zero)) == moved
+
+
+def test_a_metric_without_a_better_side_is_only_changed():
+    moved = [
+        dataclasses.replace(r, value=2.0 * r.value) if r.metric == "curvature/mean" else r for r in rows_of()
+    ]
+    assert found(rows_of(), moved) == [("changed", "tshirt", "lbfgs-4", "curvature/mean")]
+
+
+def test_times_count_beyond_a_fifth_where_they_were_repeated_and_on_one_machine():
+    assert found(rows_of(), rows_of(time=1.15)) == []
+    assert found(rows_of(), rows_of(time=1.5)) == [("changed", "flag", "lbfgs-4", "cost/frame")]
+    assert found(rows_of(), rows_of(time=1.5), times=False) == []
+    once = [  # several motions are no repeats
+        [row(scene, "lbfgs-4", "cost/frame", factor * (9.0 + i), unit="ms") for i, scene in enumerate(SCENES)]
+        for factor in (1.0, 1.5)
+    ]
+    assert found(*once) == []
+    elsewhere = [dataclasses.replace(r, hardware="another") for r in rows_of(time=1.5)]
+    assert found(rows_of(), elsewhere) == []
+
+
+def test_one_seed_in_common_is_not_judged_but_counted():
+    rows = [r for r in rows_of(1, snug=3.0) if r.seed == 0]
+    result = compare(run_of(rows_of()), run_of(rows))
+    assert result.changes == () and result.one_seed == 1 and result.only_one == 2 * len(SCENES)
+
+
+def test_a_cell_that_fails_and_a_check_that_is_off_are_worse():
+    def ended(r):
+        if r.scene == "sag":
+            return dataclasses.replace(r, status="failed", value=0.5, reason="off")
+        lost = r.method == "snug" and r.scene == SCENES[0] and r.seed == 1
+        return dataclasses.replace(r, status="diverged", value=None, reason="step 7") if lost else r
+
+    later = [ended(r) for r in rows_of()]
+    both = [("worse", SCENES[0], "snug", "energy/strain"), ("worse", "sag", "simulation", "check")]
+    assert found(rows_of(), later) == found(rows_of(), later, metrics="curvature/*") == both
+    assert [verdict for verdict, *_ in found(later, rows_of())] == ["better", "better"]
+    assert found(rows_of(), later, methods="lbfgs-*") == []
+
+
+def test_a_cell_that_fails_is_found_where_it_has_no_metric_in_common():
+    """An untimed cell has metrics of its answer, and where it crashed a row of its time."""
+    cell = {"scene": "out_of_distribution/splits", "method": "simulation", "suite": "extremes"}
+    well = [*rows_of(), row(metric="motion/strain", **cell)]
+    crash = {"metric": "cost/frame", "value": None, "status": "failed", "reason": "crashed"}
+    assert ("worse", cell["scene"], "simulation", "motion/strain") in found(
+        well, [*rows_of(), row(**crash, **cell)]
+    )
+
+
+def write(path, rows, **more):
+    folder = RunFolder(path)
+    folder.write_rows(rows)
+    folder.write_config(declaration(rows, **more))
+    return str(path)
+
+
+def test_exit_status_and_lines(tmp_path, capsys):
+    one, worse = write(tmp_path / "a", rows_of()), write(tmp_path / "b", rows_of(1, snug=1.3))
+    assert command.main([one, one]) == 0 and "0 worse" in capsys.readouterr().out
+    assert command.main([one, worse]) == 1
+    line = capsys.readouterr().out.splitlines()[0]
+    assert (
+        line.startswith("worse   tshirt  snug  energy/strain  3.5") and " J, × 1.3" in line and "p " in line
+    )
+    assert command.main([worse, one]) == 0
+
+
+@pytest.mark.parametrize("what", ["absent", "preset", "nothing shared", "pattern"])
+def test_bad_input_is_one_line_and_status_2(tmp_path, capsys, what):
+    one = write(tmp_path / "a", rows_of(), preset="quick")
+    if what == "preset":
+        write(tmp_path / "b", rows_of(), preset="smoke")
+    if what in ("nothing shared", "pattern"):
+        other = [row("skirt/turn")] if what == "nothing shared" else rows_of()
+        write(tmp_path / "b", other, preset="quick")
+    options = ["--metrics", "energy/strian"] if what == "pattern" else []
+    assert command.main([one, str(tmp_path / "b"), *options]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.startswith("reports.compare: ")
+    assert captured.err.count("\n") == 1

@@ -1,0 +1,149 @@
+"""Films: one camera for all cloths, names, the right length, and one line where none is made."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from benchmarks.results.run_folder import RunFolder
+from reference_sim import Trajectory
+from reports import film
+from reports.pictures.render import camera_axes, vertex_normals
+from reports.run.kept_roll_outs import Kept
+from tests.reports.report_folder import declaration, row, run_of, sheet, write_mesh
+
+SCENE = "tshirt/walk"
+DRAWS = subprocess.run([sys.executable, "-c", film.SWATCH], capture_output=True).returncode == 0
+needs_opengl = pytest.mark.skipif(not DRAWS, reason="no OpenGL without a screen on this machine")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> RunFolder:
+    """A simulation that moves, skinning that stands still, and a network that ended early."""
+    folder = RunFolder(tmp_path_factory.mktemp("run"))
+    rows = [row(SCENE, method) for method in ("simulation", "skinning", "snug")]
+    folder.write_rows(rows)
+    folder.write_config(declaration(rows))
+    body, faces = sheet(-0.2)
+    write_mesh(folder.trajectory_path(SCENE, "body"), body, faces, {})
+    for method in ("simulation", "skinning", "snug"):
+        cloth, faces = sheet(0.0)
+        if method == "simulation":
+            cloth += np.array([0.0, 0.06, 0.0]) * np.arange(len(cloth))[:, None, None]
+        if method == "snug":
+            cloth = cloth[:2]
+        write_mesh(folder.trajectory_path(SCENE, method), cloth, faces, {})
+    return folder
+
+
+def filmed(run, path, *more) -> int:
+    arguments = [str(run.path), "--scene", SCENE, "--methods", "simulation,skinning", "--width", "100"]
+    return film.main([*arguments, "-o", str(path), *more])
+
+
+@needs_opengl
+def test_a_gif_has_every_frame_in_its_time_and_the_same_bytes_twice(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(film, "SWATCH", "pass")  # it was tried above
+    paths = [tmp_path / "x.gif", tmp_path / "y.gif"]
+    assert [filmed(run, path, "--speed", ".5") for path in paths] == [0, 0]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    with Image.open(paths[0]) as picture:
+        assert picture.n_frames == 5 and picture.width == 200
+        shown, lasted = [], 0.0
+        for frame in range(picture.n_frames):
+            picture.seek(frame)
+            lasted += picture.info["duration"]
+            shown.append(np.asarray(picture.convert("RGB")).astype(int))
+    assert lasted == pytest.approx(5 / 30 / 0.5 * 1000, abs=10)
+    rows = slice(30, -30)  # without names and time
+    half = [(picture[rows, :100], picture[rows, 100:]) for picture in shown]
+    assert np.abs(half[0][0] - half[0][1]).max() < 40  # both at rest, one light, one camera
+    assert np.abs(half[4][0] - half[4][1]).max() > 100
+
+
+@needs_opengl
+def test_an_mp4_has_every_frame(run, tmp_path):
+    av = pytest.importorskip("av", reason="the extra [film] is not installed")
+    assert filmed(run, tmp_path / "x.mp4") == 0
+    with av.open(str(tmp_path / "x.mp4")) as container:
+        frames = list(container.decode(video=0))
+        assert len(frames) == 5 and container.streams.video[0].average_rate == 30
+        assert frames[0].width == 200
+
+
+@needs_opengl
+def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run, monkeypatch):
+    from reports.run.kept_roll_outs import read_kept
+
+    said: list[str] = []
+    monkeypatch.setattr(film, "_fitting", lambda draw, label, font, width: said.append(label) or label)
+    frames = list(film.pictures(read_kept(run, SCENE, ["simulation", "snug"]), 100, 25.0))
+    names = ["Simulation", "SNUG"]
+    assert len(frames) == 5 and said == names + names + 3 * [*names, "ended at 0.03 s: ok"]
+
+
+def kept_of(*positions: np.ndarray) -> Kept:
+    faces = np.array([[0, 1, 2]])
+    cloths = {str(k): Trajectory(x, faces, np.arange(len(x)) / 30.0) for k, x in enumerate(positions)}
+    return Kept(run_of([row(SCENE, "simulation")]), cloths, None)
+
+
+def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
+    rng = np.random.default_rng(3)
+    walk = np.cumsum(rng.normal(0.0, 0.2, (40, 1, 3)), axis=0)
+    one, other = (walk[:n] + rng.normal(0.0, 0.4, (n, 30, 3)) for n in (40, 25))
+    for azimuth in (0.0, 25.0, 180.0, -90.0):
+        axes = camera_axes(azimuth)
+        assert axes.T @ axes == pytest.approx(np.eye(3), abs=1e-12) and np.linalg.det(axes) > 0.0
+        centres, half = film.camera_path(kept_of(one, other), axes)
+        for cloth in (one, np.concatenate([other, np.repeat(other[-1:], 15, axis=0)])):
+            seen = (cloth - centres[:, None]) @ axes
+            assert np.abs(seen[..., 1]).max() <= half and np.abs(seen[..., 0]).max() <= half / film.TALL
+    front = camera_axes(0.0)
+    assert front[:, 0] == pytest.approx([1.0, 0.0, 0.0]) and front[2, 2] > 0.95  # the body faces +z
+
+
+def test_a_single_frame_has_a_camera():
+    centres, half = film.camera_path(kept_of(np.eye(3)[None]), camera_axes(25.0))
+    assert centres.shape == (1, 3) and half > 0.0
+
+
+def test_normals_of_a_sphere_point_outwards():
+    import pyvista
+
+    ball = pyvista.Icosphere(radius=2.0, nsub=2)
+    normals = vertex_normals(ball.points, ball.regular_faces)
+    assert normals == pytest.approx(ball.points / 2.0, abs=0.02)
+    assert np.all(vertex_normals(np.zeros((3, 3)), np.array([[0, 1, 2]])) == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (["--methods", "snug,simulatoin"], "no method in tshirt/walk is called 'simulatoin'"),
+        (["-o", "x.avi"], "x.avi: a film ends in .mp4 or .gif"),
+        (["--speed", "0"], "--speed is .01 to 10"),
+        (["--speed", "nan"], "--speed is .01 to 10"),
+        (["--width", "7"], "--width 64 to 2000"),
+    ],
+)
+def test_what_cannot_be_filmed_is_one_line_and_status_2(run, tmp_path, monkeypatch, capsys, change, said):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(film, "SWATCH", "pass")
+    assert filmed(run, "x.gif", *change) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("reports.film: ") and error.count("\n") == 1 and said in error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_opengl_or_the_extra_it_says_what_to_install(run, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(film, "SWATCH", "import os; os.kill(os.getpid(), 11)")
+    assert filmed(run, tmp_path / "x.gif") == 2
+    assert "libegl1" in capsys.readouterr().err
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert filmed(run, tmp_path / "x.mp4") == 2
+    assert "pip install 'neural-garment-benchmark[film]'" in capsys.readouterr().err

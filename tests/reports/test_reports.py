@@ -1,0 +1,238 @@
+"""The report of a run: numbers as they are, dashes where there are none, the same bytes twice."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.results.run_folder import COLUMNS, FORMAT, RunFolder, digest_of_file
+from reports import build
+from reports.document.document import document
+from reports.figures import training
+from reports.run.read import read_run, read_trajectory
+from reports.run.rows import run_data
+from reports.statistics.means import Mean
+from reports.tables.tables import make_tables
+from tests.reports.report_folder import (
+    FRAMES,
+    METHODS,
+    SCENES,
+    TERMS,
+    all_rows,
+    declaration,
+    row,
+    sheet,
+    write_mesh,
+    write_model,
+)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> RunFolder:
+    """A whole run folder with its report, drawn without OpenGL."""
+    run = RunFolder(tmp_path_factory.mktemp("run"))
+    run.write_rows(all_rows())
+    said = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
+    run.write_config(declaration(all_rows(), **said))
+    for scene in SCENES:
+        body, faces = sheet(0.0)
+        write_mesh(run.trajectory_path(scene, "body"), body, faces, {})
+        for method in METHODS:
+            cloth, faces = sheet(0.1)
+            fields = {f"energy/{t}": np.linspace(0, v, FRAMES) for t, v in TERMS.items()}
+            write_mesh(run.trajectory_path(scene, method), cloth, faces, fields)
+    write_model(run.models / "snug-seed0.safetensors", "snug", strain=0.1)
+    write_model(run.models / "supervised-seed0.safetensors", "supervised", vertices=2.0)
+    assert build.main([str(run.path)]) == 0
+    return run
+
+
+def read_csv(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_table_1_is_the_mean_over_scenes(made):
+    lines = {line["method"]: line for line in read_csv(made.tables / "energies.csv")}
+    assert list(lines) == ["simulation", "skinning", "snug", "pbns"]
+    for method, factor in METHODS.items():
+        for term, value in TERMS.items():
+            assert float(lines[method][f"energy/{term} [J]"]) == pytest.approx(1.5 * factor * value, rel=1e-8)
+        assert float(lines[method]["energy/total [J]"]) == pytest.approx(1.5 * factor, rel=1e-8)
+
+
+def test_what_is_not_declared_is_a_dash_and_zero_stays_zero(made):
+    lines = read_csv(made.tables / "energies_by_scene.csv")
+    sheet_line = next(x for x in lines if x["scene"] == "hanging_sheet" and x["method"] == "newton-1")
+    assert sheet_line["energy/strain [J]"] == "0"
+    assert sheet_line["energy/collision [J]"] == sheet_line["energy/total [J]"] == "-"
+    fall = next(x for x in lines if x["scene"] == "free_fall")
+    assert fall["energy/strain [J]"] == "-" and fall["energy/gravity [J]"] == "-0.5"
+
+
+def test_every_file_of_the_report_is_there(made):
+    names = {path.name for path in made.tables.iterdir()}
+    wanted = ("energies", "energies_by_scene", "curvature", "cost", "validation", "extremes", "unfinished")
+    assert {f"{name}.csv" for name in wanted} <= names
+    pictures = {path.name for path in made.figures.iterdir()}
+    for stem in ("energy_series_tshirt-walk", "error_against_time", "training", "dots", "histograms"):
+        assert {f"{stem}.svg", f"{stem}.png"} <= pictures
+    assert {"lead.png", "frames_tshirt-walk.png", "strip_tshirt-jump.png", "failures.png"} <= pictures
+    assert made.report_path.read_bytes().startswith(b"%PDF")
+
+
+def test_the_papers_numbers_are_in_no_file_of_ours(made):
+    for path in made.tables.iterdir():
+        assert "paper" not in path.read_text(encoding="utf-8").lower()
+
+
+def test_made_twice_it_is_the_same_to_the_byte(made):
+    def contents() -> dict[str, bytes]:
+        return {str(p): p.read_bytes() for p in sorted(made.path.rglob("*")) if p.is_file()}
+
+    before = contents()
+    assert build.main([str(made.path)]) == 0
+    assert contents() == before
+
+
+def test_figures_of_an_earlier_report_are_removed_and_others_stay(tmp_path):
+    run = RunFolder(tmp_path)
+    run.write_config(declaration(all_rows()))
+    run.write_rows(all_rows())
+    run.figures.mkdir()
+    old = ("hem_tunic-stop.svg", "error_against_time_flag.png", "training_tunic.svg")
+    kept = ("mine.png", "gap-relative_against_cost-frame.svg")
+    for name in (*old, *kept):
+        (run.figures / name).write_bytes(b"")
+    assert build.main([str(tmp_path)]) == 0
+    left = {path.name for path in run.figures.iterdir()}
+    assert left.isdisjoint(old) and left.issuperset(kept)
+
+
+def test_failed_cells_are_listed_once_with_their_reason(made):
+    lines = read_csv(made.tables / "unfinished.csv")
+    found = [(x["scene"], x["method"], x["status"], x["reason"]) for x in lines]
+    assert found == [
+        ("tshirt/walk", "supervised", "failed", "diverged at step 7"),
+        ("tshirt/jump", "supervised", "failed", "diverged at step 7"),
+        ("hanging_sheet", "snug", "skipped", "no body here"),
+    ]
+
+
+@pytest.mark.parametrize("what", ["absent", "empty", "broken config", "broken rows", "no rows"])
+def test_no_run_folder_is_one_line_and_status_2(tmp_path, capsys, what):
+    run = RunFolder(tmp_path / "run")
+    if what != "absent":
+        run.path.mkdir()
+    if what not in ("absent", "empty"):
+        run.write_config({"format": FORMAT})
+        run.write_rows([])
+    if what == "broken config":
+        run.config_path.write_text("{", encoding="utf-8")
+    if what == "broken rows":
+        run.rows_path.write_text("a,b\n", encoding="utf-8")
+    before = sorted(tmp_path.rglob("*"))
+    assert build.main([str(run.path)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("reports.build: ") and error.count("\n") == 1 and str(run.path) in error
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
+    run = RunFolder(tmp_path)
+    run.write_config(declaration(all_rows()))
+    run.write_rows(all_rows())
+    path = run.trajectory_path(SCENES[0], "snug")
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"no mesh")
+    (run.models).mkdir()
+    (run.models / "snug-seed0.safetensors").write_bytes(b"\xff" * 20)
+    assert build.main([str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert "tshirt-walk/snug.vtkhdf" in said.err and "snug-seed0.safetensors" in said.err
+    assert said.out.strip() == str(run.report_path) and run.report_path.is_file()
+
+
+def test_curves_beside_a_trajectory_are_its_own(tmp_path):
+    run = RunFolder(tmp_path)
+    path = run.trajectory_path(SCENES[0], "snug")
+    write_mesh(path, *sheet(0.1), {"energy/strain": np.zeros(FRAMES), "iterations": np.ones(FRAMES)})
+    np.savez(run.curves_path(SCENES[0], "snug"), **{"energy/strain": np.ones(FRAMES)})
+    fields = read_trajectory(run, path, []).frame_fields
+    assert fields["energy/strain"].tolist() == fields["iterations"].tolist() == [1.0] * FRAMES
+    run.curves_path(SCENES[0], "snug").write_bytes(b"no archive")
+    problems = []
+    assert read_trajectory(run, path, problems) is None and "snug.npz" in problems[0]
+
+
+def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
+    run = RunFolder(tmp_path)
+    run.write_rows(all_rows())
+    digests = {"results.csv": digest_of_file(run.rows_path), "trajectories/gone.vtkhdf": "0"}
+    run.write_config(declaration(all_rows(), digests=digests))
+    assert read_run(run).changed == []
+    assert document(read_run(run), {}, [], [])["first"]["changed"] == ""
+    run.write_rows(all_rows()[:-1])
+    said = document(read_run(run), {}, [], [])["first"]["changed"]
+    assert said.startswith("Not as the run wrote them: results.csv.")
+
+
+def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, capsys):
+    run = RunFolder(tmp_path)
+    run.write_rows(all_rows())
+    run.config_path.write_text("{}", encoding="utf-8")
+    assert build.main([str(tmp_path)]) == 2
+    assert "run the benchmark again" in capsys.readouterr().err
+    run.write_config({"format": FORMAT})
+    lines = run.rows_path.read_text(encoding="utf-8").splitlines()
+    old = COLUMNS.index("garment")
+    run.rows_path.write_text("\n".join(",".join(line.split(",")[:old]) for line in lines), encoding="utf-8")
+    assert build.main([str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "run the benchmark again" in error and str(run.rows_path) in error
+
+
+def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
+    rows = [*all_rows(), row(SCENES[0], "snug", "sound/volume", 60.0, unit="dB")]
+    said = declaration(rows)
+    said["metrics"]["sound/volume"] |= {"table": "acoustics", "title": "Volume"}
+    rows.append(row(SCENES[0], "snug", "energy/heat", 5.0))
+    said["metrics"]["energy/heat"] = {
+        "unit": "J",
+        "title": "Heat",
+        "table": "energies",
+        "definition": "warmth",
+    }
+    found = make_tables(run_data(said, rows))
+    assert found["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1, 1)),)
+    found["acoustics"].write_csv(tmp_path)
+    assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"
+    (heat,) = (column for column in found["energies"].columns if column.name == "energy/heat")
+    assert (heat.title, heat.unit) == ("Heat", "J")
+
+
+def test_histories_come_from_the_models_headers(made, tmp_path):
+    history = training.read_history(made.models / "snug-seed0.safetensors", "snug")
+    assert history is not None and history.method == "snug" and history.panel == training.PANELS["J"]
+    assert history.column("loss").tolist() == [2.0, 1.0, 0.5]
+    assert (history.frames, history.best_step) == (90, 3)  # between the steps that were logged
+    for kind in ("supervised", "tailornet", "dynamic"):
+        write_model(tmp_path / kind, kind)
+    taught = [training.read_history(tmp_path / kind, kind) for kind in ("supervised", "tailornet", "dynamic")]
+    assert len({history.panel for history in taught}) == 3
+
+
+def test_the_command_answers_without_loading_anything_heavy():
+    probe = (
+        "import sys, reports.build\n"
+        "try:\n    reports.build.main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'pandas', 'scipy', 'matplotlib', 'torch', 'h5py', 'typst', 'pyvista'}\n"
+        "heavy |= {'reference_sim', 'snug.body.parametric_body'}\n"
+        "sys.exit(bool(heavy & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=60).returncode == 0

@@ -1,0 +1,161 @@
+"""Bodies that are not the package's, made by code from it: other mesh, layout, pose and shape."""
+
+import dataclasses
+import functools
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import igl
+import numpy as np
+
+from benchmarks.assets.assets import Assets, embedded_motions
+from benchmarks.scenes import of_garment
+from reference_sim import Trajectory, simulate
+from snug.body.parametric_body import Body
+from snug.body.skeleton import JOINT, PARENTS
+from snug.garments.garment import Garment
+
+SMPL_FACES = 13776  # 6890 vertices
+
+
+def reshaped(body: Body, scale: Any = 1.0, **betas: float) -> Body:
+    """The body with shape coefficients, beta_0=2.5, as its mean; then stretched by `scale`, one or (3,)."""
+    shape = np.zeros(body.shape_count)
+    for name, value in betas.items():
+        shape[int(name.removeprefix("beta_"))] = value
+    return dataclasses.replace(
+        body, template=body.shaped(shape) * scale, joint_template=body.joints(shape) * scale
+    )
+
+
+def other_mesh(body: Body, faces: int = SMPL_FACES) -> Body:
+    """Edges collapsed to so many faces; weights and shapes from the closest points of the body."""
+    points, triangles, *_ = igl.decimate(body.template, body.faces.astype(np.int64), faces)
+    _, nearest, closest = igl.point_mesh_squared_distance(points, body.template, body.faces.astype(np.int64))
+    corners = body.faces[nearest]
+    shares = igl.barycentric_coordinates(closest, *(body.template[corners[:, k]] for k in range(3)))
+    shares = np.clip(shares, 0.0, None)
+    shares /= shares.sum(axis=1, keepdims=True)
+
+    def carried(values: np.ndarray) -> np.ndarray:
+        return np.einsum("vk,vk...->v...", shares, values[corners])
+
+    return dataclasses.replace(
+        body,
+        template=points,
+        shape_directions=carried(body.shape_directions),
+        skinning_weights=carried(body.skinning_weights),
+        faces=triangles.astype(np.int64),
+    )
+
+
+def smpl_arrays(body: Body) -> dict[str, np.ndarray]:
+    """In SMPL's layout, with a regressor that gives the body's joints exactly."""
+    known = np.concatenate([body.template[..., None], body.shape_directions], axis=2)
+    joints = np.concatenate([body.joint_template[..., None], body.joint_directions], axis=2)
+    regressor = np.linalg.lstsq(
+        known.reshape(len(body.template), -1).T, joints.reshape(24, -1).T, rcond=None
+    )[0].T
+    table = np.stack([np.array(PARENTS), np.arange(24)]).astype(np.uint32)  # the root's -1 is 2^32 - 1
+    return {
+        "v_template": body.template,
+        "shapedirs": body.shape_directions,
+        "J_regressor": regressor,
+        "weights": body.skinning_weights,
+        "kintree_table": table,
+        "f": body.faces.astype(np.uint32),
+    }
+
+
+def with_hands(arrays: dict[str, np.ndarray], face: bool) -> dict[str, np.ndarray]:
+    """SMPL-H's layout, 52 joints, or with jaw and eyes SMPL-X's, 55: weights of hand and head are shared out.
+
+    Five fingers of three joints hang on each wrist; their knuckles' mean is SMPL's joint of the hand.
+    """
+    regressor, weights = arrays["J_regressor"], arrays["weights"]
+    parents = list(PARENTS[:22])
+    joints, shares = list(regressor[:22]), [*weights[:, :22].T]
+    if face:
+        head = shares[15] / 4
+        shares[15] = head
+        parents += [15, 15, 15]
+        joints += [regressor[15]] * 3
+        shares += [head] * 3
+    for wrist, hand in ((20, 22), (21, 23)):
+        for finger in range(5):
+            first = len(parents)
+            parents += [wrist, first, first + 1]
+            aside = (finger - 2) * 0.1 * (regressor[hand] - regressor[wrist])
+            joints += [
+                regressor[hand] + aside + k * 0.1 * (regressor[hand] - regressor[wrist]) for k in range(3)
+            ]
+            shares += [weights[:, hand] / 15] * 3
+    table = np.stack([np.array(parents), np.arange(len(parents))]).astype(np.uint32)
+    return {**arrays, "J_regressor": np.stack(joints), "weights": np.stack(shares, 1), "kintree_table": table}
+
+
+def lowered(body: Body, degrees: float) -> Body:
+    """In an A pose, by skinning: template and joints with both arms lowered. Its shapes are left out."""
+    poses = np.zeros((1, 24, 3))
+    poses[0, JOINT["left_shoulder"], 2] = -np.radians(degrees)
+    poses[0, JOINT["right_shoulder"], 2] = np.radians(degrees)
+    still = np.zeros((1, 3))
+    transforms = body.transforms(poses, still)[0]
+    joints = np.einsum("jab,jb->ja", transforms[:, :, :3], body.joint_template) + transforms[:, :, 3]
+    return dataclasses.replace(
+        body,
+        template=body.vertices(poses, still)[0],
+        joint_template=joints,
+        shape_directions=body.shape_directions[..., :0],
+        joint_directions=body.joint_directions[..., :0],
+    )
+
+
+def plain_arrays(body: Body) -> dict[str, np.ndarray]:
+    """Without shapes, under plain names."""
+    return {
+        "vertices": body.template,
+        "faces": body.faces,
+        "blend_weights": body.skinning_weights,
+        "joints": body.joint_template,
+        "parents": body.parents,
+        "rest_pose": np.zeros((24, 3)),
+    }
+
+
+def read_again(arrays: dict[str, np.ndarray]) -> Body:
+    """As a user's file gives it."""
+    with tempfile.TemporaryDirectory() as folder:
+        np.savez(Path(folder) / "body.npz", **arrays)
+        return Body.from_file(Path(folder) / "body.npz")
+
+
+@functools.cache
+def _another() -> Body:
+    return other_mesh(Body.load())
+
+
+BODIES: Mapping[str, Callable[[], Body]] = {
+    "package": Body.load,
+    "other_mesh": lambda: read_again(with_hands(smpl_arrays(_another()), face=True)),
+    "a_pose": lambda: read_again(plain_arrays(lowered(_another(), 40.0))),
+    "heavy": lambda: reshaped(Body.load(), beta_1=2.5),
+    "slim": lambda: reshaped(Body.load(), beta_1=-2.5),
+    "third_shape": lambda: reshaped(Body.load(), beta_2=2.5),
+    "child": lambda: reshaped(Body.load(), (0.7, 0.63, 0.7)),
+}
+
+
+def simulate_walk(garment: Garment, body: Body, frames: int = 30) -> Trajectory:
+    """The garment, settled on the body, in the first frames of a walk."""
+    motion = embedded_motions(["walk"])[0].cut(0, frames)
+    assets = Assets(body, {garment.name: garment}, {motion.name: motion}, {})
+    scene = dataclasses.replace(
+        of_garment(garment.name).scene("walk"), sizes=(), options={"settle_frames": 30, "warm_up_frames": 0}
+    ).build(assets)
+    return simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
+        start=scene.start, velocity=scene.start_velocity, pin_positions=scene.pin_positions,
+    )  # fmt: skip

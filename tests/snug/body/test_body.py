@@ -1,0 +1,392 @@
+"""The baked body is a closed adult that poses as SMPL does; a user's file is read or refused in one line."""
+
+import dataclasses
+import pickle
+import time
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_matrix
+from scipy.spatial.transform import Rotation
+
+from snug.body.bake import merge_weights, to_t_pose
+from snug.body.parametric_body import Body
+from snug.body.skeleton import JOINT_NAMES, BodyError
+from tests.snug.body.other_bodies import lowered, other_mesh, plain_arrays, smpl_arrays, with_hands
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Body.load()
+
+
+def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def joint(name: str) -> int:
+    return JOINT_NAMES.index(name)
+
+
+def test_surface_is_closed_and_without_handles(body):
+    edges = np.concatenate([body.faces[:, [0, 1]], body.faces[:, [1, 2]], body.faces[:, [2, 0]]])
+    assert len(np.unique(edges, axis=0)) == len(edges)  # each edge once in each direction: one winding
+    undirected, counts = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    assert np.all(counts == 2)
+    assert len(body.template) - len(undirected) + len(body.faces) == 2  # Euler: one sphere
+    assert len(np.unique(body.faces)) == len(body.template)
+
+
+def test_template_is_an_adult(body):
+    assert 1.5 < body.height < 1.9
+    assert 0.050 < volume(body.template, body.faces) < 0.100
+    assert abs(body.template[:, 1].min()) < 0.002  # stands on y = 0
+    assert np.abs(body.joint_template[0, [0, 2]]).max() < 1e-6
+
+
+def test_weights_are_sparse_and_sum_to_one(body):
+    assert body.skinning_weights.min() >= 0.0
+    np.testing.assert_allclose(body.skinning_weights.sum(axis=1), 1.0, atol=1e-12)
+    assert (body.skinning_weights > 0).sum(axis=1).max() <= 8
+
+
+def test_t_pose_faces_z_with_the_left_arm_along_x(body):
+    at = {name: body.joint_template[index] for index, name in enumerate(JOINT_NAMES)}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        arm = at[f"{side}_wrist"] - at[f"{side}_shoulder"]
+        np.testing.assert_allclose(arm / np.linalg.norm(arm), [sign, 0.0, 0.0], atol=1e-4)
+        assert at[f"{side}_foot"][2] - at[f"{side}_ankle"][2] > 0.05  # toes forward
+        assert at[f"{side}_hip"][0] * sign > 0.05
+    heights = [at[name][1] for name in ("left_ankle", "left_knee", "pelvis", "spine2", "neck", "head")]
+    assert np.all(np.diff(heights) > 0)
+    mirrored = body.joint_template[[joint(n.replace("left", "right")) for n in JOINT_NAMES if "left" in n]]
+    own = body.joint_template[[joint(n) for n in JOINT_NAMES if "left" in n]]
+    np.testing.assert_allclose(mirrored * [-1, 1, 1], own, atol=1e-3)
+
+
+def test_parents_are_those_of_smpl(body):
+    expected = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21]
+    assert body.parents.tolist() == expected
+
+
+def test_shapes_start_at_the_template_and_the_first_one_is_height(body):
+    np.testing.assert_array_equal(body.shaped(np.zeros(10)), body.template)
+    np.testing.assert_array_equal(body.joints(np.zeros(10)), body.joint_template)
+    tall = np.eye(10)[0]
+    gain = np.ptp(body.shaped(tall)[:, 1]) - np.ptp(body.shaped(-tall)[:, 1])
+    assert 0.10 < gain < 0.30  # two standard deviations of the height of adults of both sexes
+    fat = np.eye(10)[1]
+    change = volume(body.shaped(fat), body.faces) / volume(body.shaped(-fat), body.faces)
+    assert change > 1.1 and abs(np.ptp(body.shaped(fat)[:, 1]) - np.ptp(body.shaped(-fat)[:, 1])) < 0.03
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_joints_stay_inside_every_body(body, seed):
+    from igl import fast_winding_number
+
+    betas = np.random.default_rng(seed).normal(size=10)
+    inside = fast_winding_number(body.shaped(betas), body.faces, body.joints(betas))
+    assert inside.min() > 0.5, [JOINT_NAMES[j] for j in np.flatnonzero(inside < 0.5)]
+
+
+def test_identity_pose_is_the_shaped_body(body):
+    betas = np.linspace(-1.0, 1.0, 10)
+    shift = np.array([0.1, 0.2, 0.3])
+    posed = body.vertices(np.zeros((2, 24, 3)), np.stack([0 * shift, shift]), betas)
+    np.testing.assert_allclose(posed[0], body.shaped(betas), atol=1e-13)
+    np.testing.assert_allclose(posed[1], body.shaped(betas) + shift, atol=1e-13)
+
+
+def test_the_root_moves_everything_rigidly_about_the_pelvis(body):
+    poses = np.random.default_rng(0).normal(scale=0.4, size=(1, 24, 3))
+    poses[:, 0] = 0.0
+    turned = poses.copy()
+    turned[:, 0] = [0.4, -1.9, 0.7]
+    shift = np.array([[0.3, -0.2, 1.0]])
+    pelvis = body.joint_template[0]
+    turn = Rotation.from_rotvec(turned[0, 0]).as_matrix()
+    expected = (body.vertices(poses, 0 * shift)[0] - pelvis) @ turn.T + pelvis + shift
+    np.testing.assert_allclose(body.vertices(turned, shift)[0], expected, atol=1e-12)
+
+
+def test_vertices_agree_with_the_skinning_used_in_training(body):
+    import torch
+
+    from snug.body.skinning import joint_transforms, skin
+
+    random = np.random.default_rng(1)
+    poses, shifts = random.normal(scale=0.5, size=(70, 24, 3)), random.normal(size=(70, 3))
+    betas = random.normal(size=10)
+    transforms = joint_transforms(
+        torch.from_numpy(Rotation.from_rotvec(poses.reshape(-1, 3)).as_matrix()).reshape(*poses.shape, 3),
+        torch.from_numpy(body.joints(betas)),
+        body.parents.tolist(),
+        torch.from_numpy(shifts),
+    )
+    some = slice(0, None, 97)
+    expected = skin(
+        torch.from_numpy(body.shaped(betas)[some]), torch.from_numpy(body.skinning_weights[some]), transforms
+    )
+    np.testing.assert_allclose(body.vertices(poses, shifts, betas)[:, some], expected.numpy(), atol=1e-12)
+
+
+def test_a_body_posed_frame_after_frame_is_the_same(body):
+    rng = np.random.default_rng(4)
+    poses, translations = rng.normal(0, 0.5, (5, 24, 3)), rng.normal(0, 1, (5, 3))
+    for betas in (None, rng.normal(0, 1, body.shape_count)):
+        whole, pose = body.vertices(poses, translations, betas), body.poser(betas)
+        for frame in (3, 0):
+            one = pose(poses[frame : frame + 1], translations[frame : frame + 1])
+            assert np.abs(one - whole[frame]).max() < 1e-12
+
+
+def test_elbow_and_knee_bend_their_own_side(body):
+    """An elbow turned by -90 degrees about y points forward; a knee by +90 about x puts the foot behind."""
+    poses = np.zeros((1, 24, 3))
+    poses[0, joint("left_elbow"), 1] = -np.pi / 2
+    poses[0, joint("left_knee"), 0] = np.pi / 2
+    posed = body.vertices(poses, np.zeros((1, 3)))[0]
+    moving = [joint(f"left_{name}") for name in ("elbow", "wrist", "hand", "knee", "ankle", "foot")]
+    still = body.skinning_weights[:, moving].sum(axis=1) == 0
+    assert 1000 < still.sum() < len(still) - 1000
+    np.testing.assert_allclose(posed[still], body.template[still], atol=1e-13)
+    hand = body.skinning_weights[:, joint("left_hand")] > 0.9
+    foot = body.skinning_weights[:, joint("left_foot")] > 0.9
+    elbow, knee = body.joint_template[joint("left_elbow")], body.joint_template[joint("left_knee")]
+    assert np.all(posed[hand, 2] > elbow[2] + 0.15) and np.abs(posed[hand, 0] - elbow[0]).max() < 0.15
+    assert np.all(posed[foot, 2] < knee[2] - 0.3)
+
+
+def test_baking_undoes_an_a_pose_made_by_skinning(body):
+    """Lower the arms and bend the elbows: the step of the bake to the T-pose gives the body back."""
+    poses = np.zeros((1, 24, 3))
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        poses[0, joint(f"{side}_shoulder"), 2] = -0.8 * sign
+        poses[0, joint(f"{side}_elbow"), 1] = -0.6 * sign
+    transforms = body.transforms(poses, np.zeros((1, 3)))[0]
+    joints = np.einsum("jab,jb->ja", transforms[:, :, :3], body.joint_template) + transforms[:, :, 3]
+    vertices, rest = to_t_pose(body.vertices(poses, np.zeros((1, 3)))[0], joints, body.skinning_weights)
+    ground = [0.0, body.template[:, 1].min(), 0.0]  # the bake puts the soles on y = 0 (float32 in the file)
+    np.testing.assert_allclose(vertices, body.template - ground, atol=1e-6)
+    np.testing.assert_allclose(rest, body.joint_template - ground, atol=1e-6)
+
+
+def test_bones_without_a_joint_give_their_weights_to_the_parent():
+    labels, parents = ["Hips", "LHipJoint", "LeftUpLeg", "Toe", "Nail"], [-1, 0, 1, 2, 3]
+    merged = merge_weights(np.array([[0.1, 0.2, 0.3, 0.1, 0.3]]), labels, parents)
+    np.testing.assert_allclose(merged[0, :3], [0.3, 0.7, 0.0])
+
+
+def test_lowered_arms_keep_the_volume(body):
+    poses = np.zeros((1, 24, 3))
+    poses[0, joint("left_shoulder"), 2], poses[0, joint("right_shoulder"), 2] = -1.2, 1.2
+    lowered = volume(body.vertices(poses, np.zeros((1, 3)))[0], body.faces)
+    assert lowered == pytest.approx(volume(body.template, body.faces), rel=0.02)
+
+
+def test_a_motion_of_75_frames_takes_less_than_a_second(body):
+    poses = np.random.default_rng(0).normal(scale=0.3, size=(75, 24, 3))
+    body.vertices(poses[:1], np.zeros((1, 3)))
+    start = time.process_time()
+    body.vertices(poses, np.zeros((75, 3)))
+    assert time.process_time() - start < 1.0  # measured 0.03 s on one core
+
+
+@pytest.mark.parametrize(
+    ("poses", "translations", "betas"),
+    [
+        (np.zeros((2, 22, 3)), np.zeros((2, 3)), None),
+        (np.zeros((2, 24, 3)), np.zeros((3, 3)), None),
+        (np.full((2, 24, 3), np.nan), np.zeros((2, 3)), None),
+        (np.zeros((2, 24, 3)), np.zeros((2, 3)), np.zeros(3)),
+        (np.zeros((2, 24, 3)), np.zeros((2, 3)), np.full(10, np.inf)),
+    ],
+)
+def test_wrong_arguments_are_refused(body, poses, translations, betas):
+    with pytest.raises(BodyError):
+        body.vertices(poses, translations, betas)
+
+
+@pytest.fixture(scope="module")
+def small(body):
+    """Another mesh, of 1000 vertices."""
+    return other_mesh(body, 1996)
+
+
+@pytest.fixture(scope="module")
+def layouts(small):
+    """What users have: of the family's three sizes, plain, in an A pose, as written by the package itself."""
+    smpl = smpl_arrays(small)
+    return {
+        "SMPL": smpl,
+        "SMPL-H": with_hands(smpl, face=False),
+        "SMPL-X": with_hands(smpl, face=True),
+        "A pose": plain_arrays(lowered(small, 40.0)),
+        "plain": plain_arrays(small),
+    }
+
+
+def saved(path, arrays):
+    if path.suffix == ".pkl":
+        sparse = {k: csc_matrix(v) if k == "J_regressor" else v for k, v in arrays.items()}
+        path.write_bytes(pickle.dumps(sparse, protocol=2))
+    else:
+        np.savez(path, **arrays)
+    return path
+
+
+@pytest.mark.parametrize("ending", [".npz", ".pkl"])
+@pytest.mark.parametrize("layout", ["SMPL", "SMPL-H", "SMPL-X", "A pose", "plain"])
+def test_every_layout_gives_the_same_body(small, layouts, layout, ending, tmp_path):
+    user = Body.from_file(saved(tmp_path / f"user{ending}", layouts[layout]))
+    np.testing.assert_allclose(user.template, small.template, atol=1e-12)
+    np.testing.assert_allclose(user.joint_template, small.joint_template, atol=1e-12)
+    np.testing.assert_allclose(user.skinning_weights, small.skinning_weights, atol=1e-12)
+    np.testing.assert_array_equal(user.faces, small.faces)
+    assert user.parents.tolist() == small.parents.tolist()
+    if layout.startswith("SMPL"):
+        betas = np.linspace(-1.0, 1.0, 10)
+        np.testing.assert_allclose(user.joints(betas), small.joints(betas), atol=1e-12)
+        np.testing.assert_allclose(user.shaped(betas), small.shaped(betas), atol=1e-12)
+    else:
+        assert user.shape_count == 0
+
+
+def test_shapes_of_an_a_pose_are_lifted_with_it(small, tmp_path):
+    """The person of a shape, in the A pose, has a T pose that skinning takes back to it."""
+    betas = np.array([1.0, -0.7, 0.4])
+    low = lowered(small, 40.0)
+    shapes = {"shapedirs": 0.02 * np.random.default_rng(0).normal(size=(*small.template.shape, 3))}
+    shapes["J_shapedirs"] = 0.01 * np.random.default_rng(1).normal(size=(24, 3, 3))
+    shapes["J_shapedirs"][:, 0] = 0.0
+    user = Body.from_file(saved(tmp_path / "a.npz", plain_arrays(low) | shapes))
+    poses = np.zeros((1, 24, 3))
+    poses[0, [joint("left_shoulder"), joint("right_shoulder")], 2] = np.radians([-40.0, 40.0])
+    shift = (low.joint_template[0] - user.joint_template[0])[None]
+    back = user.vertices(poses, shift, betas)[0]
+    np.testing.assert_allclose(back, low.template + shapes["shapedirs"] @ betas, atol=1e-12)
+
+
+def test_pose_correctives_are_what_smpl_says(small, layouts, tmp_path):
+    """Rest pose: none. Posed: the rest shape that is skinned has moved by posedirs (R - I)."""
+    posedirs = 0.003 * np.random.default_rng(0).normal(size=(len(small.template), 3, 207))
+    user = Body.from_file(saved(tmp_path / "a.npz", layouts["SMPL"] | {"posedirs": posedirs}))
+    still = np.zeros((1, 24, 3)), np.zeros((1, 3))
+    np.testing.assert_allclose(user.vertices(*still)[0], small.template, atol=1e-12)
+    poses = np.random.default_rng(1).normal(scale=0.5, size=(2, 24, 3))
+    turns = Rotation.from_rotvec(poses[:, 1:].reshape(-1, 3)).as_matrix().reshape(2, 23, 3, 3)
+    betas = np.linspace(-1.0, 1.0, 10)
+    posed = user.vertices(poses, np.zeros((2, 3)), betas)
+    for frame in range(2):
+        moved = posedirs @ (turns[frame] - np.eye(3)).ravel()
+        corrected = dataclasses.replace(small, template=small.template + moved)
+        expected = corrected.vertices(poses[frame : frame + 1], np.zeros((1, 3)), betas)[0]
+        np.testing.assert_allclose(posed[frame], expected, atol=1e-12)
+    assert np.abs(posed - small.vertices(poses, np.zeros((2, 3)), betas)).max() > 0.01
+
+
+def test_training_poses_the_body_with_its_correctives(small, tmp_path):
+    import torch
+
+    from snug.body.skinning import corrected, skin
+
+    posedirs = 0.003 * np.random.default_rng(0).normal(size=(len(small.template), 3, 189))
+    user = dataclasses.replace(small, pose_directions=posedirs)
+    poses = np.random.default_rng(1).normal(scale=0.5, size=(2, 24, 3))
+    transforms = torch.as_tensor(user.transforms(poses, np.zeros((2, 3))))
+    rest, weights = (torch.as_tensor(a) for a in (user.template, user.skinning_weights))
+    rest = corrected(rest, torch.as_tensor(posedirs), transforms, user.parents.tolist())
+    posed = skin(rest, weights, transforms).numpy()
+    np.testing.assert_allclose(posed, user.vertices(poses, np.zeros((2, 3))), atol=1e-12)
+
+
+def test_correctives_of_fingers_are_left_out(layouts, small, tmp_path):
+    posedirs = np.zeros((len(small.template), 3, 459))
+    posedirs[:, 0] = np.arange(459)
+    user = Body.from_file(saved(tmp_path / "a.npz", layouts["SMPL-H"] | {"posedirs": posedirs}))
+    assert user.pose_directions[0, 0].tolist() == list(range(189))
+
+
+def test_the_eyes_of_a_head_are_closed(small, layouts, tmp_path):
+    sides = np.linalg.norm(np.diff(small.template[small.faces[:, [0, 1, 2, 0]]], axis=1), axis=2).sum(axis=1)
+    reach = np.bincount(small.faces.ravel(), np.repeat(sides, 3))
+    around = (small.faces == np.argmin(reach)).any(axis=1)
+    user = Body.from_file(saved(tmp_path / "a.npz", layouts["SMPL"] | {"f": small.faces[~around]}))
+    assert volume(user.template, user.faces) == pytest.approx(volume(small.template, small.faces), rel=0.01)
+    edges = np.sort(user.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2)
+
+
+def test_quadrilaterals_become_triangles(small, layouts, tmp_path):
+    doubled = small.faces[:, [0, 1, 2, 2]]  # each falls into the triangle and one without area
+    with pytest.raises(BodyError, match="closed surface"):
+        Body.from_file(saved(tmp_path / "a.npz", layouts["SMPL"] | {"f": doubled}))
+
+
+def changed(key, change):
+    def of(arrays):
+        array = np.array(arrays[key])
+        return {**arrays, key: change(array)}
+
+    return of
+
+
+def moved_joint(regressor):
+    regressor[18] *= 1e6
+    return regressor
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda a: {k: v for k, v in a.items() if k != "weights"}, "no array weights or blend_weights"),
+        (changed("weights", lambda w: w[:, :22]), "expected numbers of shape (1000, 24)"),
+        (changed("weights", lambda w: 2 * w), "sum to one"),
+        (changed("v_template", lambda v: v * np.nan), "not finite"),
+        (changed("v_template", lambda v: v * 1000), "in metres"),
+        (changed("v_template", lambda v: v * [1000, 1, 1]), "in metres"),
+        (changed("v_template", lambda v: v[:, [0, 2, 1]] * [1, 1, -1]), "in metres"),
+        (changed("v_template", lambda v: v * [-1, 1, -1]), "face +z"),
+        (changed("v_template", lambda v: v + np.array([0.5, 0, 0])), "beside x = 0"),
+        (changed("shapedirs", lambda s: s[:3]), "shapedirs"),
+        (lambda a: {k: v for k, v in a.items() if k != "J_regressor"}, "no joints"),
+        (lambda a: a | {"J_regressor": np.array([{"sparse": 1}], dtype=object)}, "plain arrays"),
+        (changed("J_regressor", moved_joint), "left_elbow"),
+        (changed("kintree_table", lambda t: np.full((2, 24), 30)), "hangs on 30"),
+        (changed("kintree_table", lambda t: t[:, :23]), "(2, 23)"),
+        (lambda a: a | {"f": a["f"][a["v_template"][a["f"], 1].min(axis=1) > 0.12]}, "a hole at vertex"),
+        (changed("f", lambda f: f[:, ::-1]), "inwards"),
+        (changed("f", lambda f: f + 1), "vertex 1000"),
+        (lambda a: a | {"rest_pose": np.full((24, 3), 0.2)}, "rest_pose"),
+        (lambda a: a | {"posedirs": np.zeros((1000, 3, 93))}, "posedirs"),
+    ],
+    ids=range(20),
+)  # fmt: skip
+def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
+    path = saved(tmp_path / "broken.npz", change(layouts["SMPL"]))
+    with pytest.raises(BodyError) as caught:
+        Body.from_file(path)
+    message = str(caught.value)
+    assert says in message and str(path) in message and "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("degrees", "arrays", "says"),
+    [(75.0, {}, "to 60"), (40.0, {"posedirs": np.zeros((1000, 3, 207))}, "leave them out")],
+)
+def test_arms_that_hang_too_low_are_refused(small, tmp_path, degrees, arrays, says):
+    path = saved(tmp_path / "low.npz", plain_arrays(lowered(small, degrees)) | arrays)
+    with pytest.raises(BodyError, match=says):
+        Body.from_file(path)
+
+
+@pytest.mark.parametrize("ending", [".npz", ".pkl"])
+@pytest.mark.parametrize("content", [None, b"", b"not a zip", b"PK\x03\x04 cut", b"\x93NUMPY\x01\x00", b"N."])
+def test_a_file_that_is_no_body_is_refused_in_one_line(tmp_path, content, ending):
+    path = tmp_path / f"body{ending}"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BodyError) as caught:
+        Body.from_file(path)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)

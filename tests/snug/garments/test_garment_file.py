@@ -1,0 +1,370 @@
+"""Garments of other people: what comes out of their files, and what is said of those that cannot be used."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from benchmarks import run as run_command
+from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import make_parser
+from benchmarks.plan.plan import PlanError
+from benchmarks.presets import find_preset
+from benchmarks.runner.schedule import Schedule
+from reference_sim.energies import BendHinge, StretchStVK
+from reference_sim.material import Material
+from snug import check
+from snug import train as train_command
+from snug.body.parametric_body import Body
+from snug.garments.fit import file_pose
+from snug.garments.garment import GarmentError
+from snug.garments.options import GarmentFile, add_garment_options, demand_a_file, garment_file
+from snug.garments.reading import read_garment
+from snug.garments.templates import tailor_skirt, tailor_tshirt
+from snug.motion.motion import Motion
+from snug.networks.dressed_body import DressedBody
+from snug.training import train as training
+from tests.snug.body.other_bodies import lowered, plain_arrays, read_again
+from tests.snug.garments.garment_files import doubled_along, own_chart, write_obj, z_up
+from tests.snug.training.dressing import tube_dress
+
+
+@pytest.fixture(scope="session")
+def body():
+    return Body.load()
+
+
+@pytest.fixture(scope="session")
+def shirt(body):
+    return tailor_tshirt(body, vertices=300)
+
+
+@pytest.fixture(scope="session")
+def tube():
+    """150 vertices, made in milliseconds."""
+    return tube_dress().garment
+
+
+def saved(tmp_path, garment, *, positions=None, faces=None, uv=None, name="mine.obj"):
+    positions = garment.rest_positions if positions is None else positions
+    return write_obj(tmp_path / name, positions, garment.faces if faces is None else faces, uv)
+
+
+def energies(garment):
+    """Of a garment that is a little out of shape."""
+    cloth = garment.cloth()
+    x = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.003, cloth.rest_positions.shape)
+    return [term(cloth).value_and_gradient(x)[0] for term in (StretchStVK, BendHinge)]
+
+
+# --- what is read ----------------------------------------------------------------------------------------
+
+
+def test_the_tshirt_written_and_read_is_the_tshirt(tmp_path, body, shirt):
+    read = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
+    np.testing.assert_array_equal(read.rest_positions, shirt.rest_positions)
+    np.testing.assert_array_equal(read.faces, shirt.faces)
+    assert read.loops.keys() == shirt.loops.keys() and read.name == "mine" and not len(read.pins)
+    for name, loop in shirt.loops.items():
+        np.testing.assert_array_equal(read.loops[name], loop)
+    assert energies(read) == energies(shirt)
+    # Its weights are blended over the face below, so near those of the nearest vertex.
+    np.testing.assert_allclose(read.skinning_weights.sum(axis=1), 1.0)
+    assert np.abs(read.skinning_weights - shirt.skinning_weights).sum(axis=1).mean() < 0.1
+
+
+def test_a_chart_with_seams_is_its_rest_shape_and_gives_the_same_energies(tmp_path, body, shirt):
+    uv = own_chart(shirt.rest_positions, shirt.faces)
+    path = saved(tmp_path, shirt, uv=uv)
+    read = read_garment(GarmentFile(path=path, rest="uv"), body)
+    np.testing.assert_array_equal(read.rest_uv, uv)
+    assert energies(read) == pytest.approx(energies(shirt), rel=1e-12)
+    assert read_garment(GarmentFile(path=path), body).rest_uv is None
+
+
+@pytest.mark.parametrize(("units", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254)])
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_units_and_axes_give_the_same_garment(tmp_path, body, tube, units, metres, up):
+    positions = tube.rest_positions / metres
+    path = saved(tmp_path, tube, positions=z_up(positions) if up == "z" else positions)
+    read = read_garment(GarmentFile(path=path, units=units, up=up), body)
+    np.testing.assert_allclose(read.rest_positions, tube.rest_positions, rtol=0, atol=1e-12)
+
+
+def test_a_garment_that_is_inside_out_is_turned_with_its_chart(tmp_path, body, tube):
+    turned = tube.faces[:, ::-1]
+    uv = own_chart(tube.rest_positions, turned)
+    read = read_garment(GarmentFile(path=saved(tmp_path, tube, faces=turned, uv=uv), rest="uv"), body)
+    np.testing.assert_array_equal(read.faces, tube.faces)
+    assert energies(read) == pytest.approx(energies(tube), rel=1e-12)
+
+
+def test_doubled_vertices_are_joined_and_weights_are_those_of_the_file(tmp_path, body, tube):
+    front = np.flatnonzero(np.abs(tube.rest_positions[:, 0]) < 1e-3)
+    twice, split = doubled_along(tube.rest_positions, tube.faces, front)
+    weights = np.random.default_rng(0).dirichlet(np.ones(24), len(twice))
+    path = saved(tmp_path, tube, positions=twice, faces=split)
+    np.savez(tmp_path / "mine.weights.npz", weights=weights)
+    file = GarmentFile(path=path)
+    read = read_garment(file, body)
+    np.testing.assert_array_equal(read.faces, tube.faces)
+    assert len(file.files) == 2 and read.authored_weights and len(front)
+    dressed = DressedBody(body, read)
+    for smoothing in (0, 20):
+        np.testing.assert_allclose(dressed.weights(smoothing), weights[: len(tube.rest_positions)], atol=1e-7)
+
+
+def test_borrowed_weights_are_smoothed_as_a_recipe_says(tmp_path, body, tube):
+    dressed = DressedBody(body, read_garment(GarmentFile(path=saved(tmp_path, tube)), body))
+    assert not np.allclose(dressed.weights(0), dressed.weights(20), atol=1e-3)
+
+
+def test_a_garment_follows_the_limbs_that_it_encloses_and_no_other(tmp_path, body, shirt):
+    names = np.array(body.joint_names)
+    own = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
+    strongest = set(names[np.unique(own.skinning_weights.argmax(axis=1))])
+    assert strongest <= {"pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip", "left_collar",
+                         "right_collar", "left_shoulder", "right_shoulder"}  # fmt: skip
+    assert {"spine3", "left_shoulder", "right_shoulder"} <= strongest
+
+
+def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
+    skirt = tailor_skirt(body, vertices=300)
+    read = read_garment(GarmentFile(path=saved(tmp_path, skirt)), body)
+    assert set(read.loops) == {"waist", "hem"}
+    np.testing.assert_array_equal(read.pins, skirt.pins)
+    middle = np.abs(read.rest_positions[read.hem, 0]) < 0.02
+    left, right = (read.skinning_weights[read.hem][middle, body.joint_names.index(f"{side}_hip")]
+                   for side in ("left", "right"))  # fmt: skip
+    assert np.abs(left - right).max() < 0.2 and min(left.min(), right.min()) > 0.2
+
+
+def test_a_garment_made_for_lowered_arms_is_brought_to_the_t_pose_with_its_rest_shape(tmp_path, body, shirt):
+    filed = lowered(body, 40.0)
+    read_body = read_again(plain_arrays(filed))
+    pose = file_pose(read_body)[None]
+    hanging = Motion("file", np.repeat(pose, 2, axis=0), np.zeros((2, 3)), fps=30.0)
+    made = DressedBody(read_body, shirt).skinned(hanging, smoothing=20)[0]
+    read = read_garment(GarmentFile(path=saved(tmp_path, shirt, positions=made)), read_body)
+    assert read.loops.keys() == shirt.loops.keys()
+    # Skinned into the pose of the file it is what was made, and that is where it has no strain.
+    back = DressedBody(read_body, read).skinned(hanging, smoothing=20)[0]
+    np.testing.assert_allclose(back, made, atol=1e-5)
+    assert StretchStVK(read.cloth()).value_and_gradient(made)[0] < 1e-12
+    np.testing.assert_allclose(read.rest_positions, shirt.rest_positions, atol=0.03)
+
+
+def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
+    (tmp_path / "silk.toml").write_text("young_modulus = 5e4\nbending_stiffness = 1e-6\n")
+    file = GarmentFile(path=saved(tmp_path, tube), material=tmp_path / "silk.toml")
+    preset = replace(find_preset("smoke"), frames=8, clip_frames=4)
+    assets = open_assets(preset, embedded_motions(["walk"]), ["mine"], own=file)
+    silk = Material(young_modulus=5e4, bending_stiffness=1e-6)
+    scene = file_scene(file).at(preset).build(assets)
+    assert scene.cloth.material == DressedBody(body, assets.garments["mine"]).cloth.material == silk
+    assert {type(term).__name__: term.cloth.material for term in scene.energies}["StretchStVK"] == silk
+
+
+def file_scene(file):
+    from benchmarks.plan.plan import OwnGarment
+
+    return OwnGarment(file, ()).scenes.scene("walk")
+
+
+# --- what is refused --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda x: 100 * x, "--garment-units cm"),
+        (z_up, "--garment-up z"),
+        (lambda x: z_up(x) / 0.0254, "--garment-units in --garment-up z"),
+    ],
+)
+def test_another_unit_or_axis_is_found(tmp_path, body, shirt, spoil, words):
+    path = saved(tmp_path, shirt, positions=spoil(shirt.rest_positions))
+    with pytest.raises(GarmentError, match=rf"{path}: does not lie on the body .*: {words}$"):
+        read_garment(GarmentFile(path=path), body)
+
+
+@pytest.mark.parametrize("away", [(0.03, -0.1, 0.02), (0.0, -0.95, 0.0)])
+def test_the_shift_that_is_said_mends_a_displaced_garment(tmp_path, body, shirt, away):
+    path = saved(tmp_path, shirt, positions=shirt.rest_positions + away)
+    with pytest.raises(GarmentError, match=r"mm deep in the body|fits far better") as refused:
+        read_garment(GarmentFile(path=path), body)
+    shift = tuple(map(float, str(refused.value).rpartition("--garment-shift=")[2].split(",")))
+    np.testing.assert_allclose(np.add(shift, away), 0.0, atol=0.02)
+    read_garment(GarmentFile(path=path, shift=shift), body)
+
+
+def closed(tube):
+    """The tube with a lid on either end."""
+    lids = [np.array([[loop[0], loop[k + 1], loop[k]] for k in range(1, len(loop) - 1)])
+            for loop in (np.arange(15), np.arange(149, 134, -1))]  # fmt: skip
+    return np.concatenate([tube.faces, *lids])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda t: np.concatenate([t.faces, t.faces[5:6]]), "triangles 5 and 270 are the same: remove one"),
+        (lambda t: np.where(np.arange(len(t.faces))[:, None] == 9, t.faces[:, ::-1], t.faces), "same way"),
+        (closed, "none: the surface is closed"),
+    ],
+)
+def test_a_mesh_that_cannot_be_simulated_is_named(tmp_path, body, tube, spoil, words):
+    path = saved(tmp_path, tube, faces=spoil(tube))
+    with pytest.raises(GarmentError, match=words):
+        read_garment(GarmentFile(path=path), body)
+
+
+@pytest.mark.parametrize(
+    ("weights", "words"),
+    [
+        (np.ones((150, 24)), "weights of vertex 0 are negative or sum to 24"),
+        (np.full((150, 20), 0.05), r"expected numbers \(150, 24\)"),
+        (np.full((150, 24), np.nan), "weights of vertex 0"),
+    ],
+)
+def test_wrong_weights_are_refused(tmp_path, body, tube, weights, words):
+    path = saved(tmp_path, tube)
+    np.savez(tmp_path / "mine.weights.npz", weights=weights)
+    with pytest.raises(GarmentError, match=words):
+        read_garment(GarmentFile(path=path), body)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--garment-shift=-1,2"], "give three numbers"),
+        (["--garment-uv-scale", "2"], "add --garment-rest uv"),
+    ],
+)
+def test_an_option_that_means_nothing_is_refused(words, expected):
+    parser = argparse.ArgumentParser()
+    add_garment_options(parser)
+    with pytest.raises(ValueError, match=expected):
+        garment_file("a.obj", parser.parse_args(words))
+    with pytest.raises(ValueError, match="add --garment FILE"):
+        demand_a_file(parser.parse_args(words))
+
+
+# --- the command that says all of it -----------------------------------------------------------------------
+
+
+def test_check_says_what_was_found_and_how_to_mend_it(tmp_path, capsys, tube):
+    good = saved(tmp_path, tube, faces=tube.faces[:, ::-1], name="good.obj")
+    picture = tmp_path / "good.png"
+    assert check.main([str(good), "--picture", str(picture)]) == check.USABLE
+    told = capsys.readouterr().out
+    assert "good.obj: can be used" in told and "inside out; turned as it is read" in told
+    assert "neck (15 vertices), hem (15 vertices)" in told and picture.read_bytes()[:4] == b"\x89PNG"
+
+    bad = saved(tmp_path, tube, positions=1000 * tube.rest_positions, name="bad.obj")
+    assert check.main([str(good), str(bad)]) == check.UNUSABLE
+    assert "--garment-units mm" in capsys.readouterr().out
+
+    (tmp_path / "broken.obj").write_text("v 0 0\n")
+    assert check.main([str(tmp_path / "broken.obj"), str(bad)]) == check.UNREADABLE
+    assert "line 1 is not understood" in capsys.readouterr().err
+
+
+def test_check_answers_help_without_loading_anything_heavy():
+    code = (
+        "import sys, contextlib, io\n"
+        "from snug import check\n"
+        "with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):\n"
+        "    check.main(['--help'])\n"
+        "sys.exit(bool({'numpy', 'torch', 'numba', 'igl', 'scipy', 'pyvista'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_path, tube, monkeypatch):
+    path = saved(tmp_path, tube, uv=100 * own_chart(tube.rest_positions, tube.faces))
+    (tmp_path / "silk.toml").write_text("density = 300.0\n")
+    seen = []
+
+    def stop(kind, dressed, motions, **options):
+        seen.append(dressed)
+        raise ValueError("seen enough")
+
+    monkeypatch.setattr(training, "train", stop)
+    words = ["--garment", str(path), "--garment-rest", "uv", "--garment-uv-scale", "0.01"]
+    words += ["--garment-material", str(tmp_path / "silk.toml"), "-o", str(tmp_path / "a.safetensors")]
+    assert train_command.main(words) == 2
+    (dressed,) = seen
+    assert dressed.cloth.material == Material(density=300.0) and dressed.vertices == 150
+    np.testing.assert_allclose(dressed.cloth.rest_uv, own_chart(tube.rest_positions, tube.faces))
+    assert train_command.main(["--garment", "tshirt", "--garment-up", "z"]) == 2 and len(seen) == 1
+
+
+# --- in a run ---------------------------------------------------------------------------------------------
+
+
+def planned(*words):
+    return make_plan(make_parser().parse_args(words), words)
+
+
+def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, tube):
+    path, out = saved(tmp_path, tube), str(tmp_path / "run")
+    plan = planned("--preset", "smoke", "--garment", str(path), "-o", out)
+    worn = {scene.garment for scene in plan.scenes if scene.dressed}
+    assert worn == {"mine"} and {network.garment for network in plan.networks} == {"mine"}
+    names = {scene.name for scene in plan.scenes}
+    assert {"mine/push_recovery", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
+    with pytest.raises(PlanError, match="unknown scene 'dependence/mesh/500'"):  # it tailors one itself
+        planned("--garment", str(path), "--scenes", "dependence/mesh/500", "-o", out)
+    usual = planned("--preset", "smoke", "-o", out)
+    assert {scene.garment for scene in usual.scenes if scene.dressed} == {"tshirt"}
+
+
+def test_what_a_garment_is_read_from_is_an_input_of_all_that_wears_it(tmp_path, tube):
+    path = saved(tmp_path, tube)
+    words = ["--preset", "smoke", "--suite", "garments", "--methods", "skinning", "--garment", str(path)]
+
+    def inputs(*more):
+        plan = planned(*words, *more, "-o", str(tmp_path / "run"))
+        return Schedule(plan).cell(plan.cells[0]).inputs
+
+    first = inputs()
+    assert inputs() == first != inputs("--garment-shift", "0,0.001,0")
+    (tmp_path / "elsewhere").mkdir()
+    moved = path.rename(tmp_path / "elsewhere" / path.name)
+    words[-1] = str(moved)
+    assert inputs() == first
+    material = tmp_path / "silk.json"
+    material.write_text('{"density": 300.0}')
+    assert inputs("--garment-material", str(material)) != first
+    moved.write_text(moved.read_text() + "# edited\n")
+    assert inputs() != first
+
+
+@pytest.mark.parametrize("name", ["tshirt.obj", "out_of_distribution.obj", "my shirt.obj", "a*.obj"])
+def test_a_name_that_means_something_else_is_refused(tmp_path, tube, name):
+    path = saved(tmp_path, tube, name=name)
+    with pytest.raises(PlanError, match="give the file another name"):
+        planned("--preset", "smoke", "--garment", str(path), "-o", str(tmp_path / "run"))
+
+
+@pytest.mark.slow
+def test_a_garment_of_ones_own_goes_through_a_run(tmp_path, shirt):
+    path = saved(tmp_path, shirt, uv=own_chart(shirt.rest_positions, shirt.faces))
+    out = tmp_path / "run"
+    words = ["--preset", "smoke", "--suite", "garments", "--methods", "simulation,skinning,snug"]
+    words += ["--garment", str(path), "--garment-rest", "uv", "-o", str(out), "--workers", "1"]
+    assert run_command.main(words) == 0
+    from benchmarks.results.run_folder import RunFolder
+
+    folder = RunFolder(out)
+    rows = [row for row in folder.read_rows() if row.metric == "energy/strain"]
+    assert {row.scene for row in rows} == {"mine/push_recovery"} and all(row.status == "ok" for row in rows)
+    assert folder.read_config()["garments"]["mine"]["material"] == asdict(Material())
+    assert (folder.models_of("mine") / "snug-seed0.safetensors").is_file()

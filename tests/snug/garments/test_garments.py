@@ -1,0 +1,401 @@
+"""Tailored garments: topology, even triangles, room around the body, ease, flare, borrowed weights."""
+
+import dataclasses
+import time
+
+import igl
+import numpy as np
+import pytest
+
+from snug.body.parametric_body import Body
+from snug.garments.cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
+from snug.garments.garment import GarmentError, smooth_weights
+from snug.garments.openings import named_openings
+from snug.garments.templates import GARMENT_TEMPLATES, find_template, tailor_tshirt, tailor_tunic
+from tests.reference_sim.meshes import edge_counts, girth
+from tests.snug.body.other_bodies import BODIES, other_mesh, simulate_walk
+
+WAIST = "spine1"
+
+
+@pytest.fixture(scope="session")
+def body():
+    return Body.load()
+
+
+@pytest.fixture(scope="session")
+def shirts(body):
+    return {count: tailor_tshirt(body, vertices=count) for count in (300, 1000, 2000, 4400)}
+
+
+@pytest.fixture(scope="session")
+def wardrobe(body, shirts):
+    """Every sort of garment, at 1000 vertices."""
+    others = {p.name: p.tailor(body, vertices=1000) for p in GARMENT_TEMPLATES if p.name != "tshirt"}
+    return {"tshirt": shirts[1000], **others}
+
+
+@pytest.fixture(params=[pattern.name for pattern in GARMENT_TEMPLATES])
+def garment(request, wardrobe):
+    return wardrobe[request.param]
+
+
+@pytest.fixture(params=["tshirt", "tunic"])
+def shirt(request, wardrobe):
+    """With sleeves, each vertex with the weights of one body vertex."""
+    return wardrobe[request.param]
+
+
+def face_normals(points, faces):
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def test_openings_are_named_by_their_place(body, garment):
+    found = named_openings(body, garment.rest_positions, garment.faces)
+    assert found.keys() == garment.loops.keys()
+    for name, loop in garment.loops.items():
+        np.testing.assert_array_equal(found[name], loop)
+
+
+def waist(body):
+    return body.joint_template[body.joint_names.index(WAIST), 1]
+
+
+@pytest.mark.parametrize("count", [300, 1000, 2000, 4400])
+def test_topology_and_triangles_at_every_resolution(shirts, count):
+    shirt = shirts[count]
+    points, faces = shirt.rest_positions, shirt.faces
+    assert abs(len(points) - count) <= 0.01 * count  # asked: 3 %
+    assert np.array_equal(np.unique(faces), np.arange(len(points)))
+    halves, edges, counts = edge_counts(faces)
+    assert counts.max() == 2
+    assert len(np.unique(halves, axis=0)) == len(
+        halves
+    )  # every edge once in each direction: consistent winding
+    # A sphere with four holes: V - E + F = 2 - 4, in one piece.
+    assert len(points) - len(edges) + len(faces) == -2
+    rim = edges[counts == 1]
+    in_loops = [len(loop) for loop in shirt.loops.values()]
+    assert sum(in_loops) == len(rim) == len(np.unique(np.concatenate(list(shirt.loops.values()))))
+    areas = 0.5 * np.linalg.norm(face_normals(points, faces), axis=1)
+    assert areas.min() >= 0.5 * areas.mean() and areas.max() <= 2.0 * areas.mean()
+    # Law of cosines: the smallest angle is opposite the shortest side.
+    sides = np.sort(np.linalg.norm(points[faces] - np.roll(points[faces], 1, axis=1), axis=2), axis=1).T
+    cosine = (sides[1] ** 2 + sides[2] ** 2 - sides[0] ** 2) / (2 * sides[1] * sides[2])
+    assert np.degrees(np.arccos(cosine)).min() > 15
+
+
+def test_one_piece(garment):
+    component = np.arange(len(garment.rest_positions))
+    for _ in range(len(component)):
+        least = component[garment.faces].min(axis=1)
+        new = component.copy()
+        np.minimum.at(new, garment.faces.ravel(), np.repeat(least, 3))
+        if np.array_equal(new, component):
+            break
+        component = new
+    assert component.max() == 0
+
+
+@pytest.mark.parametrize("count", [300, 1000, 4400])
+def test_clear_of_the_body_at_vertices_and_within_triangles(body, shirts, count):
+    corners = shirts[count].rest_positions[shirts[count].faces]
+    rng = np.random.default_rng(3)
+    shares = rng.dirichlet(np.ones(3), size=len(corners))
+    inside = np.einsum("fk,fkd->fd", shares, corners)
+    vertices = igl.signed_distance(shirts[count].rest_positions, body.template, body.faces)[0]
+    within = igl.signed_distance(inside, body.template, body.faces)[0]
+    assert vertices.min() >= 0.015 - 1e-9
+    assert within.min() >= 0.0145  # random points are not the samples that tailoring looks at
+
+
+def test_faces_point_away_from_the_body(body, garment):
+    points, faces = garment.rest_positions, garment.faces
+    normals = face_normals(points, faces)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    centroids = points[faces].mean(axis=1)
+    closest = igl.signed_distance(centroids, body.template, body.faces)[2]
+    away = centroids - closest
+    assert np.mean(np.sum(normals * away, axis=1) > 0) > 0.995
+
+
+def test_cut_lines_are_plane_and_even(body, shirt):
+    points = shirt.rest_positions
+    assert np.ptp(points[shirt.hem, 1]) < 1e-4
+    hip, ankle = (body.joint_template[body.joint_names.index(n), 1] for n in ("left_hip", "left_ankle"))
+    assert ankle < points[shirt.hem, 1].mean() < hip
+    assert np.ptp(points[shirt.loops["left_sleeve"], 0]) < 1e-4
+    for loop in shirt.loops.values():
+        sides = np.linalg.norm(points[loop] - np.roll(points[loop], 1, axis=0), axis=1)
+        assert sides.max() / sides.min() < 2.0
+        turns = np.diff(points[np.append(loop, loop[:2])], axis=0)
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        assert np.sum(turns[1:] * turns[:-1], axis=1).min() > np.cos(np.radians(75))  # no saw teeth
+
+
+def test_the_left_half_mirrors_the_right(garment):
+    points = garment.rest_positions
+    mirrored = {tuple(p) for p in np.round(points * [-1, 1, 1] + 0.0, 9).tolist()}
+    assert mirrored == {tuple(p) for p in np.round(points + 0.0, 9).tolist()}
+
+
+def test_the_tunic_is_longer_and_flares_by_what_is_asked(body, shirts):
+    """Steiner: a convex section grown by d is 2 pi d longer, so d comes back from the girths."""
+    tunics = {flare: tailor_tunic(body, vertices=2000, flare=flare) for flare in (0.0, 0.045)}
+    straight, flared = tunics[0.0], tunics[0.045]
+    hem = flared.rest_positions[flared.hem, 1].mean()
+    assert shirts[2000].rest_positions[shirts[2000].hem, 1].mean() - hem == pytest.approx(0.08, abs=1e-3)
+    low = [girth(g.rest_positions, g.faces, 1, hem + 0.004) for g in (flared, straight)]
+    # A little above the hem, where the cone is 4 mm of its height narrower; chords lose the rest.
+    assert (low[0] - low[1]) / (2 * np.pi) == pytest.approx(0.045, abs=0.002)
+    above = [girth(g.rest_positions, g.faces, 1, waist(body) + 0.05) for g in (flared, straight)]
+    assert above[0] == pytest.approx(above[1], abs=0.01)
+
+
+def test_patterns_are_found_by_name(body):
+    assert find_template("tunic").tailor is tailor_tunic
+    with pytest.raises(GarmentError, match=r"'gown'.*tshirt, tunic, skirt.*dress"):
+        find_template("gown")
+    with pytest.raises(GarmentError, match=r"flare=0\.5: a tunic"):
+        tailor_tunic(body, flare=0.5)
+
+
+def test_ease_is_girth_at_waist_and_cuff(body, shirts):
+    """On a finer mesh, where a section's chords are close to its curve (at 1000 vertices they lose 1 cm)."""
+    loose = shirts[2000]
+    tight = tailor_tshirt(body, ease=0.0, vertices=2000)
+    at_waist = [girth(g.rest_positions, g.faces, 1, waist(body)) for g in (loose, tight)]
+    assert at_waist[0] - at_waist[1] == pytest.approx(0.06, abs=0.003)
+    # Steiner: a convex section grown by d is 2 pi d longer. Here the arm is convex; the chords
+    # cost 2 mm. The waist is as wide as chest and hips ask.
+    cuff = loose.rest_positions[:, 0].max() - 0.003
+    arm = girth(body.template, body.faces, 0, cuff)
+    assert girth(loose.rest_positions, loose.faces, 0, cuff) == pytest.approx(
+        arm + 2 * np.pi * 0.015 + 0.06, abs=0.005
+    )
+    assert at_waist[0] > girth(body.template, body.faces, 1, waist(body)) + 2 * np.pi * 0.015 + 0.06
+
+
+def test_the_shirt_hangs_from_the_chest(body, shirt):
+    """Not pressed into the waist, nor between the legs: below the chest girth does not shrink."""
+    points, faces = shirt.rest_positions, shirt.faces
+    levels = np.linspace(points[shirt.hem, 1].mean() + 0.01, waist(body) + 0.15, 8)[::-1]
+    girths = [girth(points, faces, 1, level) for level in levels]
+    assert np.diff(girths).min() > -0.01
+    front = points[shirt.hem][:, 2] > 0
+    middle = np.abs(points[shirt.hem][:, 0]) < 0.05
+    assert points[shirt.hem][front & middle, 2].min() > points[shirt.hem][:, 2].max() - 0.01
+
+
+def test_tailoring_twice_gives_the_same(body, shirts):
+    again = tailor_tshirt(body, vertices=300)
+    assert np.array_equal(again.rest_positions, shirts[300].rest_positions)
+    assert np.array_equal(again.faces, shirts[300].faces)
+
+
+def test_weights_are_borrowed_from_the_nearest_allowed_vertex(body, shirt):
+    weights = shirt.skinning_weights
+    assert weights.shape == (len(shirt.rest_positions), 24)
+    assert np.allclose(weights.sum(axis=1), 1.0, atol=1e-12)
+    assert np.array_equal(weights, body.skinning_weights[shirt.body_vertices])
+    strongest = {body.joint_names[j] for j in np.argmax(weights, axis=1)}
+    assert not strongest & {"head", "neck", "left_wrist", "left_hand", "left_knee", "left_foot"}
+    assert {"left_shoulder", "right_shoulder", "spine3", "pelvis"} <= strongest
+
+
+def test_smoothing_keeps_rows_and_lowers_dirichlet_energy(shirt):
+    _, edges, _ = edge_counts(shirt.faces)
+
+    def dirichlet(w):
+        return np.sum((w[edges[:, 0]] - w[edges[:, 1]]) ** 2)
+
+    energies = []
+    for rounds in (0, 1, 10, 50):
+        smooth = smooth_weights(shirt.skinning_weights, shirt.faces, rounds)
+        assert np.allclose(smooth.sum(axis=1), 1.0, atol=1e-12) and smooth.min() >= 0
+        energies.append(dirichlet(smooth))
+    assert energies[0] > 2 * energies[2] > 0 and np.all(np.diff(energies) < 0)
+    assert np.array_equal(smooth_weights(shirt.skinning_weights, shirt.faces, 0), shirt.skinning_weights)
+
+
+def test_another_shape_carries_the_shirt_along(body, shirt):
+    assert np.array_equal(shirt.rest_for(body, None), shirt.rest_positions)
+    assert np.array_equal(shirt.rest_for(body, np.zeros(10)), shirt.rest_positions)
+    for sign in (-1.5, 1.5):
+        betas = np.zeros(10)
+        betas[:3] = sign
+        rest = shirt.rest_for(body, betas)
+        distance = igl.signed_distance(rest, body.shaped(betas), body.faces)[0]
+        assert distance.min() > 0.005
+        assert np.abs(rest - shirt.rest_positions).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"vertices": 99}, "vertices=99"),
+        ({"vertices": 10**6}, "vertices=1000000"),
+        ({"ease": -0.01}, "ease=-0.01"),
+        ({"ease": 0.5}, "ease=0.5"),
+        ({"ease": float("nan")}, "ease=nan"),
+        ({"clearance": 0.0}, "clearance=0.0"),
+        ({"sleeve": 1.2}, "sleeve=1.2"),
+        ({"length": 1.0}, "length=1.0"),
+    ],
+)
+def test_a_parameter_out_of_range_is_named(body, wrong, says):
+    with pytest.raises(GarmentError, match=says) as caught:
+        tailor_tshirt(body, **wrong)
+    assert "\n" not in str(caught.value)
+
+
+def test_negative_smoothing_is_refused(shirt):
+    with pytest.raises(GarmentError, match="iterations=-1"):
+        smooth_weights(shirt.skinning_weights, shirt.faces, -1)
+
+
+SLEEVES = {"neck", "left_sleeve", "right_sleeve", "hem"}
+ARMHOLES = {"neck", "left_armhole", "right_armhole", "hem"}
+LEGS = {"waist", "left_leg", "right_leg"}
+OPENINGS = {
+    "tshirt": SLEEVES, "tunic": SLEEVES, "long_sleeves": SLEEVES, "tank_top": ARMHOLES, "dress": ARMHOLES,
+    "skirt": {"waist", "hem"}, "trousers": LEGS, "shorts": LEGS,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def another(body):
+    return other_mesh(body, 5000)
+
+
+def at(body, name):
+    return body.joint_template[body.joint_names.index(name)]
+
+
+def test_every_kind_has_its_openings_and_no_other(garment):
+    _, edges, counts = edge_counts(garment.faces)
+    assert set(garment.loops) == OPENINGS[garment.name] and counts.max() == 2
+    # A sphere with so many holes.
+    characteristic = len(garment.rest_positions) - len(edges) + len(garment.faces)
+    assert characteristic == 2 - len(garment.loops)
+    points = garment.rest_positions
+    for name, loop in garment.loops.items():
+        side = {"left": 1, "right": -1}.get(name.partition("_")[0], 0)
+        assert np.sign(np.round(points[loop, 0].mean(), 6)) == side, name
+    assert set(garment.pins) == set(garment.loops.get("waist", ()))
+    assert len(garment.hem) == len(set(garment.hem.tolist())) > 0
+
+
+def test_every_kind_is_clear_of_the_body(body, garment):
+    distance = igl.signed_distance(garment.rest_positions, body.template, body.faces)[0]
+    assert distance.min() >= garment.parameters["clearance"] - 1e-9
+
+
+def test_legs_are_as_long_as_asked_and_each_follows_its_own(body, wardrobe):
+    points = {name: wardrobe[name].rest_positions for name in ("shorts", "trousers")}
+    heights = {name: points[name][wardrobe[name].loops["left_leg"], 1] for name in points}
+    ankle = at(body, "left_ankle")[1]
+    # Two equations for the crotch, from which both inseams are measured.
+    shares = {name: wardrobe[name].parameters["length"] for name in points}
+    crotch = {name: (heights[name].mean() - shares[name] * ankle) / (1 - shares[name]) for name in points}
+    assert crotch["shorts"] == pytest.approx(crotch["trousers"], abs=0.03)  # they differ in ease
+    assert ankle < heights["trousers"].mean() < at(body, "left_knee")[1] < heights["shorts"].mean()
+    for name in points:
+        assert np.ptp(heights[name]) < 1e-4
+        below = points[name][:, 1] < crotch[name] - 0.05
+        assert np.abs(points[name][below, 0]).min() > 0.005  # apart
+        weights = wardrobe[name].skinning_weights[below & (points[name][:, 0] > 0)]
+        foreign = [body.joint_names.index(f"right_{joint}") for joint in ("hip", "knee")]
+        assert weights[:, foreign].max() < 0.2 and np.allclose(weights.sum(axis=1), 1.0)
+
+
+def test_arms_are_bare_or_covered_to_the_wrist(body, wardrobe):
+    shoulder, wrist = at(body, "left_shoulder")[0], at(body, "left_wrist")[0]
+    reach = {name: wardrobe[name].rest_positions[:, 0].max() for name in ("long_sleeves", "tank_top")}
+    share = wardrobe["long_sleeves"].parameters["sleeve"]
+    assert reach["long_sleeves"] == pytest.approx(shoulder + share * (wrist - shoulder), abs=1e-4)
+    top = wardrobe["tank_top"].rest_positions
+    armhole = top[wardrobe["tank_top"].loops["left_armhole"]]
+    assert np.ptp(armhole[:, 1]) > 0.12 and armhole[:, 0].max() < shoulder + 0.1
+    strongest = np.argmax(wardrobe["long_sleeves"].skinning_weights, axis=1)
+    assert body.joint_names.index("left_elbow") in strongest
+
+
+def test_a_dress_follows_both_thighs_below_and_the_skin_above(body, wardrobe):
+    dress = wardrobe["dress"]
+    own = body.skinning_weights[dress.body_vertices]
+    y, hip = dress.rest_positions[:, 1], at(body, "left_hip")[1]
+    assert np.array_equal(dress.skinning_weights[y > hip + 0.05], own[y > hip + 0.05])
+    _, edges, _ = edge_counts(dress.faces)
+    low = (y[edges] < hip - 0.06).all(axis=1)
+    steps, borrowed = (
+        np.abs(w[edges[low, 0]] - w[edges[low, 1]]).max() for w in (dress.skinning_weights, own)
+    )
+    assert steps < 0.2 and borrowed > 0.5
+    assert np.allclose(dress.skinning_weights.sum(axis=1), 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [pattern.name for pattern in GARMENT_TEMPLATES])
+def test_every_kind_fits_another_mesh(another, kind):
+    garment = find_template(kind).tailor(another, vertices=500)
+    assert set(garment.loops) == OPENINGS[kind]
+
+
+def test_a_neck_is_cut_above_high_shoulders(body):
+    """Lower neck joint by 4 cm: then the shoulders are as high beside it as they are on other bodies."""
+    joints = body.joint_template.copy()
+    joints[body.joint_names.index("neck"), 1] -= 0.04
+    low = dataclasses.replace(body, joint_template=joints)
+    neck = neck_cut(low, 0.015)
+    assert neck.point[1] > joints[body.joint_names.index("neck"), 1] + 0.005
+    assert neck_cut(body, 0.015).point[1] == at(body, "neck")[1]
+    shirt = tailor_tshirt(low, vertices=500)
+    assert np.abs(shirt.rest_positions[shirt.loops["neck"], 0]).max() < neck.reach - 0.005
+
+
+def test_the_bend_of_a_cut_ends(body):
+    cut = CutPlane("neck", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), bend=3.0)
+    z = np.linspace(-0.5, 0.5, 2001)
+    points = np.stack([0 * z, 0 * z, z], axis=1)
+    height = cut.height(points)
+    near, far = np.abs(z) <= BEND_SPAN, np.abs(z) >= 2 * BEND_SPAN
+    assert np.array_equal(height[near], 3.0 * z[near] ** 2)
+    assert height[far] == pytest.approx(6.0 * BEND_SPAN**2)
+    slope = cut.normals(points)
+    assert slope[:, 2] / slope[:, 1] == pytest.approx(np.gradient(height, z), abs=4e-3)
+
+
+def test_a_corner_that_clipping_left_twice_counts_once():
+    """A square with a second corner 10 micrometres from one: on both cuts too."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [1e-6, 1, 0], [0, 1, 0], [0, 0.5, 0], [0.5, 1, 0],
+                       [0.5, 0, 0], [1, 0.5, 0], [0.5, 0.5, 0]])  # fmt: skip
+    ring = [0, 7, 1, 8, 2, 6, 3, 4, 5]
+    faces = np.array([[9, a, b] for a, b in zip(ring, np.roll(ring, -1), strict=True)])
+    cuts = [
+        SEAM_CUT, CutPlane("top", (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+        CutPlane("side", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        CutPlane("hem", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
+    ]  # fmt: skip
+    (loop,) = outlines(points, faces, cuts)
+    assert sorted(name for name, _ in loop) == ["hem", "seam", "side", "top"]
+
+
+def test_a_body_too_large_for_the_grid_is_refused_at_once(body):
+    joints = body.joint_template.copy()
+    joints[body.joint_names.index("left_elbow"), 0] = 1e6
+    clock = time.perf_counter()
+    with pytest.raises(GarmentError, match="metres") as caught:
+        tailor_tshirt(dataclasses.replace(body, joint_template=joints))
+    assert "\n" not in str(caught.value) and time.perf_counter() - clock < 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vertices", [500, 1000])
+@pytest.mark.parametrize("wearer", BODIES)
+@pytest.mark.parametrize("kind", [pattern.name for pattern in GARMENT_TEMPLATES])
+def test_every_kind_on_every_body_is_simulated(kind, wearer, vertices, tmp_path):
+    simulated = simulate_walk(
+        find_template(kind).tailor(BODIES[wearer](), vertices=vertices), BODIES[wearer]()
+    )
+    assert simulated.status == "converged" and simulated.frames == 30

@@ -1,0 +1,102 @@
+"""One motion in the forms that people keep motions in, written by code of its own."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from snug.body.skeleton import JOINT_NAMES, PARENTS, REST_JOINTS
+
+Y_UP = np.eye(3)
+# From y up to z up: (x, y, z) becomes (x, -z, y).
+TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+MIXAMO = {
+    "pelvis": "Hips", "spine1": "Spine", "spine2": "Spine1", "spine3": "Spine2", "neck": "Neck",
+    "head": "Head",
+    **{f"{side}_{ours}": side.capitalize() + theirs for side in ("left", "right") for ours, theirs in (
+        ("hip", "UpLeg"), ("knee", "Leg"), ("ankle", "Foot"), ("foot", "ToeBase"), ("collar", "Shoulder"),
+        ("shoulder", "Arm"), ("elbow", "ForeArm"), ("wrist", "Hand"), ("hand", "HandMiddle1"))},
+}  # fmt: skip
+
+
+def of_root(motion, turn):
+    """Poses and path with the world turned by a matrix (3, 3)."""
+    poses = motion.poses.copy()
+    poses[:, 0] = (Rotation.from_matrix(turn) * Rotation.from_rotvec(poses[:, 0])).as_rotvec()
+    return poses, motion.translations @ turn.T
+
+
+def columns(poses, joints):
+    """(T, 3 joints): the body's joints where SMPL+H and SMPL-X have them, nothing in the fingers."""
+    wide = np.zeros((len(poses), joints, 3))
+    kept = 24 if joints == 24 else 22
+    wide[:, :kept] = poses[:, :kept]
+    return wide.reshape(len(poses), -1)
+
+
+def write_forms(folder: Path, motion, turn=Y_UP) -> list[Path]:
+    """The motion in a file of each form."""
+    poses, trans = of_root(motion, turn)
+    count, fps = len(poses), motion.fps
+    flat = Rotation.from_rotvec(poses.reshape(-1, 3))
+    quaternions, matrices = flat.as_quat().reshape(count, 24, 4), flat.as_matrix().reshape(count, 24, 3, 3)
+    forms = {
+        "smpl": {"poses": columns(poses, 24), "trans": trans, "fps": fps},
+        "joints": {"poses": poses, "transl": trans[:, None], "framerate": fps},
+        "smplh": {"poses": columns(poses, 52), "trans": trans, "mocap_framerate": fps},
+        "smplx": {"poses": columns(poses, 55), "trans": trans, "mocap_frame_rate": fps},
+        "body": {"poses": poses[:, :22], "trans": trans, "fps": fps},
+        "parts": {"root_orient": poses[:, 0], "pose_body": columns(poses, 24)[:, 3:66], "trans": trans,
+                  "fps": fps},
+        "estimated": {"global_orient": matrices[:, :1], "body_pose": matrices[:, 1:], "transl": trans,
+                      "fps": fps},
+        "root_matrix": {"global_orient": matrices[:, 0], "body_pose": poses[:, 1:], "translations": trans,
+                        "fps": fps},
+        "xyzw": {"quaternions_xyzw": quaternions, "trans": trans, "fps": fps},
+        "wxyz": {"rotations_quat": quaternions[..., [3, 0, 1, 2]], "trans": trans, "fps": fps},
+        "scalar_first": {"quaternions_wxyz": quaternions[..., [3, 0, 1, 2]], "trans": trans, "fps": fps},
+        "matrices": {"rotations": matrices, "trans": trans, "fps": fps},
+    }  # fmt: skip
+    files = []
+    for name, arrays in forms.items():
+        files.append(folder / f"{name}.npz")
+        np.savez(files[-1], **arrays)
+    files.append(folder / "pickled.pkl")
+    files[-1].write_bytes(pickle.dumps(forms["smpl"]))
+    files.append(folder / "ours.bvh")
+    files[-1].write_text(bvh(poses, trans, fps))
+    files.append(folder / "mixamo.bvh")
+    files[-1].write_text(bvh(poses, trans, fps, names=MIXAMO, order="XYZ", unit=0.01))
+    return files
+
+
+def bvh(poses, trans, fps, *, names=None, order="ZXY", unit=1.0, rest=REST_JOINTS) -> str:
+    """The text of a BVH of our skeleton; unit: [m] of its lengths."""
+    names = names or {name: name for name in JOINT_NAMES}
+    lines, walked = ["HIERARCHY"], []
+
+    def numbers(values) -> str:
+        return " ".join(f"{value:.7f}" for value in values)
+
+    def write(joint: int, depth: int) -> None:
+        walked.append(joint)
+        space, parent = "\t" * depth, PARENTS[joint]
+        offset = (rest[joint] - (rest[parent] if parent >= 0 else 0.0)) / unit
+        channels = "".join(f" {axis}rotation" for axis in order)
+        lines.append(f"{space}{'JOINT' if depth else 'ROOT'} {names[JOINT_NAMES[joint]]}")
+        lines.extend([f"{space}{{", f"{space}\tOFFSET {numbers(offset)}"])
+        moved = " Xposition Yposition Zposition" if depth == 0 else ""
+        lines.append(f"{space}\tCHANNELS {3 + 3 * (depth == 0)}{moved}{channels}")
+        children = [child for child, above in enumerate(PARENTS) if above == joint]
+        for child in children:
+            write(child, depth + 1)
+        if not children:
+            lines.extend([f"{space}\tEnd Site", f"{space}\t{{", f"{space}\t\tOFFSET 0 0.1 0", f"{space}\t}}"])
+        lines.append(f"{space}}}")
+
+    write(0, 0)
+    angles = Rotation.from_rotvec(poses[:, walked].reshape(-1, 3)).as_euler(order, degrees=True)
+    rows = np.concatenate([(trans + rest[0]) / unit, angles.reshape(len(poses), -1)], axis=1)
+    lines += ["MOTION", f"Frames: {len(poses)}", f"Frame Time: {1 / fps:.7f}", *map(numbers, rows)]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,242 @@
+"""BVH clips: names of joints, zero poses, orders of channels, and each broken file refused by name."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, REST_JOINTS, joint_positions
+from snug.motion.bvh import read_clip
+from snug.motion.files import read_motion
+from snug.motion.joint_names import NEEDED, _side, find_joints
+from snug.motion.library import make_motion
+from snug.motion.motion import MotionError
+from snug.motion.options import Reading
+from tests.snug.motion.motion_forms import MIXAMO, bvh
+
+WALK = make_motion("walk").cut(20, 40)
+LEGS = ("left_hip", "left_knee", "right_hip", "right_knee")
+
+
+def written(path, text=None, **options):
+    path.write_text(text if text is not None else bvh(WALK.poses, WALK.translations, 30.0, **options))
+    return path
+
+
+def directions(motion, near, far):
+    joints = joint_positions(motion.poses, motion.translations)
+    way = joints[:, JOINT[far]] - joints[:, JOINT[near]]
+    return way / np.linalg.norm(way, axis=1, keepdims=True)
+
+
+def test_channels_are_applied_in_their_order(tmp_path):
+    text = """HIERARCHY
+ROOT a
+{
+  OFFSET 1 2 3
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
+  JOINT b
+  {
+    OFFSET 0 1 0
+    CHANNELS 2 Yrotation Zrotation
+    End Site
+    {
+      OFFSET 0 0 1
+    }
+  }
+}
+MOTION
+Frames: 1
+Frame Time: 0.0083333
+4 5 6 10 20 30 40 50
+"""
+    clip = read_clip(written(tmp_path / "a.bvh", text))
+    assert [joint.name for joint in clip.joints] == ["a", "b", ""] and round(clip.fps) == 120
+    root, below, end = clip.joints
+    np.testing.assert_allclose(clip.shift(root), [[4, 5, 6]])
+    np.testing.assert_allclose(clip.shift(below), [[0, 1, 0]])
+    np.testing.assert_allclose(end.offset, [0, 0, 1])
+    expected = Rotation.from_euler("ZYX", [10, 20, 30], degrees=True).as_matrix()
+    np.testing.assert_allclose(clip.turns(root)[0], expected, atol=1e-12)
+    np.testing.assert_allclose(
+        clip.turns(below)[0], Rotation.from_euler("YZ", [40, 50], degrees=True).as_matrix(), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "side", "rest"),
+    [
+        ("mixamorig:LeftUpLeg", "left", "upleg"),
+        ("lThigh", "left", "thigh"),
+        ("RHip", "right", "hip"),
+        ("thigh_l", "left", "thigh"),
+        ("Bip01 R UpperArm", "right", "upperarm"),
+        ("left_knee", "left", "knee"),
+        ("LHipJoint", "left", "hipjoint"),
+        ("LowerBack", "", "lowerback"),
+        ("Head", "", "head"),
+        ("L", "", "l"),
+        ("", "", ""),
+    ],
+)
+def test_sides_of_names(name, side, rest):
+    assert _side(name) == (side, rest)
+
+
+# Names with the indices of their parents. CMU's clips as BVH: half bones inside hips and neck.
+CMU = """Hips -1, LHipJoint 0, LeftUpLeg 1, LeftLeg 2, LeftFoot 3, LeftToeBase 4, RHipJoint 0, RightUpLeg 6,
+RightLeg 7, RightFoot 8, LowerBack 0, Spine 10, Spine1 11, Neck 12, Neck1 13, Head 14, LeftShoulder 12,
+LeftArm 16, LeftForeArm 17, LeftHand 18, RightShoulder 12, RightArm 20, RightForeArm 21, RightHand 22"""
+BIOVISION = """Hips -1, LeftHip 0, LeftKnee 1, LeftAnkle 2, RightHip 0, RightKnee 4, RightAnkle 5, Chest 0,
+Neck 7, Head 8, LeftCollar 7, LeftShoulder 10, LeftElbow 11, LeftWrist 12, RightCollar 7, RightShoulder 14,
+RightElbow 15, RightWrist 16"""
+UPPER = """Hips -1, Spine 0, Chest 1, UpperChest 2, Neck 3, Head 4, LeftShoulder 3, LeftUpperArm 6,
+LeftLowerArm 7, LeftHand 8, RightShoulder 3, RightUpperArm 10, RightLowerArm 11, RightHand 12, LeftHip 0,
+LeftKnee 14, LeftFoot 15, LeftToe 16, RightHip 0, RightKnee 18, RightFoot 19, RightToe 20"""
+MIXAMORIG = ", ".join(f"mixamorig:{MIXAMO[name]} {PARENTS[k]}" for k, name in enumerate(JOINT_NAMES))
+
+
+def known(skeleton):
+    names, parents = zip(*(joint.strip().rsplit(" ", 1) for joint in skeleton.split(",")), strict=True)
+    found = find_joints(Path("a.bvh"), names, [int(parent) for parent in parents], None)
+    return {ours: names[index] for ours, index in found.items()}
+
+
+def test_common_skeletons_are_known_without_a_map():
+    mixamo = known(MIXAMORIG)
+    assert len(mixamo) == 22  # all but the fingers
+    assert all(theirs == f"mixamorig:{MIXAMO[ours]}" for ours, theirs in mixamo.items())
+    found = known(CMU)
+    assert [found[f"spine{k}"] for k in (1, 2, 3)] == ["LowerBack", "Spine", "Spine1"]
+    assert (found["pelvis"], found["neck"], found["head"]) == ("Hips", "Neck1", "Head")
+    assert (found["left_collar"], found["left_shoulder"]) == ("LeftShoulder", "LeftArm")
+    assert "right_foot" not in found
+    found = known(BIOVISION)
+    assert found["spine1"] == "Chest" and "spine2" not in found and "spine3" not in found
+    assert found["left_shoulder"] == "LeftShoulder" and found["left_collar"] == "LeftCollar"
+    found = known(UPPER)  # arms after bones, legs after joints
+    assert (found["left_collar"], found["left_shoulder"]) == ("LeftShoulder", "LeftUpperArm")
+    assert (found["right_ankle"], found["right_foot"]) == ("RightFoot", "RightToe")
+    assert [found[f"spine{k}"] for k in (1, 2, 3)] == ["Spine", "Chest", "UpperChest"]
+
+
+@pytest.mark.parametrize(
+    ("names", "sides"),
+    [
+        ("pelvis, thigh_{0}, calf_{0}, foot_{0}, upperarm_{0}, lowerarm_{0}, hand_{0}, head", "lr"),
+        ("Bip01 Pelvis, Bip01 {0} Thigh, Bip01 {0} Calf, Bip01 {0} Foot, Bip01 {0} UpperArm, "
+         "Bip01 {0} Forearm, Bip01 {0} Hand, Bip01 Head", "LR"),
+        ("hip, {0}Thigh, {0}Shin, {0}Foot, {0}Shldr, {0}ForeArm, {0}Hand, head", "lr"),
+    ],
+    ids=["Unreal", "3ds Max", "Daz"],
+)  # fmt: skip
+def test_skeletons_of_other_programs_are_known(names, sides):
+    root, *limbs, head = names.split(", ")
+    left, right = ([limb.format(side) for limb in limbs] for side in sides)
+    parents = [0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11]
+    joints = [*left, *right]
+    found = known(", ".join([f"{root} -1", *(f"{j} {p}" for j, p in zip(joints, parents)), f"{head} 0"]))
+    for side, theirs in (("left", left), ("right", right)):
+        assert [found[f"{side}_{joint}"] for joint in NEEDED] == theirs
+    assert (found["pelvis"], found["head"]) == (root, head)
+
+
+def test_a_map_names_joints_that_no_guess_finds(tmp_path):
+    odd = {name: f"bone{index}" for index, name in enumerate(JOINT_NAMES)}
+    path = written(tmp_path / "odd.bvh", names=odd)
+    with pytest.raises(
+        MotionError, match=r"odd\.bvh: no joint is known as 'left_hip'; name it by --joint-map"
+    ):
+        read_motion(path, Reading())
+    table = tmp_path / "map.toml"
+    table.write_text("\n".join(f'{ours} = "{theirs}"' for ours, theirs in odd.items()))
+    mapped = read_motion(path, Reading(joint_map=table))
+    np.testing.assert_array_equal(mapped.poses, read_motion(written(tmp_path / "b.bvh"), Reading()).poses)
+    for text, words in (
+        ('left_hip = "bone99"', "no joint 'bone99' for left_hip; did you mean bone9"),
+        ('left_tail = "bone1"', "'left_tail' is none of our joints"),
+        ("left_hip = ", "not a TOML file"),
+        (table.read_text().replace('bone4"', 'bone5"', 1), "'bone5' taken for left_knee does not hang below"),
+    ):
+        table.write_text(text)
+        with pytest.raises(MotionError, match=words):
+            read_motion(path, Reading(joint_map=table))
+    with pytest.raises(MotionError, match=r"none\.toml: cannot be read"):
+        read_motion(path, Reading(joint_map=tmp_path / "none.toml"))
+
+
+def test_limbs_of_another_skeleton_point_where_its_own_do(tmp_path):
+    # Arms down by 40 degrees, legs astride and longer, in another heading and z up, and no turn at all.
+    rest = REST_JOINTS.copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        shoulder, hip = JOINT[f"{side}_shoulder"], JOINT[f"{side}_hip"]
+        for base, limb, turn in (
+            (shoulder, ("elbow", "wrist", "hand"), Rotation.from_euler("z", -40 * sign, degrees=True)),
+            (hip, ("knee", "ankle", "foot"), Rotation.from_euler("z", 20 * sign, degrees=True)),
+        ):
+            joints = [JOINT[f"{side}_{name}"] for name in limb]
+            rest[joints] = rest[base] + 1.3 * turn.apply(rest[joints] - rest[base])
+    zero, world = np.zeros((2, 24, 3)), Rotation.from_euler("zx", [0, 90], degrees=True)
+    heading = Rotation.from_euler("z", 60, degrees=True) * world
+    text = bvh(zero, np.zeros((2, 3)), 60.0, rest=heading.apply(rest))
+    motion = read_motion(written(tmp_path / "a.bvh", text), Reading())
+    back = Rotation.from_matrix(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])) * heading
+    limbs = ("left_shoulder left_elbow", "right_elbow right_wrist", "left_hip left_knee")
+    for near, far in map(str.split, limbs):
+        way = rest[JOINT[far]] - rest[JOINT[near]]
+        np.testing.assert_allclose(
+            directions(motion, near, far)[0], back.apply(way / np.linalg.norm(way)), atol=1e-6
+        )
+    for name in ("spine1", "spine3", "neck", "left_collar"):
+        np.testing.assert_allclose(motion.poses[:, JOINT[name]], 0.0, atol=1e-9)
+
+
+def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
+    lengths = written(tmp_path / "a.bvh", bvh(WALK.poses, 2 * WALK.translations, 30.0, rest=2 * REST_JOINTS))
+    large = read_motion(lengths, Reading())
+    travelled = large.translations - large.translations[0]
+    np.testing.assert_allclose(travelled, WALK.translations - WALK.translations[0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: "", "ends in line 0"),
+        (lambda text: "solid\n" + text, "line 1: 'solid' where 'HIERARCHY' should be"),
+        (lambda text: text.replace("MOTION", "MOVE"), "where 'MOTION' should be"),
+        (lambda text: text.replace("Frames: 20", "Frames: 21"), "declares 21 frames and holds 20"),
+        (lambda text: text.replace("Frames: 20", "Frames: 19"), "more than the 19 frames"),
+        (lambda text: text.replace("Frames: 20", "Frames: -1"), "no number of frames"),
+        (lambda text: text.replace("Frames: 20", "Frames: 99999"), "holds 20|cut the clip"),
+        (lambda text: text.replace("Frames: 20", "Frames: 0"), "0 frames"),
+        (lambda text: text.replace("Frame Time: 0.0333333", "Frame Time: 0"), "no frame rate"),
+        (lambda text: text.replace("CHANNELS 3", "CHANNELS 4", 1), "declares other channels"),
+        (lambda text: text.replace("Zrotation", "Wrotation", 1), "unknown ones"),
+        (lambda text: text.replace("JOINT left_knee", "JOINT left_hip"), "'left_hip' has no name or"),
+        (lambda text: text.replace("left_knee", "left_thing"), "no joint is known as 'left_knee'"),
+        (lambda text: text.replace("head", "hat"), "no joint is known as 'head'"),
+        (lambda text: text.replace("OFFSET", "OFFSETS", 1), "not known in a hierarchy"),
+        (lambda text: text.rsplit(" ", 1)[0], "finite numbers should be here"),
+        (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "finite numbers should be here"),
+        (lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"), "backwards"),
+    ],
+)  # fmt: skip
+def test_a_broken_file_is_refused_by_name(tmp_path, change, words):
+    path = written(tmp_path / "clip.bvh")
+    path.write_text(change(path.read_text()))
+    with pytest.raises(MotionError, match=words) as caught:
+        read_motion(path, Reading())
+    assert "clip.bvh" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_zero_pose_that_does_not_stand_is_refused(tmp_path):
+    arms_up = REST_JOINTS.copy()
+    for name in ("left_elbow", "left_wrist", "left_hand"):
+        arms_up[JOINT[name]] = REST_JOINTS[JOINT["left_shoulder"]] - [
+            REST_JOINTS[JOINT[name], 0] - REST_JOINTS[JOINT["left_shoulder"], 0], 0, 0]  # fmt: skip
+    with pytest.raises(MotionError, match=r"no T or A pose: left_shoulder is turned by 180 degrees"):
+        read_motion(written(tmp_path / "a.bvh", rest=arms_up), Reading())
+    flat = np.zeros((24, 3))
+    with pytest.raises(MotionError, match="legs or hips of its zero pose have no length"):
+        read_motion(written(tmp_path / "a.bvh", rest=flat), Reading())

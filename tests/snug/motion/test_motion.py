@@ -1,0 +1,364 @@
+"""Motions: the embedded library looks like a moving person, and the tools keep what they promise."""
+
+import numpy as np
+import pytest
+
+from snug.body.parametric_body import Body
+from snug.body.skeleton import (
+    JOINT,
+    JOINT_NAMES,
+    PARENTS,
+    REST_JOINTS,
+    axis_angles,
+    global_rotations,
+    joint_positions,
+    rotation_matrices,
+    sole_points,
+)
+from snug.motion.clips.posture import poses_from_angles
+from snug.motion.library import (
+    DYNAMIC_TEST,
+    DYNAMIC_TRAIN,
+    DYNAMIC_VALIDATION,
+    TEST,
+    TRAIN,
+    VALIDATION,
+    make_motion,
+)
+from snug.motion.motion import (
+    ARMS_CLEAR,
+    Motion,
+    MotionError,
+    arm_clearance,
+    clear_arms,
+    heading,
+    joint_speeds,
+    nearest_pose,
+    place,
+    resample,
+    spread_arms,
+    transition,
+    turned,
+)
+
+ACTING = TRAIN + VALIDATION + TEST
+STOPPING = DYNAMIC_TRAIN + DYNAMIC_VALIDATION
+RISING = "climbing_steps"  # its floor is steps
+
+
+@pytest.fixture(scope="module")
+def library():
+    return {name: make_motion(name) for name in ACTING}
+
+
+def standing(frames=3):
+    return Motion("standing", np.zeros((frames, 24, 3)), np.zeros((frames, 3)))
+
+
+def test_each_motion_has_one_role_and_no_kind_is_in_two(library):
+    assert (len(TRAIN), len(VALIDATION), len(TEST)) == (14, 4, 5)
+    names = (*ACTING, *STOPPING)
+    assert len(set(names)) == len(names) and set(DYNAMIC_TEST) <= set(TEST)
+    kinds = [{library[name].kind for name in role} for role in (TRAIN, VALIDATION, TEST)]
+    assert len(set().union(*kinds)) == sum(map(len, kinds))
+    assert all(motion.kind for motion in library.values())
+
+
+@pytest.mark.parametrize("name", STOPPING)
+class TestStops:
+    """What moves until one frame and not at all after it."""
+
+    def test_stops_within_one_frame_and_holds(self, name):
+        motion = make_motion(name)
+        moves = np.linalg.norm(np.diff(motion.poses, axis=0), axis=-1).max(-1) * 30.0  # [rad/s]
+        last = np.flatnonzero(moves > 0)[-1]
+        assert len(moves) - 1 - last == 36
+        assert moves[last] > 0.5  # at full speed into the stop
+        assert moves.max() < 12.0
+        assert np.all(np.diff(motion.translations, axis=0)[last + 1 :] == 0)
+
+    def test_starts_at_rest_with_feet_on_the_floor(self, name):
+        motion = make_motion(name)
+        assert np.linalg.norm(motion.poses[1] - motion.poses[0]) * 30.0 < 0.2
+        soles = sole_points(motion.poses, motion.translations)[..., 1].min(axis=1)
+        assert np.abs(soles).max() < 0.03
+        assert np.degrees(arm_clearance(motion).min()) > 25.0
+
+
+def test_no_two_stops_are_alike():
+    library = [make_motion(name) for name in STOPPING]
+    yaws = [motion.poses[:, 0, 1] + motion.poses[:, [3, 6, 9], 1].sum(axis=1) for motion in library]
+    twist = np.degrees(yaws[STOPPING.index("twist_stop")])
+    assert 40.0 < np.abs(twist).max() <= 45.0 + 1e-9
+    for i, one in enumerate(yaws):
+        for other in yaws[i + 1 :]:
+            frames = min(len(one), len(other))
+            assert np.degrees(np.abs(one[:frames] - other[:frames]).max()) > 8.0
+
+
+@pytest.mark.parametrize("name", ACTING)
+class TestEveryMotion:
+    def test_length_and_rate(self, library, name):
+        assert 45 <= library[name].frames <= 150
+        assert library[name].fps == 30.0
+
+    def test_is_deterministic(self, library, name):
+        again = make_motion(name)
+        np.testing.assert_array_equal(again.poses, library[name].poses)
+        np.testing.assert_array_equal(again.translations, library[name].translations)
+
+    def test_joint_speeds_are_human(self, library, name):
+        speeds = joint_speeds(library[name])
+        assert 1.0 < speeds.max() < 15.0  # [rad/s]; a fast kick or punch is near 12
+
+    def test_speeds_change_smoothly(self, library, name):
+        # A step in a joint's speed of 15 rad/s within a frame would be 450 rad/s^2; a blow peaks near 200.
+        rotations = rotation_matrices(library[name].poses)
+        steps = np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:]
+        jerks = np.linalg.norm(steps[1:] - steps[:-1], axis=(-1, -2)) / np.sqrt(2) * 30.0**2
+        assert jerks.max() < 250.0  # [rad/s^2]
+
+    def test_knees_and_elbows_bend_the_human_way(self, library, name):
+        poses = library[name].poses
+        for side, inward in (("left", -1.0), ("right", 1.0)):
+            assert poses[:, JOINT[f"{side}_knee"], 0].min() > np.radians(-3)
+            assert poses[:, JOINT[f"{side}_knee"], 0].max() < np.radians(140)
+            assert (inward * poses[:, JOINT[f"{side}_elbow"], 1]).min() > np.radians(-3)
+
+    def test_feet_stay_on_or_above_the_floor(self, library, name):
+        lowest = sole_points(library[name].poses, library[name].translations)[..., 1].min(axis=1)
+        # The pelvis path is smoothed over a few hundredths of a second, so a toe pushing off dips a little.
+        assert lowest.min() > -0.035
+        assert lowest.max() < (0.4 if "jump" in name else 0.5 if name == RISING else 0.03)
+
+    def test_root_moves_at_human_pace(self, library, name):
+        velocity = np.diff(library[name].translations, axis=0) * 30.0
+        acceleration = np.diff(velocity, axis=0) * 30.0
+        assert np.linalg.norm(velocity, axis=1).max() < 4.0
+        assert np.linalg.norm(acceleration, axis=1).max() < 45.0  # a hard push-off is about 3.5 g
+
+    def test_starts_at_the_origin_facing_forward(self, library, name):
+        motion = library[name]
+        np.testing.assert_allclose(motion.translations[0, [0, 2]], 0.0, atol=1e-12)
+        assert abs(motion.translations[0, 1]) < 0.1
+        assert rotation_matrices(motion.poses[0, 0])[2, 2] > 0.95
+
+    def test_arms_are_clear_of_the_torso(self, library, name):
+        assert arm_clearance(library[name]).min() > ARMS_CLEAR
+
+
+def test_flight_of_a_jump_is_free_fall(library):
+    height = library["jump"].translations[:, 1]
+    flight = np.diff(height[29:41], n=2) * 30.0**2
+    np.testing.assert_allclose(flight, -9.81, rtol=0.02)
+
+
+def test_walk_has_the_published_speed_and_planted_feet(library):
+    motion = library["walk"]
+    steady = motion.translations[40:]
+    speed = (steady[-1, 2] - steady[0, 2]) / (len(steady) - 1) * 30.0
+    assert 1.0 < speed < 1.5  # [m/s] natural cadence
+    balls = sole_points(motion.poses, motion.translations)[40:, [1, 4]]
+    speeds = np.linalg.norm(np.diff(balls[..., [0, 2]], axis=0), axis=-1) * 30.0
+    # At every moment one foot is down; it slides slowly compared with the body.
+    assert np.median(speeds.min(axis=1)) < 0.25 * speed
+
+
+FROZEN = {  # frames, mean sizes of rotations [rad] and of translations [m]
+    "push_recovery": (72, 0.081678814, 0.045432383),
+    "dance_turn": (78, 0.101169306, 0.087090973),
+    "cartwheel_lean": (78, 0.088473662, 0.106607446),
+    "climbing_steps": (72, 0.104817920, 0.204505597),
+    "sit_and_stand": (84, 0.143868332, 0.130723748),
+}
+
+
+def test_the_test_motions_are_frozen(library):
+    """Who changes one makes another test set: docs/protocol.md."""
+    assert set(FROZEN) == set(TEST)
+    for name, (frames, turn, way) in FROZEN.items():
+        motion = library[name]
+        found = np.abs(motion.poses).mean(), np.abs(motion.translations).mean()
+        assert motion.frames == frames and found == pytest.approx((turn, way), abs=1e-8), name
+
+
+def test_climbing_goes_up_step_by_step_and_the_standing_foot_rests(library):
+    motion = library[RISING]
+    assert motion.translations[-1, 1] - motion.translations[0, 1] > 0.4
+    feet = sole_points(motion.poses, motion.translations)[:, [1, 4]]
+    speeds = np.linalg.norm(np.diff(feet, axis=0), axis=-1) * 30.0
+    assert np.median(speeds.min(axis=1)) < 0.15 < np.median(speeds.max(axis=1))
+    standing = np.sort(feet[:-1][speeds < 0.15][:, 1])  # heights at which a foot rests
+    steps = np.split(standing, np.flatnonzero(np.diff(standing) > 0.08) + 1)
+    rises = np.diff([step.mean() for step in steps])
+    assert len(rises) >= 2 and np.all((rises > 0.14) & (rises < 0.27))
+
+
+def test_the_nearest_pose_is_the_mean_angle_of_joints_whatever_the_heading():
+    random = np.random.default_rng(0)
+    poses = 0.4 * random.normal(size=(3, 24, 3))
+    assert nearest_pose(poses, poses[::-1]) == pytest.approx(0.0, abs=1e-6)
+    turned = poses.copy()
+    heading = rotation_matrices(np.array([0.0, 2.0, 0.0]))
+    turned[:, 0] = axis_angles(heading @ rotation_matrices(poses[:, 0]))
+    assert nearest_pose(turned, poses) == pytest.approx(0.0, abs=1e-6)
+    bent = turned.copy()
+    elbow = JOINT["left_elbow"]
+    bent[:, elbow] = axis_angles(
+        rotation_matrices(bent[:, elbow]) @ rotation_matrices(np.array([0.3, 0.0, 0.4]))
+    )
+    bent[:, JOINT["left_hand"]] += 1.0  # hands are left out
+    tilted = bent.copy()
+    tilt = rotation_matrices(np.array([0.2, 0.0, 0.0]))
+    tilted[:, 0] = axis_angles(rotation_matrices(bent[:, 0]) @ tilt)
+    up = rotation_matrices(bent[:, 0])[:, 1]
+    leaning = np.arccos(np.sum(up * (up @ tilt), axis=1))
+    assert nearest_pose(bent, poses) == pytest.approx(0.5 / 22, abs=1e-6)
+    assert nearest_pose(tilted, poses) == pytest.approx((0.5 + leaning) / 22, abs=1e-6)
+
+
+def test_sudden_stop_stops(library):
+    speed = np.diff(library["sudden_stop"].translations[:, 2]) * 30.0
+    assert speed[25:42].min() > 1.4
+    assert np.abs(speed[-10:]).max() < 0.05
+    fastest_braking = np.diff(speed).min() * 30.0
+    assert -20.0 < fastest_braking < -6.0  # [m/s^2]
+
+
+def test_unknown_names_list_the_known_ones():
+    with pytest.raises(MotionError, match=r"moonwalk.*jumping_jack"):
+        make_motion("moonwalk")
+    with pytest.raises(KeyError, match="tail_flexion"):
+        poses_from_angles({"tail_flexion": np.zeros(3)}, 3)
+
+
+def test_names_list_equals_the_tables():
+    from snug.motion.clips import ACTIONS, GAITS, STOPS
+
+    assert set(ACTING) == set(ACTIONS) | set(GAITS)
+    assert set(STOPS) == set(STOPPING)
+
+
+@pytest.mark.parametrize(
+    ("poses", "translations", "fps", "words"),
+    [
+        (np.zeros((3, 23, 3)), np.zeros((3, 3)), 30.0, "24, 3"),
+        (np.zeros((0, 24, 3)), np.zeros((0, 3)), 30.0, "24, 3"),
+        (np.zeros((3, 24, 3)), np.zeros((4, 3)), 30.0, "translations"),
+        (np.full((3, 24, 3), np.nan), np.zeros((3, 3)), 30.0, "finite"),
+        (np.zeros((3, 24, 3)), np.zeros((3, 3)), 0.0, "frames per second"),
+    ],
+)
+def test_a_motion_that_is_none_is_refused(poses, translations, fps, words):
+    with pytest.raises(MotionError, match=words):
+        Motion("bad", poses, translations, fps)
+
+
+def spinning(frames, fps, rate):
+    """The left elbow turns at a constant rate about a fixed axis; the root moves at constant velocity."""
+    time = np.arange(frames) / fps
+    poses = np.zeros((frames, 24, 3))
+    poses[:, JOINT["left_elbow"]] = rate * time[:, None] * np.array([0.6, 0.0, 0.8])
+    return Motion("spin", poses, np.outer(time, [0.0, 0.1, 1.0]), fps)
+
+
+@pytest.mark.parametrize(("frames", "fps"), [(121, 120.0), (76, 25.0), (90, 30.0), (122, 120.0)])
+def test_resample_keeps_ends_duration_and_uniform_turning(frames, fps):
+    motion = spinning(frames, fps, 1.0)
+    sampled = resample(motion, 30.0)
+    assert sampled.fps == 30.0
+    assert abs(sampled.duration - motion.duration) <= 0.5 / 30.0
+    ends = [0, -1]
+    np.testing.assert_allclose(sampled.poses[ends], motion.poses[ends], atol=1e-12)
+    np.testing.assert_allclose(sampled.translations[ends], motion.translations[ends], atol=1e-12)
+    turned = sampled.poses[:, JOINT["left_elbow"]]
+    share = np.linspace(0.0, 1.0, sampled.frames)[:, None]
+    np.testing.assert_allclose(turned, share * motion.poses[-1, JOINT["left_elbow"]], atol=1e-9)
+    if frames == 121:
+        np.testing.assert_allclose(sampled.poses, motion.poses[::4], atol=1e-12)
+
+
+def test_transition_leaves_and_arrives_at_rest():
+    goal = np.zeros((24, 3))
+    goal[JOINT["left_shoulder"]] = [0.0, 0.0, -1.2]
+    poses = transition(np.zeros((24, 3)), goal, 31)
+    np.testing.assert_allclose(poses[[0, 15, 30]], [0 * goal, 0.5 * goal, goal], atol=1e-12)
+    steps = np.abs(np.diff(poses[:, JOINT["left_shoulder"], 2]))
+    assert steps[0] < 1e-3 and steps[-1] < 1e-3 < steps.max()
+    with pytest.raises(MotionError, match="at least 2"):
+        transition(goal, goal, 1)
+
+
+def test_spread_arms_lifts_both_upper_arms_by_the_angle():
+    angles = {name: np.full(40, 70.0) for name in ("left_arm_lowering", "right_arm_lowering")}
+    hanging = Motion("hang", poses_from_angles(angles, 40), np.zeros((40, 3)))
+    joints = joint_positions(spread_arms(hanging, 20.0).poses, hanging.translations)
+    for side, outward in (("left", 1.0), ("right", -1.0)):
+        arm = joints[:, JOINT[f"{side}_elbow"]] - joints[:, JOINT[f"{side}_shoulder"]]
+        lowered = np.degrees(np.arctan2(-arm[:, 1], outward * arm[:, 0]))
+        np.testing.assert_allclose(lowered, 50.0, atol=1e-9)
+    assert spread_arms(hanging, 0.0) is hanging
+    close = arm_clearance(hanging).min()
+    assert close < ARMS_CLEAR < arm_clearance(clear_arms(hanging)).min()
+
+
+def test_a_turned_motion_faces_that_much_further_round_and_keeps_its_shape():
+    motion = make_motion("walk")
+    around = turned(motion, 2.0)
+    assert heading(around.poses[5]) == pytest.approx(heading(motion.poses[5]) + 2.0)
+    assert heading(turned(around, 2.0).poses[0]) == pytest.approx(heading(motion.poses[0]) + 4.0 - 2 * np.pi)
+    np.testing.assert_array_equal(around.poses[:, 1:], motion.poses[:, 1:])
+    np.testing.assert_array_equal(around.translations[0], 0.0)
+    path = motion.translations - motion.translations[0]
+    np.testing.assert_allclose(around.translations[:, 1], path[:, 1], atol=1e-12)
+    # From +z towards +x: x' = cos x + sin z.
+    np.testing.assert_allclose(
+        around.translations[:, 0], np.cos(2.0) * path[:, 0] + np.sin(2.0) * path[:, 2], atol=1e-12
+    )
+
+
+def test_place_faces_forward_on_the_floor():
+    rng = np.random.default_rng(3)
+    motion = standing(30)
+    motion.poses[:, 0] = [0.0, 2.1, 0.0]
+    start = np.array([3.0, -0.7, 1.0])
+    motion.translations[:] = start + np.cumsum(rng.normal(0, 0.01, (30, 3)), axis=0)
+    motion.translations[:10, 1] += 0.3  # it starts in the air: the floor is not where the first frame is
+    placed = place(motion)
+    np.testing.assert_allclose(placed.translations[0, [0, 2]], 0.0, atol=1e-12)
+    np.testing.assert_allclose(placed.poses[:, 0], 0.0, atol=1e-12)
+    assert abs(sole_points(placed.poses, placed.translations)[..., 1].min()) < 0.02
+    # The path turns with the body: distances stay.
+    before, after = (np.linalg.norm(np.diff(m.translations, axis=0), axis=1) for m in (motion, placed))
+    np.testing.assert_allclose(after, before, atol=1e-12)
+
+
+class TestSkeleton:
+    def test_is_the_bodys(self):
+        body = Body.load()
+        assert body.joint_names == JOINT_NAMES
+        assert tuple(body.parents) == PARENTS
+        np.testing.assert_allclose(REST_JOINTS, body.joints(), atol=0.01)
+
+    def test_moves_rigid_parts_as_skinning_does(self, library):
+        # Oracle: a vertex that hangs on one joint alone must ride on that joint's frame.
+        body = Body.load()
+        motion = library["spin_jump"].cut(30, 45)
+        vertices = body.vertices(motion.poses, motion.translations)
+        positions = joint_positions(motion.poses, motion.translations, body.joints())
+        rotations = global_rotations(motion.poses)
+        checked = 0
+        for joint in range(24):
+            for vertex in np.flatnonzero(body.skinning_weights[:, joint] > 1.0 - 1e-6)[:3]:
+                arm = body.template[vertex] - body.joints()[joint]
+                expected = positions[:, joint] + rotations[:, joint] @ arm
+                np.testing.assert_allclose(vertices[:, vertex], expected, atol=1e-5)
+                checked += 1
+        assert checked >= 15
+
+    def test_rest_soles_are_on_the_floor(self):
+        soles = sole_points(np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
+        np.testing.assert_allclose(soles[:, 1], 0.0, atol=1e-12)
+        body = Body.load().template
+        for point in soles:  # each sole point lies under the foot
+            assert np.linalg.norm(body - point, axis=1).min() < 0.03

@@ -1,0 +1,192 @@
+"""The learned baselines: what each network is made of, what teaches it, and the material of PBNS."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from reference_sim.energies.energy import Energy
+from snug.body.skinning import skin, unposed
+from snug.networks.dressed_body import DressedBody
+from snug.networks.roll_out import roll_out
+from snug.networks.tailornet import DROPOUT, FrequencyMixture, smoothed
+from snug.networks.trained_model import TrainedModel, make_network
+from snug.recipes.named import ABLATIONS, TRAININGS
+from snug.recipes.recipe import DEFAULT
+from snug.training.loss import PhysicsLoss
+from snug.training.pbns_material import SquaredContact, spring_terms
+from snug.training.train import train
+from tests.snug.training.dressing import swaying, tube_dress
+
+TAUGHT = ("supervised", "santesteban2019", "tailornet")
+
+
+def puffed(motion):
+    """A stand-in for a simulation: skinning of a wavy shirt, a little wider and lower."""
+    dressed = tube_dress()
+    rest = dressed.rest()
+    offsets = 0.05 * rest + torch.tensor([0.0, -0.01, 0.0]) + 0.002 * torch.sin(300 * rest[:, :1])
+    return dressed.skinned(motion, smoothing=20, offsets=offsets)
+
+
+def taught(kind, steps, **changes):
+    motion = swaying(24)
+    recipe = replace(TRAININGS[kind].recipe, **changes)
+    model = train(
+        kind, tube_dress(), [motion], steps=steps, seed=0, trajectories={motion.name: puffed(motion)},
+        recipe=recipe, progress=False, every=10,
+    )  # fmt: skip
+    return model, motion
+
+
+@pytest.mark.parametrize("kind", ["santesteban2019", "tailornet"])
+def test_a_taught_baseline_learns_its_targets_and_survives_its_file(kind, tmp_path):
+    model, motion = taught(kind, 30, learning_rate=2e-3, window=4 if kind != "tailornet" else 1)
+    assert model.history[-1]["loss"] < 0.5 * model.history[0]["loss"]
+    loaded = TrainedModel.load(model.save(tmp_path / "model.safetensors"))
+    target = puffed(motion)
+    run = roll_out(loaded, tube_dress(), motion)
+    assert np.array_equal(run.positions, roll_out(model, tube_dress(), motion).positions)
+    skinned = tube_dress().skinned(motion, smoothing=20)
+    error, start = (np.linalg.norm(x - target, axis=2).mean() for x in (run.positions, skinned))
+    assert error < 0.5 * start
+
+
+@pytest.mark.parametrize("kind", TAUGHT)
+def test_same_seed_same_taught_weights_whatever_was_drawn_before(kind):
+    first = taught(kind, 3)[0]
+    torch.rand(7)
+    again = taught(kind, 3)[0]
+    assert all(torch.equal(a, b) for a, b in zip(first.network.parameters(), again.network.parameters()))
+
+
+def test_sizes_are_those_of_the_papers():
+    santesteban = make_network("santesteban2019", 151, 4, TRAININGS["santesteban2019"].recipe, seed=0)
+    fit, gru = 10 * 20 + 20 + 20 * 12 + 12, 3 * (1500 * (151 + 1500) + 2 * 1500)
+    assert sum(p.numel() for p in santesteban.parameters()) == fit + gru + 1500 * 12 + 12
+    tailornet = make_network("tailornet", 151, 4, TRAININGS["tailornet"].recipe, seed=0)
+    inner = 1024 * 1024 + 1024 + 1024 * 12 + 12
+    assert sum(p.numel() for p in tailornet.parameters()) == (151 + 1) * 1024 + (141 + 1) * 1024 + 2 * inner
+
+
+def test_the_fit_reads_the_shape_alone():
+    """With the wrinkles' layer at zero, a change of pose changes nothing and a change of shape does."""
+    network = make_network("santesteban2019", 151, 4, replace(DEFAULT, zero_last_layer=False), seed=0)
+    torch.nn.init.zeros_(network.offsets.weight)
+    features = torch.zeros(3, 1, 151)
+    features[1, 0, :141], features[2, 0, 141] = 3.0, 3.0
+    with torch.no_grad():
+        still, posed, shaped = network(features)[0]
+    assert torch.equal(posed, still) and not torch.equal(shaped, still)
+
+
+@pytest.mark.parametrize("shapes", [0, 3])
+def test_a_body_of_fewer_shapes_has_zeros_for_the_rest(shapes):
+    """Else what is read as its shape is the end of the pose."""
+    dressed, motion = tube_dress(), swaying(5)
+    few = replace(dressed.body, shape_directions=dressed.body.shape_directions[..., :shapes],
+                  joint_directions=dressed.body.joint_directions[..., :shapes])  # fmt: skip
+    betas = np.arange(1.0, 1 + shapes)
+    features = DressedBody(few, dressed.garment).features(motion, DEFAULT, betas, kind="pose_shape")
+    whole = dressed.features(motion, DEFAULT, np.append(betas, np.zeros(10 - shapes)), kind="pose_shape")
+    assert torch.equal(features, whole) and features.shape == (5, 151)
+
+
+def test_pivots_share_by_their_distance_and_each_is_itself_at_home():
+    pivots = np.zeros((3, 10))
+    pivots[1, 0], pivots[2, 1] = 6.0, -6.0
+    network = FrequencyMixture(15, 5, pivots=pivots)
+    share = network.weights(torch.as_tensor(pivots, dtype=torch.float32))
+    assert torch.allclose(share.sum(-1), torch.ones(3)) and torch.allclose(share, torch.eye(3), atol=1e-6)
+    middle = network.weights(torch.as_tensor(0.5 * (pivots[0] + pivots[1]), dtype=torch.float32))
+    assert middle[0] == middle[1] > 0.49
+    features = torch.randn(2, 1, 15)
+    features[..., -10:] = torch.as_tensor(pivots[2])
+    network.normalise_by(np.zeros(15), np.ones(15))
+    alone = network.high[2](features[..., :-10], None).unflatten(-1, (5, 3))
+    assert torch.allclose(network.bands(features)[1], alone, atol=1e-5)
+
+
+def test_dropout_keeps_the_mean_and_is_absent_at_run_time():
+    network = FrequencyMixture(15, 5)
+    masks = network.random_state(4000, 0.3, torch.Generator().manual_seed(0))
+    assert masks.mean().item() == pytest.approx(1.0, abs=2e-3)
+    assert (masks == 0).float().mean().item() == pytest.approx(DROPOUT, abs=2e-3)
+    features = torch.randn(1, 1, 15)
+    assert torch.equal(network(features)[0], network(features)[0]) and network(features)[1] is None
+    assert not torch.equal(network(features, masks[:, :1])[0], network(features)[0])
+
+
+def test_smoothing_keeps_what_is_constant_and_takes_out_what_is_rough():
+    garment = tube_dress().garment
+    count = len(garment.rest_positions)
+    constant = np.tile([0.01, -0.02, 0.03], (2, count, 1))
+    assert np.abs(smoothed(constant, garment.faces) - constant).max() < 1e-12
+    rough = np.random.default_rng(0).normal(size=(2, count, 3))
+    assert smoothed(rough, garment.faces).std() < 0.5 * rough.std()
+    # The rims are smoothed along themselves: what happens inside does not reach them.
+    inside = rough.copy()
+    inside[:, :15] = inside[:, -15:] = 0.0
+    low = smoothed(inside, garment.faces)
+    assert np.abs(low[:, :15]).max() == 0.0 and np.abs(low[:, 15:-15]).max() > 0.0
+
+
+def test_unposing_is_the_inverse_of_skinning():
+    dressed, motion = tube_dress(), swaying(6)
+    weights, transforms = dressed.weights(20), dressed.transforms(motion.poses)
+    posed = skin(dressed.rest(), weights, transforms)
+    assert (unposed(posed, weights, transforms) - dressed.rest()).abs().max() < 1e-6
+
+
+def test_the_springs_of_pbns_by_hand():
+    """One edge stretched by 1 mm, one hinge bent, one vertex 3 mm too near: each in closed form."""
+    cloth = tube_dress().cloth
+    x = cloth.rest_positions
+    membrane, bending, gravity = spring_terms(cloth)
+    assert membrane.value_and_gradient(1.01 * x)[0] == pytest.approx(
+        15.0 * ((0.01 * cloth.edge_lengths) ** 2).sum()
+    )
+    assert np.ptp(gravity.weights) == 0.0
+    assert gravity.weights.sum() == pytest.approx(0.3 * 9.81 * cloth.areas.sum())
+    corners = x[cloth.hinges]
+    e = corners[:, 1] - corners[:, 0]
+    n0, n1 = np.cross(e, corners[:, 2] - corners[:, 0]), np.cross(corners[:, 3] - corners[:, 0], e)
+    n0, n1 = (n / np.linalg.norm(n, axis=1, keepdims=True) for n in (n0, n1))
+    exact = 5e-5 * ((n0 - n1) ** 2).sum()
+    assert exact <= bending.value_and_gradient(x)[0] < 1.05 * exact
+    contact = SquaredContact(cloth)
+    contact.points = x - np.array([0.0, 1.0, 0.0])
+    contact.normals = np.tile([0.0, 1.0, 0.0], (len(x), 1))
+    near = x.copy()
+    near[7, 1] -= 0.999
+    value, gradient = contact.value_and_gradient(near)
+    assert value == pytest.approx(25 * 0.003**2)
+    assert np.allclose(gradient, Energy.value_and_gradient(contact, near)[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("recipe", ABLATIONS, ids=lambda recipe: recipe.name)
+def test_an_ablation_leaves_out_what_it_says_and_never_evaluates_it(recipe, monkeypatch):
+    from snug.training import loss as module
+
+    asked = []
+    plain = module.summed
+
+    def noted(energy, *data, **how):
+        asked.append(energy.name)
+        return plain(energy, *data, **how)
+
+    monkeypatch.setattr(module, "summed", noted)
+    dressed = tube_dress()
+    loss = PhysicsLoss(dressed.cloth, recipe, dt=1 / 30)
+    frames = recipe.window
+    x = dressed.rest().expand(2, frames, -1, 3)
+    samples = len(loss.contact.stencils)
+    planes = np.full((2, frames, samples, 3), -9.0, np.float32), np.ones((2, frames, samples, 3), np.float32)
+    terms = loss(x, torch.zeros(2, frames, 3), planes)
+    assert tuple(sorted(terms)) == tuple(sorted(recipe.terms))
+    left_out = {"strain", "bending", "gravity", "inertia", "collision"} - set(recipe.terms)
+    assert not left_out & set(asked)
+    assert ("spring" in asked) == (recipe.material == "springs")

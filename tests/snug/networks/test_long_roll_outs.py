@@ -1,0 +1,155 @@
+"""Long roll-outs: both ends show one motion, a steady garment has no drift, a wandering one is found out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from benchmarks.assets.assets import Assets
+from benchmarks.methods import find_method
+from benchmarks.metric import RollOut, SceneRollOuts, skinned
+from benchmarks.metrics.motion import long_roll_out as metric
+from benchmarks.plan.selection import PRESETS
+from benchmarks.results.run_folder import model_path
+from benchmarks.scenes import find_scene, long_motion
+from benchmarks.scenes.long_motion import ENDS, EVERY, FRAMES, LOOP_BLEND
+from benchmarks.scenes.variations import there_and_back
+from benchmarks.tasks.cell_task import judge
+from benchmarks.timing import Reading
+from reference_sim import Trajectory
+from snug.motion.library import make_motion
+from snug.networks.roll_out import roll_out
+from snug.training.train import untrained_model
+from tests.snug.training.dressing import swaying, tube_dress
+
+SMOKE = PRESETS[0]
+
+
+def assets_of(dressed, *motions):
+    return Assets(dressed.body, {"tshirt": dressed.garment}, {motion.name: motion for motion in motions}, {})
+
+
+def found_of(scene, x):
+    """What is measured of the kept frames x (T,V,3) [m]."""
+    group = SceneRollOuts(scene)
+    trajectory = Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
+    group.roll_outs.append(RollOut(group, find_method("snug"), trajectory))
+    return metric.measure(group.roll_outs[0])
+
+
+def rolled(scene, models, name):
+    """The trajectory of that network, and what is measured of it."""
+    method = find_method(name).make(models=models, seed=0)
+    method.prepare(scene)
+    trajectory = method.run()
+    group = SceneRollOuts(scene)
+    group.roll_outs.append(RollOut(group, find_method(name), trajectory))
+    return trajectory, group.roll_outs[0]
+
+
+@pytest.mark.parametrize("frames", [5, 20, 77, 150])
+def test_the_last_hundred_frames_show_the_motion_of_the_first(frames):
+    motion = swaying(frames)
+    long = long_motion.there_and_back(motion)
+    assert FRAMES <= long.frames < FRAMES + 2 * frames
+    assert np.array_equal(long.poses[-ENDS:], long.poses[:ENDS])
+    assert np.array_equal(long.translations[-ENDS:], long.translations[:ENDS])
+    steps = np.abs(np.diff(long.translations, axis=0)).max()
+    assert steps <= np.abs(np.diff(motion.translations, axis=0)).max()
+
+
+def test_a_static_network_does_not_drift_and_a_spoilt_one_is_named(tmp_path):
+    dressed, motion = tube_dress(), swaying(20)
+    scene = there_and_back(motion.name).at(SMOKE).build(assets_of(dressed, motion))
+    untrained_model("pbns", dressed, [motion], seed=0).save(model_path(tmp_path, "pbns", 0))
+    moving = untrained_model("snug", dressed, [motion], seed=0)
+    with torch.no_grad():
+        moving.network.offsets.bias[0] = torch.nan
+    moving.save(model_path(tmp_path, "snug", 0))
+    trajectory, static = rolled(scene, tmp_path, "pbns")
+    found = metric.measure(static)
+    assert trajectory.frames == scene.frames == 2 * ENDS and found["roll_out/drift"] < 1e-3
+    assert found["roll_out/first"] == pytest.approx(found["roll_out/last"], rel=1e-4)
+    assert found["roll_out/first"] > 0.0
+    trajectory, spoilt = rolled(scene, tmp_path, "snug")
+    assert judge(trajectory, Reading(0.0), scene, truncated=False)[0] == "diverged"
+    assert metric.measure(spoilt) == {}
+
+
+def test_the_frames_that_are_kept_are_those_of_the_whole_roll_out(tmp_path):
+    dressed, motion = tube_dress(), swaying(30)
+    scene = there_and_back(motion.name).at(SMOKE).build(assets_of(dressed, motion))
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    model.save(model_path(tmp_path, "snug", 0))
+    trajectory, _ = rolled(scene, tmp_path, "snug")
+    whole = roll_out(model, dressed, long_motion.there_and_back(motion))
+    assert np.array_equal(trajectory.positions[:ENDS], whole.positions[:ENDS])
+    assert np.array_equal(trajectory.positions[ENDS:], whole.positions[-ENDS:])
+    assert np.array_equal(trajectory.times[ENDS:], whole.times[-ENDS:])
+
+
+def test_a_loop_comes_back_to_its_pose_and_goes_on_over_the_ground():
+    walk = make_motion("walk")
+    motion, early, late = long_motion.looped(walk, 1000)
+    loop = walk.frames + LOOP_BLEND
+    assert motion.frames == 1000 and len(early) == len(late) == loop and early[0] == loop
+    for frames in (early, late):
+        assert np.array_equal(motion.poses[frames], motion.poses[:loop])
+    assert late[-1] < 1000 <= late[-1] + loop
+    assert motion.translations[loop, 1] == pytest.approx(motion.translations[0, 1], abs=1e-12)
+    step = np.linalg.norm(np.diff(motion.translations, axis=0), axis=1)
+    assert step.max() == pytest.approx(
+        np.linalg.norm(np.diff(walk.translations, axis=0), axis=1).max(), rel=0.2
+    )
+    with pytest.raises(ValueError, match="a drift needs three loops, 390 frames, not 389"):
+        long_motion.looped(walk, 389)
+
+
+def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_held(tmp_path):
+    dressed, walk = tube_dress(), make_motion("walk")
+    scene = find_scene("out_of_distribution/long").at(SMOKE).build(assets_of(dressed, walk))
+    model = untrained_model("snug", dressed, [walk], seed=0)
+    model.save(model_path(tmp_path, "snug", 0))
+    trajectory, found = rolled(scene, tmp_path, "snug")
+    motion, early, late = long_motion.looped(walk, SMOKE.loop_frames)
+    assert set(scene.kept) == {*range(0, SMOKE.loop_frames, EVERY), *early, *late}
+    whole = roll_out(model, dressed, motion).positions
+    assert np.array_equal(trajectory.positions, whole[scene.kept])
+    assert [scene.kept[places].tolist() for places in scene.repeated] == [early.tolist(), late.tolist()]
+    bare = dressed.skinned(motion, smoothing=20)
+    assert skinned(found.group) == pytest.approx(bare[scene.kept], abs=1e-12)
+    # The state of an untrained network is soon forgotten.
+    assert 0.0 < metric.measure(found)["roll_out/drift"] < 1.0
+
+
+def test_a_garment_that_wanders_is_found_out_wherever_the_body_went():
+    dressed, walk = tube_dress(), make_motion("walk")
+    scene = find_scene("out_of_distribution/long").at(SMOKE).build(assets_of(dressed, walk))
+    motion = scene.dressed.motion
+    x = scene.cloth.rest_positions + motion.translations[scene.kept][:, None]
+
+    def drift(x) -> float:
+        return found_of(scene, x)["roll_out/drift"]
+
+    assert drift(x) < 1e-9
+    x[scene.repeated[1]] += [0.0, 0.003, 0.004]
+    assert drift(x) == pytest.approx(5.0)
+
+
+def test_energy_of_a_rigid_flight_is_none_and_a_stop_costs_inertia():
+    """Early it flies; late it stops: 5 frames each, the first two of which have no inertia."""
+    dressed = tube_dress()
+    scene = find_scene("out_of_distribution/long").at(SMOKE).build(assets_of(dressed, make_motion("walk")))
+    scene = replace(scene, frames=10, repeated=(np.arange(5), np.arange(5, 10)))
+    still = np.repeat(dressed.cloth.rest_positions[None], 10, axis=0)
+    bending = found_of(scene, still)["roll_out/first"]
+    x = still + 0.1 * np.arange(10)[:, None, None]
+    assert found_of(scene, x)["roll_out/last"] == pytest.approx(bending, rel=1e-9) and bending > 0.0
+    x[8:] = x[7]
+    found = found_of(scene, x)
+    expected = 0.5 * dressed.cloth.masses.sum() * 3 * (0.1 * 30) ** 2 / 3
+    assert found["roll_out/first"] == pytest.approx(bending, rel=1e-9)
+    assert found["roll_out/last"] - bending == pytest.approx(expected, rel=1e-9)

@@ -1,0 +1,116 @@
+"""The compiled frame against torch's own modules, for every kind of network and every precision."""
+
+import numpy as np
+import pytest
+import torch
+
+from snug.body.skinning import skin
+from snug.kernels import one_frame as frame_kernels
+from snug.networks.one_frame import PRECISIONS, CompiledFrame, FramePlan, rounded, stored
+from snug.networks.roll_out import predictions, roll_out, skinned_frames
+from snug.networks.tailornet import FrequencyMixture
+from snug.networks.trained_model import KINDS, TrainedModel, find_kind, make_network
+from snug.recipes.named import TRAININGS
+from tests.snug.training.dressing import swaying, tube_dress
+
+RECIPES = {training.kind: training.recipe for training in TRAININGS.values()}
+PINS = (3, 77)
+
+
+def random_model(kind: str) -> TrainedModel:
+    """Nothing in it is zero or one: weights, biases, statistics of the inputs; two vertices are held."""
+    dressed, recipe = tube_dress(), RECIPES[kind]
+    inputs = dressed.features(swaying(2), recipe, kind=find_kind(kind).features).shape[1]
+    network = make_network(kind, inputs, dressed.vertices, recipe, seed=0, pins=PINS)
+    generator = torch.Generator().manual_seed(1)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            spread = 1.5 * parameter.shape[-1] ** -0.5 if parameter.ndim == 2 else 0.2
+            parameter.copy_(spread * torch.randn(parameter.shape, generator=generator))
+        network.input_mean.copy_(0.3 * torch.randn(inputs, generator=generator))
+        network.input_std.copy_(0.5 + torch.rand(inputs, generator=generator))
+    return TrainedModel(kind, network.eval(), recipe)
+
+
+def by_torch(model: TrainedModel, motion) -> tuple[np.ndarray, np.ndarray]:
+    """World vertices (T, V, 3) and offsets, of the whole motion in one call of the modules."""
+    dressed = tube_dress()
+    features = dressed.features(motion, model.recipe, kind=find_kind(model.kind).features)
+    with torch.no_grad():
+        offsets = model.network(features[None])[0][0]
+    posed = dressed.skinned(motion, smoothing=model.recipe.smoothing, offsets=offsets)
+    return posed, offsets.numpy()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_a_compiled_frame_is_the_modules_own(kind, precision):
+    model, motion = random_model(kind), swaying(8)
+    model = model.rounded(precision)
+    expected, offsets = by_torch(model, motion)
+    found = roll_out(model, tube_dress(), motion).positions
+    size = np.abs(offsets).max()
+    assert size > 0.03 and (offsets[:, PINS] == 0.0).all()
+    assert np.abs(found - expected).max() < 3e-6 * max(size, 1.0)
+
+
+@pytest.mark.parametrize(("precision", "step"), [("bf16", 2.0**-7), ("int8", 1 / 127)])
+def test_stored_weights_are_the_nearest_of_their_precision(precision, step):
+    matrix = np.random.default_rng(0).normal(size=(40, 64)).astype(np.float32)
+    matrix[7], matrix[8, 3] = 0.0, 30.0
+    values, factors = stored(matrix, precision)
+    assert values.itemsize == {"bf16": 2, "int8": 1}[precision]
+    layer = torch.nn.Linear(64, 40)
+    layer.weight.data, before = torch.from_numpy(matrix.copy()), layer.bias.clone()
+    nearest = rounded(layer, precision)
+    assert torch.equal(nearest.bias, before) and torch.equal(layer.weight.data, torch.from_numpy(matrix))
+    size = np.abs(matrix) if precision == "bf16" else np.abs(matrix).max(axis=1)[:, None]
+    error = np.abs(nearest.weight.detach().numpy() - matrix)
+    assert (error <= 0.501 * step * size).all() and error.max() > 0.4 * step * size.mean()
+    again, same = stored(nearest.weight.detach().numpy(), precision)
+    assert np.array_equal(again, values) and np.allclose(same, factors, rtol=1e-6, atol=0.0)
+
+
+def test_an_unknown_precision_is_refused():
+    with pytest.raises(ValueError, match=r"'fp8'.*float32, bf16, int8"):
+        random_model("pbns").rounded("fp8")
+
+
+def test_several_pivots_are_refused():
+    network = FrequencyMixture(15, 5, pivots=np.zeros((2, 10)))
+    with pytest.raises(ValueError, match="2 pivots"):
+        network.lay_out(FramePlan(np.arange(5), 64, "float32"))
+
+
+@pytest.mark.parametrize(("vertices", "joints"), [(1, 2), (63, 5), (64, 24), (200, 24)])
+def test_skinning_by_blocks_is_skinning(vertices, joints):
+    random = np.random.default_rng(vertices)
+    weights = random.random((vertices, joints)) * (random.random((vertices, joints)) < 0.3)
+    weights[:, 0] += 1e-3
+    weights = torch.from_numpy(weights / weights.sum(1, keepdims=True)).float()
+    rest = torch.from_numpy(random.normal(size=(vertices, 3))).float()
+    transforms = torch.from_numpy(random.normal(size=(joints, 3, 4))).float()
+    frame, out, pelvis = CompiledFrame(rest, weights), np.full((vertices, 3), np.nan), random.normal(size=3)
+    frame(np.empty(0, np.float32), transforms.numpy(), pelvis, frame.start(), out)
+    expected = skin(rest.double(), weights.double(), transforms.double()).numpy() + pelvis
+    assert np.abs(out - expected).max() < 3e-6
+
+
+def test_two_roll_outs_at_once_keep_their_own_states():
+    model, motion = random_model("snug"), swaying(6)
+    begin = predictions(model, tube_dress(), motion)
+    alone = np.array(list(begin()))
+    together = np.array(list(zip(begin(), begin())))
+    assert np.array_equal(together[:, 0], alone) and np.array_equal(together[:, 1], alone)
+    assert np.abs(alone - np.array(list(skinned_frames(tube_dress(), motion, 20)()))).max() > 1e-3
+
+
+def test_gates_are_torchs_gates_and_not_a_number_stays_so():
+    x = np.concatenate([np.linspace(-30, 30, 4001), [-1e30, -200.0, 200.0, 1e30]]).astype(np.float32)
+    sigmoid = np.array([frame_kernels._sigmoid(value) for value in x])
+    assert np.abs(sigmoid - 1 / (1 + np.exp(-x.astype(np.float64).clip(-700)))).max() < 1.2e-7
+    assert np.isnan(frame_kernels._sigmoid(np.float32("nan")))
+    model = random_model("snug")
+    with torch.no_grad():
+        model.network.gru.bias_hh_l1[5] = float("nan")
+    assert roll_out(model, tube_dress(), swaying(2)).status == "diverged"

@@ -1,0 +1,248 @@
+"""The networks: what they see does not depend on what it should not, and what they start from is known."""
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial.transform import Rotation
+
+from snug.body.skeleton import axis_angles, rotation_matrices
+from snug.garments.garment import smooth_weights
+from snug.kernels import gru as fast_network
+from snug.motion.motion import Motion
+from snug.networks.motion_perceptron import MotionPerceptron
+from snug.networks.pbns import PoseSpaceDeformation
+from snug.networks.regressor import Regressor, parameter_megabytes
+from snug.networks.santesteban2019 import FitAndWrinkles
+from snug.networks.trained_model import make_network
+from snug.recipes.named import PAPER, RECIPES, find_recipe
+from snug.recipes.recipe import DEFAULT, Recipe, RecipeError
+from snug.training.training_set import TrainingSet
+from tests.snug.training.dressing import leaning, swaying, tube_dress
+
+
+def turned(motion: Motion, angle: float, shift: np.ndarray) -> Motion:
+    """The whole motion, turned about the vertical at the pelvis and moved."""
+    turn = rotation_matrices(np.array([0.0, angle, 0.0]))
+    poses = motion.poses.copy()
+    poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
+    return Motion(motion.name, poses, motion.translations @ turn.T + shift, fps=motion.fps)
+
+
+def test_paper_scale_network_has_the_papers_size():
+    network = Regressor(85, 4424)
+    gru = sum(p.numel() for p in network.gru.parameters())
+    # 3 gates x 256 x (inputs + 256 + 2 biases), first layer on 85 inputs and three on 256.
+    assert gru == 3 * 256 * (85 + 256 + 2) + 3 * 3 * 256 * (256 + 256 + 2)
+    assert sum(p.numel() for p in network.offsets.parameters()) == (256 + 1) * 3 * 4424
+    assert 18.0 < parameter_megabytes(network) < 20.0  # the paper prints 19 MB
+
+
+def test_the_default_network_is_below_twenty_megabytes_at_paper_scale():
+    data = TrainingSet(tube_dress(), [swaying(12)], DEFAULT, features="motion", sequences=True)
+    network = make_network("snug", data.features.shape[1], 4400, DEFAULT, seed=0)
+    assert data.features.shape[1] > 85 and 19.0 < parameter_megabytes(network) < 20.0
+
+
+def test_state_carries_a_sequence_over_a_cut():
+    network = Regressor(10, 7)
+    features = torch.randn(2, 9, 10)
+    whole, _ = network(features)
+    first, state = network(features[:, :4])
+    second, _ = network(features[:, 4:], state)
+    assert torch.allclose(whole, torch.cat([first, second], 1), atol=1e-6)
+    forgotten, _ = network(features[:, 4:])
+    assert (forgotten - second).abs().max() > 1e-3
+
+
+@pytest.mark.parametrize("kind", ["snug", "pbns"])
+def test_inputs_are_normalised_inside(kind):
+    network, plain = (make_network(kind, 12, 5, PAPER, seed=1) for _ in range(2))
+    mean, std = torch.randn(12), torch.rand(12) + 0.5
+    network.normalise_by(mean.numpy(), std.numpy())
+    features = torch.randn(2, 3, 12)
+    expected, _ = plain((features - mean) / std)
+    assert torch.allclose(network(features)[0], expected, atol=1e-6)
+
+
+def test_zero_last_layer_starts_at_the_template():
+    for kind in ("snug", "pbns"):
+        network = make_network(kind, 12, 5, DEFAULT, seed=1)
+        offsets, _ = network(torch.randn(3, 4, 12))
+        assert offsets.shape == (3, 4, 5, 3) and (offsets == 0).all()
+        random, _ = make_network(kind, 12, 5, PAPER, seed=1)(torch.randn(3, 4, 12))
+        assert random.abs().max() > 1e-3
+
+
+def test_seed_alone_decides_the_start():
+    torch.manual_seed(5)
+    a = make_network("snug", 12, 5, PAPER, seed=3)
+    before = torch.rand(1)
+    torch.manual_seed(5)
+    b = make_network("snug", 12, 5, PAPER, seed=3)
+    assert all(torch.equal(p, q) for p, q in zip(a.parameters(), b.parameters()))
+    assert torch.equal(before, torch.rand(1))  # and it leaves the caller's randomness alone
+    c = make_network("snug", 12, 5, PAPER, seed=4)
+    assert not torch.equal(a.offsets.weight, c.offsets.weight)
+
+
+def test_pbns_is_one_matrix_per_activation():
+    network = PoseSpaceDeformation(72, 6)
+    features = torch.randn(1, 1, 72)
+    offsets, state = network(features)
+    activations = network.activations(features)[0, 0]
+    matrix = network.offsets.weight.T.reshape(32, 6, 3)  # (32, V, 3)
+    expected = torch.einsum("i,ivc->vc", activations, matrix)
+    assert state is None and torch.allclose(offsets[0, 0], expected, atol=1e-6)
+
+
+def test_default_inputs_know_no_heading_and_no_place():
+    dressed, motion = tube_dress(), leaning(swaying())
+    moved = turned(motion, 1.1, np.array([3.0, 0.5, -2.0]))
+    plain, other = (dressed.features(m, DEFAULT) for m in (motion, moved))
+    assert torch.allclose(plain, other, atol=1e-6)
+    literal = dressed.features(moved, PAPER) - dressed.features(motion, PAPER)
+    assert literal.abs().max() > 0.5
+
+
+def test_default_inputs_begin_with_up_and_the_first_two_columns_of_each_rotation():
+    dressed, motion = tube_dress(), leaning(swaying(4))
+    found = dressed.features(motion, DEFAULT).numpy()
+    turns = Rotation.from_rotvec(motion.poses.reshape(-1, 3)).as_matrix().reshape(4, 24, 3, 3)
+    assert np.allclose(found[:, :3], turns[:, 0].transpose(0, 2, 1) @ [0.0, 1.0, 0.0], atol=1e-6)
+    for joint in range(1, 24):
+        six = found[:, 6 * joint - 3 : 6 * joint + 3]
+        assert np.allclose(six, np.concatenate([turns[:, joint, :, 0], turns[:, joint, :, 1]], 1), atol=1e-6)
+
+
+def test_default_inputs_know_lean_speed_and_shape():
+    dressed, motion = tube_dress(), swaying()
+    plain = dressed.features(motion, DEFAULT)
+    assert (dressed.features(leaning(motion), DEFAULT) - plain).abs().max() > 0.1
+    velocity = plain[:, -13:-10]
+    assert (velocity[0] == 0).all() and np.allclose(velocity[1:, 2], 1.2, atol=1e-5)
+    betas = np.linspace(-1, 1, 10)
+    assert np.allclose(dressed.features(motion, DEFAULT, betas)[:, -10:], betas, atol=1e-6)
+    assert dressed.features(motion, PAPER, kind="pose").shape == (motion.frames, 72)
+
+
+def test_dresser_agrees_with_the_body_in_the_world():
+    """A garment that is a piece of the body, with the body's weights, must land on the posed body."""
+    dressed, motion = tube_dress(), swaying()
+    betas = np.array([1.0, -0.5, 0.3, 0, 0, 0, 0, 0.2, 0, -0.4])
+    body = dressed.body
+    expected = body.vertices(motion.poses, motion.translations, betas)[:, ::97]
+    from snug.body.skinning import skin
+
+    weights = torch.as_tensor(body.skinning_weights[::97]).float()
+    rest = torch.as_tensor(body.shaped(betas)[::97]).float()
+    posed = skin(rest, weights, dressed.transforms(motion.poses, betas)).double().numpy()
+    assert np.abs(posed + dressed.pelvis(motion, betas)[:, None] - expected).max() < 1e-5
+
+
+def test_smoothing_reaches_as_far_on_every_mesh():
+    dressed = tube_dress()  # 150 vertices: 20 sweeps at 1000 are 3 here
+    expected = smooth_weights(dressed.garment.skinning_weights, dressed.garment.faces, 3)
+    assert np.abs(dressed.weights(20).numpy() - expected).max() < 1e-6
+    assert np.abs(dressed.weights(0).numpy() - dressed.garment.skinning_weights).max() < 1e-6
+
+
+def test_rest_follows_the_body_shape():
+    dressed = tube_dress()
+    betas = np.array([0.5, 2.0, -1.0, 0, 0, 1.0, 0, 0, 0, -2.0])
+    expected = dressed.garment.rest_for(dressed.body, betas)
+    assert np.abs(dressed.rest(betas).numpy() - expected).max() < 1e-6
+    assert np.abs(expected - dressed.garment.rest_positions).max() > 5e-3
+    assert dressed.rest(np.stack([betas, -betas])).shape == (2, dressed.vertices, 3)
+
+
+@pytest.mark.parametrize("recipe", RECIPES.values(), ids=list(RECIPES))
+def test_recipes_survive_a_file(recipe):
+    assert Recipe.from_dict(recipe.as_dict()) == recipe
+    assert find_recipe(recipe.name) is recipe
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"pose_input": "quaternion"}, "pose_input='quaternion'"),
+        ({"terms": ("strain", "wind")}, "'wind'"),
+        ({"window": 2}, "window"),
+        ({"learning_rate": 0.0}, "learning_rate"),
+        ({"even": 0}, "even"),
+        ({"weight_decay": -0.1}, "weight_decay"),
+        ({"mixed_lift": 1.5}, "mixed_lift"),
+        ({"mixed_lift": -0.1}, "mixed_lift"),
+    ],
+)
+def test_recipe_refuses_nonsense(options, words):
+    with pytest.raises(RecipeError, match=words):
+        Recipe(**options)
+
+
+def test_recipe_refuses_unknown_names():
+    with pytest.raises(RecipeError, match=r"'papers'.*default, paper"):
+        find_recipe("papers")
+    with pytest.raises(RecipeError, match="'momentum'"):
+        Recipe.from_dict({"momentum": 0.9})
+
+
+@pytest.mark.parametrize(
+    ("make", "frames", "state"),
+    [
+        (lambda: Regressor(12, 40, hidden=32, layers=3), 3, True),
+        (lambda: Regressor(12, 40, hidden=32, layers=3), 1, True),
+        (lambda: Regressor(12, 40, hidden=32, layers=3), 5, False),
+        (lambda: Regressor(12, 40, hidden=27, layers=2), 3, True),  # fills no vector register
+        (lambda: FitAndWrinkles(12, 40), 4, True),
+        (lambda: MotionPerceptron(12, 40), 3, False),
+    ],
+)
+def test_closed_forms_train_as_the_modules_do(make, frames, state):
+    torch.manual_seed(0)
+    network = make()
+    features, factor = torch.randn(4, frames, 12), torch.randn(4, frames, 40, 3)
+    start = 0.3 * torch.randn(len(network.gru.all_weights), 4, network.gru.hidden_size) if state else None
+    results = []
+    for closed_form in (True, False):
+        network.closed_form = closed_form
+        network.zero_grad()
+        offsets, last = network(features, start)
+        (offsets * factor).sum().backward()
+        gradients = {name: p.grad.clone() for name, p in network.named_parameters()}
+        results.append((offsets.detach(), None if last is None else last.detach(), gradients))
+    (a, a_last, a_gradients), (b, b_last, b_gradients) = results
+    assert torch.allclose(a, b, atol=1e-6)
+    assert last is None or torch.allclose(a_last, b_last, atol=1e-6)
+    for name, gradient in b_gradients.items():
+        assert gradient.norm() > 1e-3, name
+        assert (a_gradients[name] - gradient).norm() < 1e-5 * gradient.norm(), name
+
+
+def test_closed_forms_hide_no_window_that_is_no_number():
+    torch.manual_seed(0)
+    network = Regressor(12, 40, hidden=32, layers=3)
+    network.closed_form = True
+    features = 50.0 * torch.randn(4, 3, 12)  # far beyond where a gate is open or closed
+    features[2, 1, 5] = torch.nan
+    offsets, _ = network(features)
+    assert offsets[2, 1:].isnan().all() and offsets[[0, 1, 3]].isfinite().all()
+
+
+def test_without_gradients_a_network_gives_what_it_trains_with():
+    torch.manual_seed(0)
+    network = Regressor(12, 40, hidden=32, layers=3)
+    features, start = torch.randn(4, 3, 12), 0.3 * torch.randn(3, 4, 32)
+    expected, state = network(features, start)
+    with torch.no_grad():
+        found, last = network(features, start)
+        assert network.double()(features.double(), start.double())[0].dtype == torch.float64
+    assert expected.abs().max() > 0.1 and torch.allclose(found, expected, atol=1e-6)
+    assert torch.allclose(last, state, atol=1e-6)
+
+
+def test_product_without_onednn_is_the_same(monkeypatch):
+    a, b, bias = torch.randn(5, 8), torch.randn(6, 8), torch.randn(6)
+    fast = fast_network.product(a, b, bias)
+    monkeypatch.setattr(fast_network, "_LINEAR", None)
+    assert torch.allclose(fast, fast_network.product(a, b, bias), atol=1e-6)
+    assert torch.allclose(fast, a @ b.T + bias, atol=1e-6)

@@ -1,0 +1,153 @@
+"""A roll-out is the network one frame at a time: in the world, and as long as the motion."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from snug.networks.roll_out import RollOutError, collected, frame_inputs, predictions, roll_out
+from snug.networks.trained_model import TrainedModel, find_kind, make_network
+from snug.recipes.named import PAPER, TRAININGS
+from snug.recipes.recipe import DEFAULT
+from snug.training.train import untrained_model
+from tests.snug.training.dressing import swaying, tube_dress
+
+
+def test_zero_offsets_give_skinning_alone():
+    dressed, motion = tube_dress(), swaying()
+    inputs = dressed.features(motion, DEFAULT).shape[1]
+    model = TrainedModel("snug", make_network("snug", inputs, dressed.vertices, DEFAULT, seed=0), DEFAULT)
+    run = roll_out(model, dressed, motion)
+    assert run.positions.dtype == np.float64
+    assert np.abs(run.positions - dressed.skinned(motion, smoothing=DEFAULT.smoothing)).max() < 1e-6
+    assert run.status == "ok" and np.allclose(run.times, np.arange(motion.frames) / 30)
+
+
+@pytest.mark.parametrize("kind", ["snug", "pbns"])
+def test_frame_by_frame_equals_the_whole_sequence(kind):
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model(kind, dressed, [motion], seed=2)
+    features = dressed.features(motion, model.recipe, kind="motion" if kind == "snug" else "pose")
+    with torch.no_grad():
+        offsets, _ = model.network(features[None])
+    whole = dressed.skinned(motion, smoothing=model.recipe.smoothing, offsets=offsets[0])
+    run = roll_out(model, dressed, motion)
+    assert np.abs(run.positions - whole).max() < 1e-5
+    assert offsets.abs().max() > 1e-3
+
+
+def test_predictions_are_the_roll_out_a_frame_when_it_is_asked_for():
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    start = time.perf_counter()
+    run = roll_out(model, dressed, motion)
+    assert run.frame_seconds.shape == (motion.frames,) and (run.frame_seconds > 0.0).all()
+    assert run.frame_seconds.sum() < time.perf_counter() - start
+    begin = predictions(model, dressed, motion)
+    for _ in range(2):  # the state begins at zero again
+        frames, start = begin(), time.perf_counter()
+        first = next(frames)
+        assert time.perf_counter() - start < 0.05
+        assert np.array_equal([first, *frames], run.positions)
+
+
+@pytest.mark.parametrize("kind", ["snug", "dynamic", "pbns"])
+def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model(kind, dressed, [motion], seed=2)
+    whole = roll_out(model, dressed, motion).positions[5:]
+    before, rest = motion.cut(0, 5), motion.cut(5, motion.frames)
+    begin = predictions(model, dressed, rest, before=before)
+    for _ in range(2):
+        assert np.abs(np.array(list(begin())) - whole).max() < 1e-6
+    forgetful = np.array(list(predictions(model, dressed, rest)()))
+    assert kind == "pbns" or np.abs(forgetful - whole).max() > 1e-5
+    make, known = frame_inputs(model, dressed, motion), frame_inputs(model, dressed, rest, before=before)
+    assert torch.allclose(known(0)[0], make(5)[0], atol=1e-6)
+
+
+def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_computed_too():
+    computed = []
+
+    def frames():
+        for frame in range(6):
+            time.sleep(0.03 if frame == 4 else 0.0)
+            computed.append(frame)
+            yield np.full((2, 3), float(frame))
+
+    positions, seconds = collected(frames(), np.array([1, 4]))
+    assert computed == list(range(6)) and positions[:, 0, 0].tolist() == [1.0, 4.0]
+    assert seconds[1] > 0.03 > 3 * seconds[0]
+
+
+@pytest.mark.parametrize("kind", ["snug", "snug-dynamic", "pbns", "santesteban2019"])
+def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind):
+    dressed, motion = tube_dress(), swaying()
+    chosen = TRAININGS[kind]
+    model = untrained_model(chosen.kind, dressed, [motion], seed=0, recipe=chosen.recipe)
+    features = dressed.features(motion, model.recipe, kind=find_kind(model.kind).features)
+    transforms, pelvis = dressed.transforms(motion.poses), dressed.pelvis(motion)
+    make = frame_inputs(model, dressed, motion)
+    for frame in reversed(range(motion.frames)):
+        made = make(frame)
+        assert made[0].shape == features[frame].shape
+        assert torch.allclose(made[0], features[frame], rtol=1e-5, atol=1e-6)
+        assert torch.allclose(made[1], transforms[frame], rtol=1e-6, atol=1e-7)
+        assert np.array_equal(made[2], pelvis[frame])
+    assert features.diff(dim=0).abs().max() > 1e-2
+    assert frame_inputs(None, dressed, motion)(3)[0] is None
+
+
+def test_a_quasi_static_frame_forgets_the_past_and_the_velocity():
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    held = roll_out(model, dressed, motion, quasi_static=True)
+    reordered = type(motion)("back", motion.poses[::-1], motion.translations[::-1] * 2.0)
+    back = roll_out(model, dressed, reordered, quasi_static=True)
+    pelvis, other = dressed.pelvis(motion)[:, None], dressed.pelvis(reordered)[:, None]
+    assert np.abs((held.positions - pelvis) - (back.positions - other)[::-1]).max() < 1e-5
+    assert np.isnan(held.frame_seconds).all()
+    moving = roll_out(model, dressed, motion)
+    assert np.abs(moving.positions - held.positions).max() > 1e-5
+
+
+def test_body_shape_changes_the_roll_out():
+    dressed, motion = tube_dress(), swaying()
+    betas = np.array([0.0, 2.0, 0, 0, 0, 0, 0, 0, 0, 0])
+    inputs = dressed.features(motion, DEFAULT).shape[1]
+    model = TrainedModel("snug", make_network("snug", inputs, dressed.vertices, DEFAULT, seed=0), DEFAULT)
+    expected = dressed.skinned(motion, betas, smoothing=DEFAULT.smoothing)
+    assert np.abs(roll_out(model, dressed, motion, betas).positions - expected).max() < 1e-6
+    assert np.abs(expected - dressed.skinned(motion, smoothing=DEFAULT.smoothing)).max() > 5e-3
+    unshaped = dressed.skinned(motion, smoothing=DEFAULT.smoothing)
+    for shapes, least, most in (
+        (3.0, 1e-4, 1.0),
+        (0.0, 0.0, 1e-5),
+    ):  # the network itself sees shapes it has met
+        recipe = replace(DEFAULT, shape_range=shapes)
+        model = untrained_model("snug", dressed, [motion], seed=0, recipe=recipe)
+        offsets = roll_out(model, dressed, motion, betas).positions - expected
+        plain = roll_out(model, dressed, motion).positions - unshaped
+        assert least <= np.abs(offsets - plain).max() < most
+
+
+def test_misfits_are_named():
+    dressed, motion = tube_dress(), swaying()
+    with pytest.raises(RollOutError, match="7 vertices, the garment 150"):
+        roll_out(
+            TrainedModel("snug", make_network("snug", 154, 7, DEFAULT, seed=0), DEFAULT), dressed, motion
+        )
+    network = make_network("snug", 85, dressed.vertices, PAPER, seed=0)
+    with pytest.raises(RollOutError, match="reads 85 numbers"):
+        roll_out(TrainedModel("snug", network, DEFAULT), dressed, motion)
+
+
+def test_not_finite_is_a_status_not_a_crash():
+    dressed, motion = tube_dress(), swaying()
+    model = untrained_model("snug", dressed, [motion], seed=0)
+    with torch.no_grad():
+        model.network.offsets.bias[0] = float("nan")
+    run = roll_out(model, dressed, motion)
+    assert run.status == "diverged" and "not finite" in run.reason

@@ -1,0 +1,84 @@
+"""Deviations of the recipe: every option in which the recipes differ, as methods, and never a test motion."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import fields
+
+import pytest
+
+from benchmarks.methods import find_method
+from benchmarks.plan.motion_roles import choose_motions
+from benchmarks.plan.options import EXAMPLES
+from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.selection import Request, choose
+from benchmarks.presets import find_preset
+from snug.motion.library import TEST, VALIDATION
+from snug.recipes.deviations import DEVIATIONS
+from snug.recipes.named import PAPER, TRAININGS
+from snug.recipes.recipe import DEFAULT, Recipe
+
+NAMES = {
+    *(f"snug-without-{deviation.name}" for deviation in DEVIATIONS),
+    *(f"snug-paper-with-{deviation.name}" for deviation in DEVIATIONS),
+}
+
+
+def differing(a: Recipe, b: Recipe) -> set[str]:
+    names = (field.name for field in fields(Recipe))
+    return {name for name in names if name != "name" and getattr(a, name) != getattr(b, name)}
+
+
+def test_every_deviation_has_its_line_and_changes_nothing_else():
+    listed = [option for deviation in DEVIATIONS for option in deviation.options]
+    assert sorted(listed) == sorted(differing(DEFAULT, PAPER)) and len(NAMES) == 2 * len(DEVIATIONS)
+    for deviation in DEVIATIONS:
+        undone = TRAININGS[f"snug-without-{deviation.name}"].recipe
+        added = TRAININGS[f"snug-paper-with-{deviation.name}"].recipe
+        assert differing(undone, DEFAULT) == differing(added, PAPER) == set(deviation.options)
+        assert differing(undone, PAPER) == differing(DEFAULT, PAPER) - set(deviation.options)
+        assert f"snug-{undone.name}" in NAMES and f"snug-{added.name}" in NAMES
+
+
+def chosen(*methods, **changes):
+    words = {"suites": ("garments", "extremes"), "preset": find_preset("paper")} | changes
+    motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
+    cells = choose(Request(motions=motions, methods=methods, **words))[0]
+    return {cell.method for cell in cells}
+
+
+def test_a_deviation_is_a_method_for_whoever_names_it():
+    for name in NAMES:
+        entry = find_method(name)
+        assert entry.trained == name and entry.role == "ablation" and entry.seeded
+        assert entry.base == ("snug-paper" if "paper" in name else "snug")
+    assert not NAMES & chosen() and not NAMES & chosen(full=True)
+    assert chosen("snug-without-*") == {name for name in NAMES if "without" in name}
+    assert chosen("snug-paper-with-*") == NAMES - chosen("snug-without-*")
+    with pytest.raises(PlanError):
+        chosen(
+            "snug-without-*", suites=("extremes", "speed", "validation")
+        )  # what they are asked is garments
+
+
+def test_a_recipe_is_never_chosen_by_the_test_motions():
+    words = [word for line in EXAMPLES.splitlines() if "snug-without" in line for word in line.split()]
+    assert words and "--split validation" in EXAMPLES and "--test-motions" not in words
+    motions = choose_motions([], [], find_preset("quick"), split="validation")
+    assert motions.measured == VALIDATION and not set(TEST) & {*motions.measured, *motions.train}
+    with pytest.raises(PlanError, match="'dance_turn' is a test motion"):
+        choose_motions([], [], find_preset("quick"), validation_names=["dance_turn"], split="validation")
+
+
+@pytest.mark.parametrize("preset", ["smoke", "quick", "paper"])
+def test_all_are_trained_for_equally_many_steps(preset):
+    sizes = find_preset(preset)
+    assert len({sizes.steps_of(name, TRAININGS[name].kind) for name in ("snug", "snug-paper", *NAMES)}) == 1
+
+
+def test_deviations_are_listed_without_torch():
+    code = "import sys; from benchmarks.run import main; main(['--list'])"
+    code += "; sys.exit('torch' in sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ended.returncode == 0 and all(name in ended.stdout for name in NAMES)

@@ -1,0 +1,123 @@
+"""An energy that a user adds is in the training loss by one line of the simulator's registry."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from reference_sim import energies
+from snug.recipes.energies import find_energy
+from snug.recipes.recipe import TERMS, Recipe, RecipeError
+from snug.training.loss import PhysicsLoss, has_kernel
+from snug.training.train import train
+from tests.snug.training.dressing import swaying, tube_dress
+
+# What a user writes: a definition, and no derivative.
+SOURCE = """
+import torch
+
+from reference_sim.energies.energy import Energy
+
+
+class Tether(Energy):
+    '''E = k |x - x_rest|^4 of each vertex [J], k [N/m^3].'''
+
+    name = "tether"
+
+    def __init__(self, cloth, *, stiffness=40.0):
+        import numpy as np
+
+        self.cloth, self.stiffness = cloth, stiffness
+        self.stencils = np.arange(cloth.vertex_count)[:, None]
+        self.home = cloth.rest_positions
+
+    def element_energy(self, u):
+        apart = u[..., 0, :] - torch.as_tensor(self.home).to(u)
+        return self.stiffness * apart.square().sum(-1) ** 2
+"""
+PLAIN = Recipe(name="plain", smoothing=0, mixed=0.0, batch=4)
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """A recipe with the user's term, whose file and whose line in the registry are there."""
+    (tmp_path / "tether.py").write_text(SOURCE)
+    monkeypatch.setattr(energies, "__path__", [*energies.__path__, str(tmp_path)])
+    monkeypatch.setitem(energies.MODULE_OF, "Tether", "tether")
+    yield replace(PLAIN, name="tethered", terms=(*TERMS, "tether"))
+    sys.modules.pop("reference_sim.energies.tether", None)
+
+
+def trained(recipe, steps=6, **options):
+    return train(
+        "snug", tube_dress(), [swaying(20)], steps=steps, seed=1, recipe=recipe, progress=False, every=2,
+        **options,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kernels", [True, False])
+def test_its_gradient_is_that_of_finite_differences(own, kernels):
+    cloth = tube_dress().cloth
+    loss = PhysicsLoss(cloth, replace(own, terms=("tether",)), dt=1 / 30, kernels=kernels)
+    random = np.random.default_rng(0)
+    shifts = 0.1 * random.normal(size=(2, 3, *cloth.rest_positions.shape))
+    x = torch.as_tensor(cloth.rest_positions + shifts).requires_grad_()
+
+    def value(at):
+        return loss(at, torch.zeros(2, 3, 3), None)["tether"]
+
+    assert value(x).shape == (2, 3)
+    factors = torch.arange(1.0, 7.0, dtype=torch.float64).view(2, 3)
+    (gradient,) = torch.autograd.grad((value(x) * factors).sum(), x)
+    assert gradient.norm() > 0.1
+    step = 1e-5
+    for n, t, v, axis in ((0, 0, 0, 0), (1, 2, 7, 1), (0, 1, 11, 2)):
+        shift = torch.zeros_like(x)
+        shift[n, t, v, axis] = step
+        above, below = ((value(x.detach() + sign * shift) * factors).sum() for sign in (1, -1))
+        assert float(gradient[n, t, v, axis]) == pytest.approx(float(above - below) / (2 * step), rel=1e-5)
+
+
+@pytest.mark.parametrize("kernels", [True, False])
+def test_training_with_it_goes_another_way_and_knows_its_recipe(own, kernels, tmp_path):
+    with_it = trained(own, kernels=kernels)
+    without = trained(replace(own, terms=TERMS), kernels=kernels)
+    assert list(with_it.history[-1])[2:9] == ["loss", *TERMS[:3], "tether", *TERMS[3:]]
+    last = with_it.history[-1]
+    assert last["loss"] == pytest.approx(sum(last[term] for term in own.terms))
+    assert last["tether"] > 0.0 and "tether" not in without.history[-1]
+    one, two = (model.network.offsets.weight for model in (with_it, without))
+    assert not torch.equal(one, two)
+    again = type(with_it).load(with_it.save(tmp_path / "own.safetensors"))
+    assert again.recipe == own and again.recipe != without.recipe
+
+
+def test_a_term_with_a_kernel_uses_it_and_one_without_its_definition(own):
+    terms = PhysicsLoss(tube_dress().cloth, own, dt=1 / 30).static
+    assert [name for name, term in terms.items() if has_kernel(term)] == ["strain", "bending", "gravity"]
+    assert list(terms) == ["strain", "bending", "gravity", "tether"]
+
+
+def test_an_energy_of_the_simulator_that_no_recipe_here_has_can_be_trained():
+    rows = trained(replace(PLAIN, terms=(*TERMS, "area_barrier")), steps=2).history
+    assert np.isfinite(rows[-1]["loss"]) and "area_barrier" in rows[-1]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("wind", "unknown energy 'wind': use one of area_barrier, bending, gravity, .*spring, .*strain"),
+        ("friction", "is made of (contact|barrier)"),
+        ("barrier", "prepared for each step"),
+    ],
+)
+def test_what_cannot_be_trained_is_refused_in_one_line(name, words):
+    with pytest.raises(RecipeError, match=words) as caught:
+        Recipe(terms=("strain", name))
+    assert "\n" not in str(caught.value)
+    with pytest.raises(ValueError, match=words):
+        find_energy(name)

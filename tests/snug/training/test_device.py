@@ -1,0 +1,257 @@
+"""The step that a GPU runs, on the CPU: torch definitions and torch contact give what the kernels give, and
+nothing is made anywhere but where it is told to."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+import torch
+from torch.overrides import TorchFunctionMode
+
+from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
+from snug.body.skinning import skin
+from snug.kernels.energies import batched_kernel
+from snug.kernels.lanes import laid, unlaid
+from snug.recipes.named import PAPER
+from snug.recipes.recipe import DEFAULT
+from snug.training.contact.cache import PARTS, ContactCache, Patch
+from snug.training.contact.cache_torch import TensorContactCache
+from snug.training.device import CPU, DeviceError, find_device
+from snug.training.loss import STATIC, on_device
+from snug.training.trainer import Trainer
+from snug.training.training_set import TrainingSet
+from tests.snug.training.dressing import swaying, tube_dress
+
+PLAIN = replace(DEFAULT, mixed=0.0)
+
+
+def made(recipe, *, kernels, kind="snug"):
+    return Trainer(kind, tube_dress(), [swaying(144)], steps=20, seed=0, recipe=recipe, kernels=kernels)
+
+
+@pytest.mark.parametrize(
+    ("kind", "recipe"),
+    [
+        ("snug", PLAIN),
+        ("snug", PAPER),
+        ("pbns", replace(PLAIN, material="pbns", contact_samples="vertices")),
+        ("snug", replace(PLAIN, material="springs")),
+    ],
+    ids=["default", "paper", "pbns-springs", "springs"],
+)
+def test_definitions_train_as_the_kernels_do(kind, recipe):
+    """Several steps: terms, and the gradient that the last of them left behind."""
+    # No frame twice in a step: there its anchors would walk once by torch, and twice by the kernels.
+    recipe = replace(recipe, contact_refresh=0.0, window_stride=3 if kind == "snug" else 1)
+    fast, slow = (made(recipe, kernels=k, kind=kind) for k in (True, False))
+    if fast.contact and slow.contact:  # the torch search finds the closest face where the walk may be rough
+        tensors, facts = fast.contact.state()
+        changed = torch.arange(fast.data.frames)
+        anchors = fast.contact.cache
+        held = {"faces": anchors.faces, "barycentric": anchors.barycentric}
+        tensors |= {"changed": changed} | {key: torch.as_tensor(array.copy()) for key, array in held.items()}
+        slow.contact.resume(tensors, facts)
+    with torch.no_grad():  # off the template and into the skin, so that every term has something to say
+        for trainer in (fast, slow):
+            generator = torch.Generator().manual_seed(1)
+            noise = torch.randn(trainer.network.offsets.weight.shape, generator=generator)
+            trainer.network.offsets.weight += (0.7 if kind == "pbns" else 0.02 / recipe.output_scale) * noise
+    for number in range(3):
+        one, other = fast.step(number), slow.step(number)
+        assert one.keys() == other.keys()
+        for name, value in one.items():
+            # A foot on the border of two faces may be rounded to either side, and the anchor go another way.
+            assert other[name] == pytest.approx(value, rel=5e-5 if name in STATIC else 1e-2), name
+    if "collision" in one:
+        assert one["collision"] > 1e-4
+    for name, parameter in fast.network.named_parameters():
+        theirs = dict(slow.network.named_parameters())[name].grad
+        assert (parameter.grad - theirs).norm() < 2e-3 * parameter.grad.norm() + 1e-9, name
+
+
+def test_torch_search_is_no_worse_than_the_walk():
+    dressed, motion = tube_dress(), swaying()
+    contact = ContactPenalty(dressed.cloth)
+    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
+    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(motion.poses[[3, 8]])
+    positions = skin(torch.as_tensor(patch.rest), weights, transforms)
+    garment = skin(dressed.rest(), dressed.weights(5), transforms)[1].numpy()
+    samples = (contact.sample_matrix @ garment + [0.0, 0.05, 0.0]).astype(np.float32)
+    walk, brute = ContactCache(patch, 2), TensorContactCache(patch, 2, CPU)
+    walk.requery(1, samples, positions[1].numpy())
+    brute.requery(1, torch.as_tensor(samples), positions[1])
+    found = []
+    for anchors in (walk, brute):
+        faces = patch.faces[np.asarray(anchors.faces[1])]
+        last = np.asarray(anchors.barycentric[1]) / PARTS
+        corner = positions[1].numpy()[faces]
+        point = corner[:, 0] + np.einsum("sc,sci->si", last, corner[:, 1:] - corner[:, :1])
+        found.append(np.linalg.norm(point - samples, axis=1))
+        assert last.min() > -1e-5 and last.sum(1).max() < 1 + 1e-5
+    # Away from the skin the walk keeps an old anchor unless there is one half as far.
+    assert (found[1] < found[0] + 1e-5).all() and (found[0] < 2 * found[1] + 1e-5).all()
+    assert list(walk.age) == list(brute.age) and (brute.faces[0].numpy() == walk.faces[0]).all()
+
+
+@pytest.mark.parametrize("region", [0.2, 0.06])
+def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
+    """From the anchors of another pose: on one smooth sheet a walk ends where a search ends, unless the rule
+    of regions is so narrow that it stops the walk.
+    """
+    dressed, motion = tube_dress(), swaying()
+    contact, body = ContactPenalty(dressed.cloth), dressed.body
+    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces, region=region)
+    weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(motion.poses[[2, 9]])
+    positions = skin(torch.as_tensor(patch.rest), weights, transforms)
+    normals = patch.normals(positions.numpy())
+    x = skin(dressed.rest(), dressed.weights(5), transforms) + torch.tensor([0.0, 0.03, -0.05])
+    samples = torch.stack([torch.as_tensor(contact.sample_matrix @ y).float() for y in x.numpy()])
+    frames, rows = np.array([1, 0]), np.arange(2)
+    still, fast, searched, slow = (
+        *(ContactCache(patch, 2) for _ in range(3)),
+        TensorContactCache(patch, 2, CPU),
+    )
+    lanes = laid(x[:, None])
+    on = (contact, lanes, np.zeros_like(lanes), frames[:, None], rows[:, None], positions.numpy(), normals)
+    assert fast.energy(*on).sum() > 0 and (fast.faces == still.faces).all()
+    fast.energy(*on, walk=True)
+    slow.walk(samples, frames, rows, positions, torch.as_tensor(normals).float(), reach=contact.margin)
+    for row, frame in enumerate(frames):
+        searched.requery(int(frame), samples[row].numpy(), positions[row].numpy(), exact=True)
+
+    def distance(anchors):
+        points, _ = ContactCache.planes(anchors, frames, rows, positions.numpy(), normals)
+        return np.linalg.norm(points - samples.numpy(), axis=-1)
+
+    moved = fast.faces[frames] != still.faces[frames]
+    slow.faces, slow.barycentric = slow.faces.numpy(), slow.barycentric.numpy()
+    off = {name: np.abs(distance(anchors) - distance(searched))[moved]
+           for name, anchors in (("still", still), ("fast", fast), ("slow", slow))}  # fmt: skip
+    assert moved.mean() > 0.1 and np.mean(off["still"] < 1e-4) < 0.2
+    if region > 0.1:
+        assert np.mean(off["fast"] < 1e-4) > 0.9
+    assert np.mean(np.abs(off["fast"] - off["slow"]) < 1e-5) > 0.99
+    for anchors in (fast, slow):
+        home = np.linalg.norm(patch.sample_rest - patch.centroids[anchors.faces], axis=-1)
+        assert (home[anchors.faces != still.faces] < region).all()
+
+
+def test_torch_planes_are_the_kernels_planes():
+    dressed, motion = tube_dress(), swaying()
+    contact = ContactPenalty(dressed.cloth)
+    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
+    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
+    positions = skin(torch.as_tensor(patch.rest), weights, dressed.transforms(motion.poses[:3]))
+    numbers, torches = ContactCache(patch, 3), TensorContactCache(patch, 3, CPU)
+    frames = np.array([2, 0])
+    points, normals = numbers.planes(frames, frames, positions.numpy(), patch.normals(positions.numpy()))
+    theirs = torches.planes(frames, frames, positions, torches.normals(positions))
+    assert np.abs(points - theirs[0].numpy()).max() < 1e-6
+    # A normal on the border of two of its 127 steps may fall on either side.
+    off = np.abs(normals - theirs[1].numpy()).max(-1)
+    assert np.mean(off > 1e-6) < 0.01 and off.max() < 0.01
+
+
+MAKERS = (
+    torch.zeros, torch.ones, torch.full, torch.empty, torch.eye, torch.arange, torch.tensor, torch.as_tensor,
+    torch.from_numpy, torch.rand, torch.randn, torch.randperm,
+)  # fmt: skip
+
+
+class Unplaced(TorchFunctionMode):
+    """Lists tensors that are made without a word about the device they belong on."""
+
+    def __init__(self):
+        super().__init__()
+        self.found = []
+
+    def __torch_function__(self, function, types, args=(), kwargs=None):
+        kwargs = kwargs or {}
+        if function in MAKERS and kwargs.get("device") is None and not isinstance(args[0], torch.Tensor):
+            self.found.append(function.__name__)
+        return function(*args, **kwargs)
+
+
+@pytest.mark.parametrize("recipe", [PLAIN, PAPER], ids=["default", "paper"])
+def test_a_step_makes_nothing_but_where_it_is_told_to(recipe):
+    trainer = made(replace(recipe, contact_refresh=0.1), kernels=False)
+    with Unplaced() as unplaced:
+        row = trainer.step(0)
+    assert unplaced.found == [] and np.isfinite(row["loss"])
+
+
+def test_a_set_lies_where_it_is_told_to():
+    meta = torch.device("meta")
+    data = TrainingSet(tube_dress(), [swaying(12)], PAPER, features="motion", sequences=True, device=meta)
+    batch = data.batch(np.array([0, 1]), np.zeros((2, 10)))
+    for tensor in (batch.features, batch.rest, batch.transforms, batch.ahead, batch.betas):
+        assert tensor.device == meta
+    assert batch.transforms.shape == (2, 3, 24, 3, 4) and batch.rest.shape == (2, 1, 150, 3)
+
+
+def lane_by_lane(kernel, x):
+    """Values (N,) and gradients (N, V, 3) that a kernel of lanes gives for x (N, V, 3)."""
+    lanes = laid(torch.as_tensor(x)[:, None])
+    gradients = np.zeros_like(lanes)
+    values = kernel(lanes, gradients)
+    return (unlaid(found, len(x), 1)[:, 0].numpy() for found in (values, gradients))
+
+
+@pytest.mark.parametrize("count", [1, 16, 21])
+@pytest.mark.parametrize("E", [StretchStVK, BendHinge, partial(BendHinge, rest_angles=2.5), Gravity])
+def test_lanes_agree_with_the_definition(E, count):
+    """Also where hinges are folded over and where a configuration is not finite."""
+    dressed = tube_dress()
+    energy, random = E(dressed.cloth), np.random.default_rng(count)
+    crumpled = np.where(np.arange(count) % 3, 0.004, 0.05)[:, None, None]
+    x = dressed.cloth.rest_positions + crumpled * random.normal(size=(count, dressed.vertices, 3))
+    x = x.astype(np.float32)
+    values, gradients = lane_by_lane(batched_kernel(energy), x)
+    for n in range(count):
+        exact, slope = energy.value_and_gradient(x[n].astype(float))
+        assert values[n] == pytest.approx(exact, rel=2e-5)
+        assert np.linalg.norm(gradients[n] - slope) < 2e-4 * np.linalg.norm(slope)
+    assert batched_kernel(ContactPenalty(dressed.cloth)) is None
+    x[-1, 3] = np.nan
+    values, _ = lane_by_lane(batched_kernel(energy), x)
+    assert np.isnan(values[-1]) and np.isfinite(values[:-1]).all()
+
+
+def test_held_energies_have_all_their_arrays_on_the_device():
+    meta = torch.device("meta")
+    twin = on_device(StretchStVK(tube_dress().cloth), meta)
+    tensors = [value for value in vars(twin).values() if isinstance(value, torch.Tensor)]
+    assert len(tensors) == 3 and {tensor.device for tensor in tensors} == {meta}
+    assert {tensor.dtype for tensor in tensors} == {torch.float32, torch.int64}
+    assert not [value for value in vars(twin).values() if isinstance(value, np.ndarray)]
+
+
+def test_absent_devices_are_one_line(capsys, tmp_path):
+    from snug.train import main
+
+    for name in ("tpu", "mps", "cuda:99"):
+        with pytest.raises(DeviceError, match=f"--device {name}"):
+            find_device(name)
+    if not torch.cuda.is_available():
+        out = tmp_path / "model.safetensors"
+        assert main(["--device", "cuda", "-o", str(out)]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and "--device cuda" in error and "--device cpu" in error
+        assert not out.exists()
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")
+def test_the_harness_hands_the_device_on(tmp_path):
+    """An absent device is refused where the plan is made, and would be refused where training starts."""
+    from benchmarks.plan.make_plan import check_device
+    from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
+
+    dressed, motion = tube_dress(), swaying(12)
+    task = training("snug", motion.name, steps=2, device="cuda")
+    with pytest.raises(DeviceError, match="--device cuda"):
+        check_device("cuda")
+    with pytest.raises(DeviceError, match="--device cuda"):
+        task.run(context(tmp_path, assets_of(dressed, motion)), {})

@@ -1,0 +1,181 @@
+"""Bad batches are named, their updates left out, and lost weights come back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from snug.recipes.named import PAPER
+from snug.recipes.recipe import DEFAULT
+from snug.training.divergence_guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
+from snug.training.run import TrainingRun
+from snug.training.trainer import Trainer
+from snug.training.training_set import TrainingError
+from tests.snug.training.dressing import swaying, tube_dress
+
+PLAIN = replace(DEFAULT, mixed=0.0, schedule="constant")
+
+
+def test_guard_names_a_window_and_keeps_the_weights():
+    trainer = Trainer("snug", tube_dress(), [swaying(120)], steps=8, seed=0, recipe=PLAIN)
+    before = trainer.network.offsets.weight.clone()
+    trainer.data.features[20] = float("nan")  # in 3 of 118 windows: in at most 3 of the first 8 batches
+    for number in range(8):
+        trainer.step(number)
+    assert 1 <= trainer.guard.summary["skipped_updates"] <= 3
+    named = trainer.guard.summary["named_windows"][0]
+    assert named["action"] == "update left out" and "motion 'sway' frame" in named["window"]
+    after = trainer.network.offsets.weight
+    assert torch.isfinite(after).all() and not torch.equal(before, after)
+
+
+def test_guard_counts_high_windows_and_clips():
+    recipe = replace(PLAIN, spike=1e-6, gradient_limit=1e-3)
+    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=99, seed=0, recipe=recipe)
+    trainer.step(0)
+    assert trainer.guard.summary["high_windows"] == 0  # the first steps are not judged
+    trainer.step(60)
+    assert trainer.guard.summary["high_windows"] == 16
+    norms = [p.grad.norm() for p in trainer.network.parameters()]
+    assert torch.stack(norms).norm() == pytest.approx(1e-3, rel=1e-2)
+
+
+def test_training_gives_up_with_a_reason():
+    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=200, seed=0, recipe=PLAIN)
+    trainer.data.features[:] = float("nan")
+    with pytest.raises(TrainingError, match=r"diverged.*motion 'sway' frame"):
+        TrainingRun(trainer, every=10).go()
+
+
+def made(recipe=PLAIN, frames=30):
+    return Trainer("snug", tube_dress(), [swaying(frames)], steps=400, seed=0, recipe=recipe)
+
+
+def weights_of(trainer):
+    return torch.cat([p.detach().flatten() for p in trainer.network.parameters()])
+
+
+def test_lost_weights_come_back():
+    """A gradient that is not finite ruins the weights, and with them every later batch."""
+    trainer = made()
+    for number in range(SNAPSHOT_EVERY + 3):
+        trainer.step(number)
+    before = weights_of(trainer)
+    with torch.no_grad():
+        trainer.network.offsets.bias[7] = float("nan")
+    losses = [trainer.step(SNAPSHOT_EVERY + 3 + k)["loss"] for k in range(PATIENCE + 2)]
+    assert not np.isfinite(losses[:PATIENCE]).any() and np.isfinite(losses[PATIENCE:]).all()
+    summary = trainer.guard.summary
+    assert summary["restored"] == 1 and summary["skipped_updates"] == PATIENCE
+    assert summary["named_windows"][-1]["action"] == f"weights of step {SNAPSHOT_EVERY} restored, rate halved"
+    assert "motion 'sway' frame" in summary["named_windows"][-1]["window"]
+    assert trainer.optimiser.param_groups[0]["lr"] == 0.5 * PLAIN.learning_rate
+    assert (weights_of(trainer) - before).abs().max() < 0.02  # a few steps of 1e-3, and as many back
+
+
+def test_a_gradient_that_is_not_finite_is_not_followed():
+    """Its energies are fine, so nothing else would tell."""
+    trainer = made()
+    for number in range(3):
+        trainer.step(number)
+    before = weights_of(trainer)
+    spoilt = trainer.network.offsets.weight.register_hook(lambda gradient: gradient * float("nan"))
+    assert np.isfinite(trainer.step(3)["loss"])
+    spoilt.remove()
+    assert torch.equal(weights_of(trainer), before)
+    (named,) = trainer.guard.summary["named_windows"]
+    assert named["action"] == "gradient not finite, update left out" and named["step"] == 3
+    assert "motion 'sway' frame" in named["window"] and trainer.guard.summary["skipped_updates"] == 1
+    trainer.step(4)
+    assert not torch.equal(weights_of(trainer), before) and torch.isfinite(weights_of(trainer)).all()
+
+
+def test_gradients_that_are_not_finite_in_a_row_bring_good_weights_back():
+    """Something in the weights is broken that no energy shows: waiting would not mend it."""
+    trainer = made()
+    for number in range(4):
+        trainer.step(number)
+    spoilt = trainer.network.offsets.weight.register_hook(lambda gradient: gradient * float("nan"))
+    good = {name: tensor.clone() for name, tensor in trainer.guard.state()[0].items()}
+    for number in range(4, 4 + PATIENCE):
+        assert trainer.guard.summary["restored"] == 0
+        assert np.isfinite(trainer.step(number)["loss"])
+    spoilt.remove()
+    assert trainer.guard.summary["restored"] == 1
+    assert torch.equal(trainer.network.offsets.weight, good["network.offsets.weight"])
+    trainer.step(4 + PATIENCE)
+    assert trainer.optimiser.param_groups[0]["lr"] == 0.5 * PLAIN.learning_rate
+
+
+def test_training_gives_up_over_gradients_too():
+    trainer = made()
+    trainer.network.offsets.weight.register_hook(lambda gradient: gradient * float("inf"))
+    with pytest.raises(TrainingError, match=r"100 updates in a row not finite, last motion 'sway' frame"):
+        for number in range(GIVE_UP):
+            trainer.step(number)
+
+
+def test_runaway_energy_brings_good_weights_back():
+    trainer = made()
+    for number in range(SETTLING + 1):
+        usual = trainer.step(number)["loss"]
+    with torch.no_grad():  # finite, but centimetres of noise
+        trainer.network.offsets.weight.normal_(0, 0.3, generator=torch.Generator().manual_seed(0))
+    losses = [trainer.step(SETTLING + 1 + k)["loss"] for k in range(PATIENCE + 1)]
+    assert min(losses[:PATIENCE]) > 10 * usual and losses[PATIENCE] < 3 * usual  # step 0
+    assert trainer.guard.summary["restored"] == 1 and trainer.guard.summary["skipped_updates"] == 0
+
+
+def test_the_papers_recipe_is_left_alone_by_the_guard():
+    """No clip, no weights back: the paper has neither."""
+    trainer = made(replace(PLAIN, spike=PAPER.spike))
+    for number in range(SETTLING + 1):
+        trainer.step(number)
+    with torch.no_grad():
+        trainer.network.offsets.weight.normal_(0, 0.3, generator=torch.Generator().manual_seed(0))
+    for number in range(PATIENCE + 1):
+        trainer.step(SETTLING + 1 + number)
+    assert trainer.guard.summary["restored"] == 0 and trainer.guard.rate == 1.0
+    norms = [p.grad.norm() for p in trainer.network.parameters()]
+    assert torch.stack(norms).norm() > 2 * PLAIN.gradient_limit
+
+
+def test_data_that_is_not_finite_does_not_wear_down_the_rate():
+    trainer = made()
+    trainer.step(0)
+    good = weights_of(trainer)
+    trainer.data.features[:] = float("nan")
+    for number in range(1, 20):
+        trainer.step(number)
+    assert trainer.guard.rate == 0.5 and trainer.guard.summary["skipped_updates"] == 19
+    assert torch.isfinite(weights_of(trainer)).all() and (weights_of(trainer) - good).abs().max() < 0.01
+
+
+def test_a_high_window_has_its_anchors_searched_before_it_is_judged(monkeypatch):
+    """Anchors from the wrong side of the body claim a contact that is none."""
+    recipe = replace(PLAIN, contact_refresh=0.0, batch=8)
+    trainer = made(recipe)
+    row = trainer.step(SETTLING)
+    usual = row["collision"]
+    anchors = trainer.contact.cache
+    searched, whole = [], anchors.requery
+
+    def requery(frame, *rest, **how):
+        assert how["exact"], "the anchors of a high window are no guide"
+        searched.append(frame)
+        whole(frame, *rest, **how)
+
+    monkeypatch.setattr(anchors, "requery", requery)
+    # Every anchor of the next batch's first window on the far side of the trunk.
+    order = trainer.order.copy()
+    frames = trainer.data.starts[order[0]] + np.arange(3)
+    anchors.faces[frames] = anchors.faces[frames][:, ::-1]
+    row = trainer.step(SETTLING + 1)
+    assert set(frames) <= set(searched) and len(searched) <= 6
+    assert row["collision"] < usual + 0.05 and trainer.guard.summary["high_windows"] == 0
+    # A lost network is no guide: nothing is searched where most windows are high.
+    searched.clear()
+    trainer.network.offsets.bias.data.normal_(0, 0.3)
+    trainer.step(SETTLING + 2)
+    assert not searched

@@ -1,0 +1,272 @@
+"""The loss is the simulator's energy, its fast backward is the derivative of the definition, and contact
+planes are where an independent search finds them."""
+
+from dataclasses import replace
+
+import igl
+import numpy as np
+import pytest
+import torch
+
+from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
+from reference_sim.energies.bend_hinge import dihedral_angles
+from snug.body.skinning import skin
+from snug.kernels.lanes import laid, unlaid
+from snug.recipes.named import PAPER, PBNS_SPRINGS, RECIPES
+from snug.recipes.recipe import DEFAULT, Recipe
+from snug.training.contact.cache import EXACT, PARTS, ContactCache, Patch, quantised
+from snug.training.loss import PhysicsLoss, make_contact, static_terms, summed
+from tests.snug.training.dressing import swaying, tube_dress
+
+DT = 1 / 30
+
+
+def posed_batch(dtype=torch.float64, seed=0):
+    """Crumpled garments in three poses: x (1, 3, V, 3) relative to the pelvis, and planes near them."""
+    dressed, motion = tube_dress(), swaying()
+    random = np.random.default_rng(seed)
+    frames = [5, 6, 7]
+    rest = dressed.rest().double() + torch.as_tensor(random.normal(0, 0.006, (3, dressed.vertices, 3)))
+    x = skin(rest, dressed.weights(5).double(), dressed.transforms(motion.poses[frames]).double())[None]
+    contact = ContactPenalty(dressed.cloth)
+    samples = contact.sample_matrix @ x[0, 0].numpy()
+    normals = random.normal(size=(1, 3, *samples.shape))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    points = np.stack([contact.sample_matrix @ x[0, t].numpy() for t in range(3)])[None] - 0.002 * normals
+    return dressed, x.to(dtype), points, normals
+
+
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
+@pytest.mark.parametrize("term", ["strain", "bending", "gravity", "collision"])
+def test_closed_form_backward_is_the_derivative_of_the_definition(term, dtype):
+    dressed, x, points, normals = posed_batch(dtype)
+    made = {E.name: E for E in (StretchStVK, BendHinge, Gravity, ContactPenalty)}[term](dressed.cloth)
+    planes = (points, normals) if term == "collision" else ()
+    fast, slow = x.clone().requires_grad_(), x.double().requires_grad_()
+    weight = torch.tensor([[1.0, -2.0, 0.5]])  # each configuration has its own factor from above
+    value = summed(made, fast, *(p.astype(np.float32) if dtype == torch.float32 else p for p in planes))
+    (value * weight).sum().backward()
+    exact = made.energy(slow, *map(torch.as_tensor, planes)).sum(-1)
+    (exact * weight).sum().backward()
+    tolerance = 1e-10 if dtype == torch.float64 else 2e-4  # float32 of 1e-6 m on centimetre edges
+    assert value.shape == (1, 3) and fast.grad.dtype == dtype
+    assert slow.grad.norm() > 1e-3
+    assert torch.allclose(value.double(), exact, rtol=tolerance)
+    assert (fast.grad.double() - slow.grad).norm() < tolerance * slow.grad.norm()
+
+
+def test_window_loss_is_the_simulators_energy_of_its_frames():
+    dressed, x, points, normals = posed_batch()
+    motion = swaying()
+    pelvis = dressed.pelvis(motion)[[5, 6, 7]]
+    ahead = np.zeros((1, 3, 3))
+    ahead[0, 2] = 2 * pelvis[1] - pelvis[0] - pelvis[2]
+    terms = PhysicsLoss(dressed.cloth, DEFAULT, dt=DT)(x, torch.as_tensor(ahead), (points, normals))
+    assert set(terms) == set(DEFAULT.terms) and all(value.shape == (1, 3) for value in terms.values())
+    world = x[0].numpy() + pelvis[:, None]
+    inertia = Inertia(dressed.cloth, DT).value_and_gradient(world[2], 2 * world[1] - world[0])[0]
+    assert np.allclose(terms["inertia"][0].numpy(), [0, 0, inertia], rtol=1e-9) and inertia > 1e-6
+    for t in range(3):
+        strain = StretchStVK(dressed.cloth).value_and_gradient(world[t])[0]
+        weight = Gravity(dressed.cloth, pelvis[t, 1]).value_and_gradient(world[t])[0]
+        assert np.isclose(float(terms["strain"][0, t]), strain, rtol=1e-9)
+        assert np.isclose(float(terms["gravity"][0, t]), weight, rtol=1e-9)
+
+
+def test_inertia_reaches_all_three_frames():
+    dressed, x, *_ = posed_batch()
+    x = x.requires_grad_()
+    recipe = Recipe(terms=("inertia",))
+    PhysicsLoss(dressed.cloth, recipe, dt=DT)(x, torch.zeros(1, 3, 3), None)["inertia"].sum().backward()
+    one, two, three = x.grad[0]
+    assert torch.allclose(two, -2 * three) and torch.allclose(one, three) and three.norm() > 0
+
+
+@pytest.mark.parametrize("windows", [1, 16, 17])
+def test_energies_in_lanes_are_the_definitions_and_their_derivatives(windows):
+    """All terms of a recipe together, whose gradients the kernels add up."""
+    dressed, x, *_ = posed_batch()
+    frames = torch.cat([x, x.flip(1)], 1) + 0.01 * torch.arange(6.0)[:, None, None] ** 2
+    random = np.random.default_rng(windows)
+    x = (frames + torch.as_tensor(random.normal(0, 0.003, (windows, *frames.shape[1:])))).float()
+    recipe = replace(DEFAULT, terms=("strain", "bending", "gravity", "inertia"))
+    ahead = 0.01 * torch.as_tensor(random.normal(size=(windows, 6, 3))).float()
+    found = []
+    for kernels in (True, False):
+        loss = PhysicsLoss(dressed.cloth, recipe, dt=DT, kernels=kernels)
+        at = (x if kernels else x.double()).clone().requires_grad_()
+        terms = loss(at, ahead, None)
+        (0.1 * torch.stack(list(terms.values()))).sum().backward()
+        found.append(([value.detach().double() for value in terms.values()], at.grad.double()))
+    (fast, gradient), (slow, exact) = found
+    assert not fast[3][:, :2].any() and (fast[3][:, 2:] > 0).all()
+    for one, other in zip(fast, slow):
+        assert one.shape == (windows, 6) and torch.allclose(one, other, rtol=1e-4)
+    assert exact.norm() > 1e-3 and (gradient - exact).norm() < 2e-4 * exact.norm()
+
+
+def test_energies_in_lanes_are_not_weighed():
+    dressed, x, *_ = posed_batch(torch.float32)
+    terms = PhysicsLoss(dressed.cloth, DEFAULT, dt=DT)(x.requires_grad_(), torch.zeros(1, 3, 3), None)
+    with pytest.raises(ValueError, match="weigh none"):
+        (terms["strain"] + 2 * terms["bending"]).sum().backward()
+
+
+def test_leaving_out_a_term_leaves_it_out():
+    dressed, x, points, normals = posed_batch()
+    recipe = Recipe(terms=("strain", "collision"))
+    terms = PhysicsLoss(dressed.cloth, recipe, dt=DT)(x, torch.zeros(1, 3, 3), (points, normals))
+    assert set(terms) == {"strain", "collision"}
+
+
+@pytest.mark.parametrize("material", ["stvk", "springs"])
+def test_hinges_are_those_of_the_recipe(material):
+    dressed, x, *_ = posed_batch()
+    recipes = [
+        Recipe(terms=("bending",), material=material, bending=form) for form in ("length_area", "none")
+    ]
+    scaled, printed = (PhysicsLoss(dressed.cloth, r, dt=DT)(x, torch.zeros(1, 3, 3), None) for r in recipes)
+    angles = dihedral_angles(x[0, 0].numpy(), dressed.cloth.hinges)
+    k, lengths, areas = 3.96e-5, dressed.cloth.hinge_lengths, dressed.cloth.hinge_areas
+    assert float(printed["bending"][0, 0]) == pytest.approx(0.5 * k * angles @ angles, rel=1e-12)
+    scale = lengths**2 / (4 * areas)
+    assert float(scaled["bending"][0, 0]) == pytest.approx(0.5 * k * angles @ (scale * angles), rel=1e-12)
+    assert DEFAULT.bending == PAPER.bending == "length_area" != RECIPES["printed-bending"].bending
+
+
+def test_pbns_keeps_its_own_hinges():
+    cloth = tube_dress().cloth
+    forms = ("length_area", "none")
+    made = [static_terms(cloth, replace(PBNS_SPRINGS, bending=form))["bending"] for form in forms]
+    assert all((term.stiffness == 1e-4).all() for term in made)  # 5e-5 theta^2
+
+
+def test_paper_recipe_has_the_papers_contact():
+    contact = make_contact(tube_dress().cloth, PAPER)
+    assert len(contact.stencils) == tube_dress().vertices and contact.margin == 0.002
+    assert (contact.stiffness == 250.0).all()
+
+
+def found(patch: Patch, anchors: np.ndarray, weights: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    weights = weights / PARTS if weights.dtype == np.uint8 else weights
+    corners = positions[patch.faces[anchors]]
+    return corners[:, 0] + np.einsum("sc,sci->si", weights, corners[:, 1:] - corners[:, :1])
+
+
+def test_contact_search_finds_the_closest_allowed_point():
+    dressed, motion = tube_dress(), swaying()
+    contact = ContactPenalty(dressed.cloth)
+    body = dressed.body
+    # A region this small leaves many a sample's nearest skin out of bounds when the trunk bends.
+    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces, region=0.07)
+    weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(motion.poses[[8]])
+    skin_now = skin(torch.as_tensor(patch.rest), weights, transforms)[0].numpy()
+    garment = skin(dressed.rest(), dressed.weights(5), transforms)[0].numpy()
+    samples = (contact.sample_matrix @ garment + [0.0, 0.05, 0.0]).astype(np.float32)
+    # Some of them are drawn to where they may touch, so that all distances from nothing to 8 cm occur.
+    touched = found(patch, *patch.search(samples, skin_now, exact=True), skin_now)
+    random = np.random.default_rng(7)
+    samples = touched + random.uniform(0, 1, (len(samples), 1)).astype(np.float32) * (samples - touched)
+    anchors = random.integers(0, len(patch.faces), len(samples))
+    faces, barycentric = patch.search(samples, skin_now, anchors)
+    assert barycentric.sum(1).max() < 1 + 1e-5 and barycentric.min() > -1e-5
+    distance = np.linalg.norm(found(patch, faces, barycentric, skin_now) - samples, axis=1)
+    reach = np.linalg.norm(patch.centroids[None] - patch.sample_rest[:, None], axis=2)  # (S, Q)
+    shortest, moved = np.full(len(samples), np.nan), 0
+    for s in range(0, len(samples), 7):
+        allowed = np.flatnonzero(reach[s] < patch.region)
+        if len(allowed) == 0:
+            continue
+        assert reach[s, faces[s]] < patch.region
+        point, mesh = samples[s : s + 1].astype(float), skin_now.astype(float)
+        exact = igl.point_mesh_squared_distance(point, mesh, patch.faces[allowed].astype(np.int64))[0]
+        free = igl.point_mesh_squared_distance(point, mesh, patch.faces.astype(np.int64))[0]
+        shortest[s] = np.sqrt(exact[0])
+        moved += bool(free[0] < exact[0] - 1e-6)
+    near, far = shortest < EXACT, shortest >= EXACT
+    assert near.sum() > 10 and far.sum() > 40 and moved > 5
+    assert np.abs(distance - shortest)[near].max() < 1e-6
+    # Farther away an old anchor may stand, but none at more than twice the distance.
+    assert (distance < 2 * shortest + 1e-6)[far].all() and (distance > 1.01 * shortest)[far].any()
+    # Unless every answer is to be exact, wherever it began.
+    exact = patch.search(samples, skin_now, anchors, exact=True)
+    first = np.linalg.norm(found(patch, *exact, skin_now) - samples, axis=1)
+    assert np.abs(first - shortest)[near | far].max() < 1e-6
+
+
+def test_anchors_follow_the_body_and_forget_nothing_but_what_is_searched():
+    dressed, motion = tube_dress(), swaying()
+    contact = ContactPenalty(dressed.cloth, samples="vertices")
+    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
+    anchors = ContactCache(patch, 3)
+    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
+    positions = skin(torch.as_tensor(patch.rest), weights, dressed.transforms(motion.poses[:3])).numpy()
+    normals = patch.normals(positions)
+    frames = np.array([2, 0])
+    points, directions = anchors.planes(frames, frames, positions, normals)
+    expected = found(patch, anchors.faces[0], anchors.barycentric[0], positions[2])
+    assert np.abs(points[0] - expected).max() < 1e-6
+    assert np.allclose(np.linalg.norm(directions, axis=-1), 1, atol=1e-5)
+    # Outward: the garment's T-pose samples lie on the positive side of the body they hang on.
+    height = np.einsum(
+        "si,si->s",
+        patch.sample_rest - found(patch, anchors.faces[0], anchors.barycentric[0], patch.rest),
+        patch.normals(patch.rest[None])[0][patch.faces[anchors.faces[0]]].mean(1),
+    )
+    assert height.min() > 0.01
+    before = anchors.faces.copy()
+    assert list(anchors.oldest(frames, 1)) == [0]
+    anchors.requery(2, points[0][::-1].copy(), positions[2])
+    assert (anchors.faces[:2] == before[:2]).all() and (anchors.faces[2] != before[2]).any()
+    assert list(anchors.oldest(frames, 1)) == [1]  # frame 2 is young again
+
+
+@pytest.mark.parametrize("recipe", [DEFAULT, PBNS_SPRINGS], ids=["cubic", "squared"])
+def test_energy_at_anchors_is_that_of_their_planes(recipe):
+    dressed, motion = tube_dress(), swaying()
+    contact, body = make_contact(dressed.cloth, recipe), dressed.body
+    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
+    weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(motion.poses[[2, 9]])
+    skin_now = skin(torch.as_tensor(patch.rest), weights, transforms).numpy()
+    garment = skin(dressed.rest(), dressed.weights(5), transforms)
+    x = garment - torch.tensor([0.0, 0.0, 0.05])  # the back a little off the skin, the front deep under it
+    anchors, frames, normals = ContactCache(patch, 3), np.array([2, 0]), patch.normals(skin_now)
+    for row, frame in enumerate(frames):
+        samples = (contact.sample_matrix @ x[row].numpy()).astype(np.float32)
+        anchors.requery(int(frame), samples, skin_now[row])
+
+    def energies():
+        lanes, rows = laid(x[:, None]), np.arange(2)[:, None]
+        gradients = np.zeros_like(lanes)
+        values = anchors.energy(contact, lanes, gradients, frames[:, None], rows, skin_now, normals)
+        return (unlaid(taken, 2, 1)[:, 0].numpy() for taken in (values, gradients))
+
+    values, gradients = energies()
+    points, directions = anchors.planes(frames, np.arange(2), skin_now, normals)
+    for row in range(2):
+        planes = points[row].astype(float), directions[row].astype(float)
+        value, gradient = contact.value_and_gradient(x[row].numpy().astype(float), *planes)
+        assert value > 1e-3 and values[row] == pytest.approx(value, rel=1e-4)
+        assert np.linalg.norm(gradients[row] - gradient) < 1e-4 * np.linalg.norm(gradient)
+    x[1, 3] = np.nan
+    values, _ = energies()
+    assert np.isfinite(values[0]) and np.isnan(values[1])
+
+
+def test_remembered_anchors_lie_in_their_faces():
+    random = np.random.default_rng(0)
+    exact = random.dirichlet([0.3, 0.3, 0.3], 5000)[:, 1:]
+    exact[:3] = (0.5, 0.5), (1.0, 0.0), (0.0, 1.0)
+    for count, kind in ((2**15 - 1, np.int16), (2**15, np.int32)):
+        faces, parts = quantised(np.full(5000, count - 1), exact, count)
+        assert faces.dtype == kind and (faces == count - 1).all() and parts.dtype == np.uint8
+    assert (parts.astype(int).sum(1) <= 255).all()
+    assert np.abs(parts / PARTS - exact).max() <= 1.01 / 255
+
+
+def test_garment_far_from_the_body_is_refused():
+    dressed = tube_dress()
+    with pytest.raises(ValueError, match="no body face"):
+        Patch.around(dressed.garment.rest_positions + 5.0, dressed.body.shaped(), dressed.body.faces)

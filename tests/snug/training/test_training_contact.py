@@ -1,0 +1,244 @@
+"""Contact anchors of a training set: first searches, propagation, and walks in between."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from reference_sim.contact.anchor_walk import triangle_adjacency
+from snug.body.skeleton import JOINT
+from snug.body.skinning import skin
+from snug.recipes.recipe import DEFAULT
+from snug.training.contact.cache import ContactCache, Patch
+from snug.training.contact.planes import FIRST_NEAR, FIRST_PROPAGATED, MARKED, NEAR, PROPAGATED
+from snug.training.motion_augmentation import mixed_for
+from snug.training.trainer import Trainer
+from tests.reference_sim.meshes import sphere
+from tests.snug.training.dressing import swaying, tube_dress
+
+MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
+PLAIN = replace(DEFAULT, mixed=0.0)
+
+
+def made(motions=MOTIONS, **options):
+    return Trainer("snug", tube_dress(), motions, steps=9, seed=0, recipe=replace(PLAIN, **options))
+
+
+def test_across_a_side_lies_the_face_that_shares_it():
+    faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]])
+    assert triangle_adjacency(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
+
+
+def test_a_sample_far_from_the_body_at_rest_may_meet_all_of_it():
+    body, faces = sphere(2, 0.1)
+    near = body[:5] * 1.2
+    assert len(Patch.around(near, body, faces, region=0.05).faces) < len(faces)
+    far = np.concatenate([near, [[1.0, 0.0, 0.0]]])
+    patch = Patch.around(far, body, faces, region=0.05)
+    assert len(patch.faces) == len(faces)  # as the simulator's rule of regions has it
+    where, _ = patch.search(np.tile([[-0.11, 0.0, 0.0]], (6, 1)), patch.rest)
+    assert body[faces[where[5]]].mean(axis=0)[0] < -0.09
+
+
+def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
+    monkeypatch.setattr(
+        "snug.training.contact.cache.EXACT", 1.0
+    )  # the dress hangs 2 cm off the skin: a search would change nothing
+    searched = []
+    requery = ContactCache.requery
+    monkeypatch.setattr(
+        ContactCache,
+        "requery",
+        lambda self, frame, *rest: (searched.append(frame), requery(self, frame, *rest)),
+    )
+    trainer = made()
+    monkeypatch.setattr(ContactCache, "requery", requery)
+    assert trainer.contact is not None and trainer.contact._kept is not None
+    anchors, patch = trainer.contact.cache, trainer.contact.patch
+    at_rest = ContactCache(patch, 1).faces[0]
+    body = trainer.contact._kept[0]
+    for frame in range(41):  # marks are not all vertices: some move a little more than twice FIRST_NEAR
+        near = [
+            other
+            for other in searched
+            if (other < 30) == (frame < 30) and abs(other - frame) <= FIRST_PROPAGATED
+            and np.linalg.norm(body[other] - body[frame], axis=1).max() < 2.6 * FIRST_NEAR
+        ]  # fmt: skip
+        assert any((anchors.faces[frame] == anchors.faces[other]).all() for other in near), frame
+        assert (anchors.faces[frame] != at_rest).any()
+    assert len(set(searched)) == len(searched) and (anchors.age == 0).all()
+    assert 6 <= sum(frame < 30 for frame in searched) <= 20 and sum(frame >= 30 for frame in searched) <= 2
+    hint = at_rest
+    for frame in searched:
+        template = skin(trainer.data.rest, trainer.weights, trainer.data.transforms[frame])
+        samples = (trainer.contact.contact.sample_matrix @ template.numpy()).astype(np.float32)
+        faces, _ = patch.search(samples, body[frame], hint)
+        assert (anchors.faces[frame] == faces).all()
+        hint = anchors.faces[frame]
+
+
+@pytest.mark.parametrize("kernels", [True, False])
+def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
+    trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=PLAIN, kernels=kernels)
+    contact = trainer.contact
+    assert contact is not None
+    before = [torch.as_tensor(table).clone() for table in (contact.cache.faces, contact.cache.barycentric)]
+
+    def kept():
+        now = (contact.cache.faces, contact.cache.barycentric)
+        return [torch.equal(torch.as_tensor(table), held) for table, held in zip(now, before)]
+
+    batch = trainer.data.batch(np.arange(4), None)
+    posed = contact.posed(batch)
+    x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.08])
+    for vertices, trusted, moved in ((torch.nan * x, True, False), (x, False, False), (x, True, True)):
+        assert trainer.loss is not None
+        trainer.loss(vertices, batch.ahead, contact.planes(batch, posed, vertices))
+        assert all(kept()) == (vertices is not x)
+        contact.settle(batch.frames, trusted=trusted)
+        assert all(kept()) == (not moved)
+
+
+@pytest.mark.parametrize("kernels", [True, False])
+def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
+    trainer = made(shape_range=3.0)
+    if not kernels:
+        trainer = Trainer(
+            "snug", tube_dress(), MOTIONS, steps=9, seed=0, kernels=False, recipe=trainer.recipe
+        )
+    contact, body, motion = trainer.contact, trainer.dressed.body, MOTIONS[0]
+    assert contact is not None
+    betas = np.random.default_rng(2).uniform(-3, 3, (2, body.shape_count))
+    batch = trainer.data.batch(np.array([4, 17]), betas)  # windows of the first motion begin at every frame
+    rows, positions, _ = contact.posed(batch)
+    assert np.asarray(rows).tolist() == list(range(6))
+    for row, frame in enumerate([4, 5, 6, 17, 18, 19]):
+        own = betas[row // 3]
+        whole = body.vertices(motion.poses[[frame]], motion.translations[[frame]], betas=own)[0]
+        pelvis = body.joints(own)[0] + motion.translations[frame]
+        expected = whole[contact.patch.body_vertices] - pelvis
+        assert np.allclose(np.asarray(positions)[row], expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("kernels", [True, False])
+def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
+    recipe = replace(DEFAULT, mixed=3.0, shape_range=3.0, shape_of="clip")
+    trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=recipe, kernels=kernels)
+    contact, data, body = trainer.contact, trainer.data, trainer.dressed.body
+    assert contact is not None and data.shapes is not None and (contact._kept is not None) == kernels
+    clips = [*MOTIONS, *mixed_for(MOTIONS, recipe, vertices=trainer.dressed.vertices, seed=0)]
+    for place in (1, 2, 3):
+        motion, own, first = clips[place], data.shapes[place], data.first[place]
+        batch = data.at(first + np.array([[3, 4, 5]]))
+        rows, positions, _ = contact.posed(batch)
+        whole = body.vertices(motion.poses[3:6], motion.translations[3:6], betas=own)[
+            :, contact.patch.body_vertices
+        ]
+        pelvis = body.joints(own)[0] + motion.translations[3:6, None]
+        assert np.allclose(np.asarray(positions)[rows], whole - pelvis, atol=1e-4)
+        assert np.allclose(contact._marks[first + 3 : first + 6], (whole - pelvis)[:, ::MARKED], atol=1e-4)
+
+
+def propagated(motions, frame, monkeypatch):
+    """The frames that have the anchors of `frame`, of 41, once it alone has been searched in a step."""
+    trainer = made(motions, contact_refresh=1 / 48)  # one frame a step
+    contact = trainer.contact
+    assert contact is not None
+    searched = []
+    requery = contact.cache.requery
+
+    def marked(number, *rest, **how):
+        requery(number, *rest, **how)
+        searched.append(number)
+        contact.cache.faces[number] = 7
+
+    monkeypatch.setattr(contact.cache, "requery", marked)
+    trainer.order = np.array([frame - 1, *[0] * 15])
+    trainer.step(0)
+    assert searched == [frame]
+    return np.flatnonzero((contact.cache.faces == 7).all(1)).tolist()
+
+
+def test_what_is_searched_is_propagated_around_it_but_to_no_other_motion(monkeypatch):
+    slow = [swaying(30, degrees=1.0), swaying(11, name="slow", degrees=1.0)]
+    assert PROPAGATED == 3
+    assert propagated(slow, 28, monkeypatch) == [25, 26, 27, 28, 29]
+    assert propagated(slow, 20, monkeypatch) == [17, 18, 19, 20, 21, 22, 23]
+
+
+def test_what_has_just_been_searched_borrows_nothing(monkeypatch):
+    trainer = made([swaying(41, degrees=1.0)], contact_refresh=2 / 48)
+    contact = trainer.contact
+    assert contact is not None
+    requery = contact.cache.requery
+
+    def marked(number, *rest, **how):
+        requery(number, *rest, **how)
+        contact.cache.faces[number] = number
+
+    monkeypatch.setattr(contact.cache, "requery", marked)
+    trainer.order = np.array([19, 21, *[0] * 14])  # middle frames 20 and 22
+    contact.cache.age[[20, 22]] = 5
+    trainer.step(0)
+    assert (contact.cache.faces[[20, 22]] == [[20], [22]]).all()
+    assert (contact.cache.faces[[18, 24]] == [[20], [22]]).all()
+
+
+def test_nothing_is_propagated_to_a_frame_in_which_the_body_is_elsewhere(monkeypatch):
+    motion = swaying(41, degrees=1.0)
+    motion.poses[19, JOINT["spine1"], 0] += 0.2
+    motion.poses[22:, JOINT["left_shoulder"], 2] += 0.3
+    height = 0.2  # m: of what the spine carries, far more than NEAR in radians of either turn
+    assert 0.2 * height > NEAR
+    assert propagated([motion], 20, monkeypatch) == [20, 21]
+
+
+def test_anchors_walk_while_training_and_are_in_its_state():
+    trainer, other = made(contact_refresh=0.0), made(contact_refresh=0.0)
+    contact, twin = trainer.contact, other.contact
+    assert contact is not None and twin is not None
+    with torch.no_grad():  # into the skin
+        trainer.network.offsets.bias.view(-1, 3)[:, 2] = -0.8
+    trainer.step(0)
+    moved = (contact.cache.faces != twin.cache.faces).any(1)
+    assert 0 < moved.sum() < len(moved)
+    tensors, facts = contact.state()
+    assert set(np.flatnonzero(moved)) <= set(tensors["changed"].tolist()) and len(tensors["changed"]) < len(
+        moved
+    )
+    twin.resume(tensors, facts)
+    assert (twin.cache.faces == contact.cache.faces).all()
+    assert (twin.cache.barycentric == contact.cache.barycentric).all()
+
+
+def test_an_input_that_never_varied_is_not_read():
+    trainer = made([swaying(30)])
+    shapes = trainer.dressed.body.shape_count
+    features = trainer.data.features[None, :9].clone()
+    with torch.no_grad():
+        trainer.network.offsets.weight.normal_()
+        plain, _ = trainer.network(features, None)
+        features[..., -shapes:] = 5.0
+        assert torch.equal(trainer.network(features, None)[0], plain)
+        features[..., int(features.std(1).argmax())] += 0.1
+        assert not torch.equal(trainer.network(features, None)[0], plain)
+    sampled = made([swaying(30)], shape_range=2.0).data.input_statistics()[1]
+    assert np.isfinite(sampled[-shapes:]).all()
+
+
+def test_an_epoch_may_be_left_to_chance():
+    trainer = made([swaying(402)], even=1)
+    drawn = np.concatenate([trainer.draw() for _ in range(len(trainer.data.starts) // trainer.windows)])
+    assert len(np.unique(drawn)) == len(drawn) and set(np.diff(np.sort(drawn[:20]))) != {DEFAULT.even}
+
+
+def test_each_part_of_an_epoch_passes_over_all_motions():
+    trainer = made([swaying(402)])
+    count = len(trainer.data.starts)
+    drawn = np.concatenate([trainer.draw() for _ in range(count // trainer.windows)])
+    assert len(np.unique(drawn)) == len(drawn) == count
+    part = np.sort(drawn[: count // DEFAULT.even])
+    assert (np.diff(part) == DEFAULT.even).all()
