@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.cell import Cell
 from benchmarks.methods import find_method
 from benchmarks.plan import plug_ins as outside
 from benchmarks.plan.plan import Motions, Plan
@@ -17,7 +18,6 @@ from benchmarks.presets import find_preset
 from benchmarks.registry import DeclarationError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scenes import SCENES, find_scene, of_garment
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.timing import one_thread
 from reference_sim.command.command_line import Parser, command
 

@@ -9,7 +9,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-# For a reader; what a task depends on is found from the source: see benchmarks.runner.source.
+# For a reader; what a task depends on is found from the source: see benchmarks.fingerprint.dependencies.
 PACKAGES = (
     "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis", "ipctk",
     "pyvista", "pyacvd",

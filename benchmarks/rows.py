@@ -8,13 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
+from benchmarks.cell import Cell
 from benchmarks.methods import find_method
 from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, network_of
 from benchmarks.results.run_folder import REFERENCE_TOLERANCE, Row, as_right
 from benchmarks.runner.schedule import Schedule
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.task import Outcome, Task, TaskId
 
 MS = 1e3

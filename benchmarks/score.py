@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from benchmarks.cell import Cell
 from benchmarks.external.roll_out_option import (
     CHARACTERS,
     PLACE,
@@ -28,7 +29,6 @@ from benchmarks.plan.plan import Plan
 from benchmarks.plan.selection import stored_cells
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.timing import one_thread
 from reference_sim.command.command_line import Parser
 

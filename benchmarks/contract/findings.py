@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.runner.source import code_of, digest
+from benchmarks.fingerprint.dependencies import code_of
+from benchmarks.fingerprint.digest import digest
 
 if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene

@@ -94,7 +94,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
         find_preset("quick"), garment_vertices=options.vertices, frames=LONGEST, settle_frames=options.settle
     )
     if options.scheduler:
-        from benchmarks.runner.cluster import check_scheduler
+        from benchmarks.process.scheduler import check_scheduler
 
         check_scheduler(options.scheduler)
     rest = argparse.ArgumentParser(add_help=False, allow_abbrev=False)

@@ -102,7 +102,8 @@ _WORDS: dict[str, tuple[str, Callable[[str], Any]]] = {
 
 def digest_of(path: str) -> str:
     """Of all that is read: the file, those of a folder or of a pattern, and the mesh beside a point cache."""
-    from benchmarks.runner.source import digest, digest_of_file
+    from benchmarks.fingerprint.digest import digest
+    from benchmarks.results.run_folder import digest_of_file
 
     given = Path(path)
     files = sorted(given.iterdir()) if given.is_dir() else sorted(map(Path, glob.glob(path))) or [given]

@@ -22,8 +22,8 @@ from benchmarks.plan.selection import MEASURED, Request, choose, choose_suites, 
 from benchmarks.presets import find_preset
 from benchmarks.provenance import usable_cores
 from benchmarks.results.run_folder import ResultsError, RunFolder, digest_of_file
-from benchmarks.runner.cache import DEFAULT_ONLY, STATES
 from benchmarks.scenes import GARMENT_SCENES, all_scenes
+from benchmarks.tasks.task import DEFAULT_ONLY, STATES
 from snug.garments.options import demand_a_file, garment_file
 from snug.motion.options import reading_of
 
@@ -181,7 +181,7 @@ def choose_scheduler(options: argparse.Namespace) -> str:
         )
     if options.rollout:
         raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
-    from benchmarks.runner.cluster import check_scheduler
+    from benchmarks.process.scheduler import check_scheduler
 
     check_scheduler(options.scheduler)
     return options.scheduler

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.cell import Cell
 from benchmarks.presets import Preset
 from benchmarks.results.run_folder import LONGEST
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
-from benchmarks.tasks.cell_task import Cell
 from snug.recipes.named import TRAININGS, Training
 
 if TYPE_CHECKING:

@@ -16,9 +16,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from benchmarks.fingerprint.dependencies import code_of, find_module, place_of
+from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.registry import DeclarationError, by_name, demand_that_it_is, load
-from benchmarks.runner.source import code_of, digest, find_module, place_of
 from benchmarks.scene import Scene
 from snug.recipes.named import TRAININGS, Training
 

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from benchmarks.cell import Cell
 from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE, Microbenchmark
@@ -19,7 +20,6 @@ from benchmarks.presets import PRESETS, Preset
 from benchmarks.registry import DeclarationError, by_name
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes, further_scenes
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.validation.case import METHOD
 from benchmarks.validation.registry import CASES
 

@@ -16,13 +16,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from benchmarks.fingerprint.dependencies import software
+from benchmarks.fingerprint.digest import digest
 from benchmarks.results.json_file import ResultsError, read_json
 from benchmarks.results.run_folder import FORMAT, RunFolder, digest_of_file, replacing
-from benchmarks.runner.source import code_of, data_of, digest, packages_of
-from benchmarks.tasks.task import Outcome, Task, TaskId
+from benchmarks.tasks.task import DEFAULT_ONLY, Outcome, Task, TaskId
 
-STATES = ("finished", "failed", "stale", "missing")
-DEFAULT_ONLY = ("stale", "missing")
 NOWHERE: Mapping[str, Any] = {}
 
 
@@ -44,13 +43,6 @@ class Found:
 def dependencies(task: Task) -> dict[str, str]:
     """Name -> digest or version of each input, file of source, package and data file, to say what changed."""
     return {name: digest(value) for name, value in task.inputs.items()} | software(*task.modules)
-
-
-def software(*modules: str) -> dict[str, str]:
-    """The same of source, packages and data files of these modules."""
-    code = code_of(*modules)
-    packages = {f"package {name}": version for name, version in packages_of(code).items()}
-    return code | packages | data_of(code)
 
 
 class Cache:

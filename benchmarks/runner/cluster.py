@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import io
-import logging
 import pickle
 import sys
 import time
@@ -22,41 +21,19 @@ from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 from benchmarks.assets.assets import Assets
+from benchmarks.fingerprint.digest import digest
+from benchmarks.process.errors import one_line
+from benchmarks.process.scheduler import connect
 from benchmarks.results.run_folder import RunFolder, digest_of_file, replacing
 from benchmarks.runner import cluster_worker
 from benchmarks.runner.cache import damaged
 from benchmarks.runner.cluster_worker import ASSETS, PIECE, Gone, Unfit
 from benchmarks.runner.local_executor import POLL, Done, LocalExecutor, Needed, Ready
-from benchmarks.runner.source import digest
-from benchmarks.tasks.task import Outcome, RunStopped, Task, TaskId, failure, one_line
+from benchmarks.tasks.task import Outcome, RunStopped, Task, TaskId, failure
 
 ATTEMPTS = 3  # workers that may die of a task
 LOOK = 2.0  # [s] between looks at which workers there are and how far they are
-FIRST = 5.0  # [s] in which a scheduler answers at first
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
-
-
-class ClusterError(ValueError):
-    """There is no such cluster; the message names it and the remedy."""
-
-
-def connect(address: str, *, seconds: float) -> Any:
-    """A client of the scheduler, which looks for one that it has lost for so long. Raises ClusterError."""
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ClusterError("--scheduler needs dask.distributed: pip install '.[cluster]'") from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
-    try:
-        return Client(address, timeout=seconds, name="benchmarks.run", set_as_default=False)
-    except (OSError, ValueError) as error:
-        remedy = "start one by `dask scheduler` and give the address that it prints, as tcp://HOST:8786"
-        raise ClusterError(f"--scheduler {address}: {one_line(error)}; {remedy}") from None
-
-
-def check_scheduler(address: str) -> None:
-    """Raises ClusterError where no scheduler answers."""
-    connect(address, seconds=FIRST).close()
 
 
 @dataclass

@@ -20,11 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import provenance
+from benchmarks.fingerprint.dependencies import software
+from benchmarks.process.errors import one_line
 from benchmarks.results.run_folder import RunFolder, digest_of_file
-from benchmarks.runner.cache import software
 from benchmarks.runner.local_executor import TaskProcess, begin_tasks
 from benchmarks.tasks.cell_task import CellTask
-from benchmarks.tasks.task import Context, Outcome, Task, failure, one_line
+from benchmarks.tasks.task import Context, Outcome, Task, failure
 from benchmarks.timing import one_thread
 
 PIECE = 8 << 20  # bytes of a file at a time

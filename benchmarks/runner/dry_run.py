@@ -6,10 +6,10 @@ from functools import partial
 
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cache import STATES, Cache, Found
+from benchmarks.runner.cache import Cache, Found
 from benchmarks.runner.loop import LEFT_OUT, Runner
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.tasks.task import Outcome
+from benchmarks.tasks.task import STATES, Outcome
 
 
 def describe(plan: Plan) -> str:

@@ -10,6 +10,9 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
 
+from benchmarks.cell import Cell, flat
+from benchmarks.fingerprint.dependencies import find_module
+from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods import find_method
 from benchmarks.metric import COMPARED_WITH
@@ -17,12 +20,11 @@ from benchmarks.metrics import MODULE_OF, names_of
 from benchmarks.performance.microbenchmark import Microbenchmark, Settings
 from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.runner.cache import dependencies
-from benchmarks.runner.source import digest, find_module
 from benchmarks.runner.task_inputs import ASSETS, TaskInputs, declared, modules_behind, modules_of
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
 from benchmarks.tasks.case import RunCase
-from benchmarks.tasks.cell_task import BatchCell, Cell, RepeatCell, RunCell, RunUntimedCell, flat
+from benchmarks.tasks.cell_task import BatchCell, RepeatCell, RunCell, RunUntimedCell
 from benchmarks.tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
 from benchmarks.tasks.metric_task import MeasureCell
 from benchmarks.tasks.microbenchmark import RunMicrobenchmark

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.external.roll_out_option import MODULE
+from benchmarks.fingerprint.digest import digest
 from benchmarks.plan.plan import Plan, runs
+from benchmarks.process.errors import one_line
 from benchmarks.results import frame_energies
 from benchmarks.results.run_folder import OF_TRAINING, Row, RunFolder, digest_of_file, with_provenance
 from benchmarks.rows import described, rows_of
@@ -21,8 +23,7 @@ from benchmarks.runner.console import remarks, summary
 from benchmarks.runner.local_executor import Executor, LocalExecutor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.source import digest
-from benchmarks.tasks.task import RunStopped, one_line
+from benchmarks.tasks.task import RunStopped
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
@@ -76,7 +77,8 @@ def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executo
     """What executes the plan's tasks. Raises RunStopped where its cluster is gone."""
     if not plan.scheduler:
         return LocalExecutor(folder, assets, plan.workers)
-    from benchmarks.runner.cluster import ClusterError, ClusterExecutor
+    from benchmarks.process.scheduler import ClusterError
+    from benchmarks.runner.cluster import ClusterExecutor
 
     try:
         return ClusterExecutor(folder, assets, plan.workers, plan.scheduler)

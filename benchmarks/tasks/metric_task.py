@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.cell import Cell
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import find_metric, modules, names_of
+from benchmarks.process.errors import one_line
 from benchmarks.registry import load
 from benchmarks.results.frame_energies import SECONDS
 from benchmarks.results.run_folder import USABLE, RunFolder, replacing
-from benchmarks.tasks.cell_task import Cell, built
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId, one_line
+from benchmarks.tasks.cell_task import built
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:
     from benchmarks.tasks.training import TrainNetwork

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from benchmarks.process.errors import one_line
 from benchmarks.process.isolated_process import WorkerDied
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from benchmarks.results.run_folder import Row, RunFolder
 
 TaskId = tuple[str, str]  # kind and name
+STATES = ("finished", "failed", "stale", "missing")  # of a task in the folder of a run
+DEFAULT_ONLY = ("stale", "missing")  # the states in which a task is done again unless --only names others
 
 
 @dataclass(frozen=True)
@@ -125,11 +128,6 @@ class RunStopped(RuntimeError):
 
     The message says why.
     """
-
-
-def one_line(error: BaseException) -> str:
-    """What was raised, in one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def failure(error: BaseException) -> Outcome:

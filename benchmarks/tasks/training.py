@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.fingerprint.digest import digest
 from benchmarks.registry import load
 from benchmarks.results.run_folder import RunFolder, model_path
-from benchmarks.runner.source import digest
 from benchmarks.tasks.task import Context, Outcome, Task, TaskId
 
 if TYPE_CHECKING:

@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.method import MethodEntry
+from benchmarks.process.errors import one_line
 from benchmarks.registry import load
 from benchmarks.results.run_folder import Row
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId, one_line
+from benchmarks.tasks.task import Context, Outcome, Task, TaskId
 from benchmarks.tasks.training import TrainNetwork
 from snug.recipes.recipe import DEFAULT
 

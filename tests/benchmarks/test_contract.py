@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from benchmarks import check
+from benchmarks.cell import Cell
 from benchmarks.contract.check_method import CheckMethod
 from benchmarks.contract.check_scene import check_derivatives
 from benchmarks.contract.findings import Findings
 from benchmarks.method import Method, MethodEntry
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.task import Context
 from benchmarks.validation.loads import DeadLoad
 from reference_sim import Trajectory

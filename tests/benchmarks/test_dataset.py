@@ -196,8 +196,8 @@ def test_what_another_build_ends_while_this_one_makes_ready_is_kept(tube, here, 
 
 def _entry(folder: Path, name: str, change) -> None:
     """Rewrite an entry of the cache as if it had been written so."""
+    from benchmarks.fingerprint.digest import digest
     from benchmarks.runner.cache import _text, read_entry
-    from benchmarks.runner.source import digest
 
     path = folder / "cache" / "sequence" / f"tube-{name}" / "simulation.json"
     entry = read_entry(path)

@@ -7,10 +7,10 @@ import dataclasses
 import pytest
 
 from benchmarks import methods, metrics, run, scenes
+from benchmarks.fingerprint.dependencies import code_of
 from benchmarks.metric import Metric
 from benchmarks.presets import find_preset
 from benchmarks.registry import DeclarationError
-from benchmarks.runner.source import code_of
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 

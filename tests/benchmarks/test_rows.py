@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks import provenance
+from benchmarks.cell import Cell
 from benchmarks.methods import METHODS, find_method
 from benchmarks.plan.plan import Motions
 from benchmarks.results.run_folder import Row
@@ -17,7 +18,7 @@ from benchmarks.runner.console import remarks, summary
 from benchmarks.runner.schedule import Schedule
 from benchmarks.runner.whole_run import RunLog, accepted
 from benchmarks.scenes import SCENES
-from benchmarks.tasks.cell_task import Cell, judge
+from benchmarks.tasks.cell_task import judge
 from benchmarks.tasks.task import Outcome
 from benchmarks.timing import Reading
 from reference_sim import Trajectory

@@ -12,9 +12,11 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks import export, run, score
+from benchmarks.cell import Cell
 from benchmarks.export_files import _write_obj, write_scene
 from benchmarks.external.roll_out_option import RollOutOption, Stated
 from benchmarks.external.scene_fit import expected_positions
+from benchmarks.fingerprint.digest import digest
 from benchmarks.methods import find_method
 from benchmarks.methods.outside.stored_roll_out import entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
@@ -24,8 +26,6 @@ from benchmarks.plan.plan import Motions, Plan, PlanError
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
-from benchmarks.runner.source import digest
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh

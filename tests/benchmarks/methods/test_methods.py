@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks import timing
 from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.cell import Cell
 from benchmarks.method import Method
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.catalogue.learned import LEARNED
@@ -24,7 +25,7 @@ from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
-from benchmarks.tasks.cell_task import Cell, built
+from benchmarks.tasks.cell_task import built
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays

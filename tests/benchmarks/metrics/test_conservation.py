@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.cell import Cell
 from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import conservation
@@ -18,7 +19,6 @@ from benchmarks.rows import rows_of_cell
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scene import Dressed
 from benchmarks.scenes import find_scene
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.task import Outcome
 from reference_sim import Trajectory, simulate
 

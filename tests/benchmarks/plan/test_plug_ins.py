@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from benchmarks import metric, run
+from benchmarks.cell import Cell
+from benchmarks.fingerprint.dependencies import code_of
+from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.methods.outside.program import program
@@ -19,14 +22,13 @@ from benchmarks.plan.plan import Motions, Plan
 from benchmarks.registry import DeclarationError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
-from benchmarks.runner.source import code_of, digest
 from benchmarks.runner.task_inputs import declared
 from benchmarks.scenes import of_garment
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from snug.recipes.named import Training
 from snug.recipes.recipe import DEFAULT, RecipeError
+from tests.benchmarks.fingerprint.test_dependencies import forget
 from tests.benchmarks.plan.outside_files import (
     HELPER,
     METHOD,
@@ -39,7 +41,6 @@ from tests.benchmarks.plan.outside_files import (
     as_before,
     installed,
 )
-from tests.benchmarks.runner.test_source import forget
 
 _as_before = pytest.fixture(autouse=True)(as_before)
 

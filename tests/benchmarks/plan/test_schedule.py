@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from benchmarks import provenance
+from benchmarks.cell import Cell
 from benchmarks.methods import find_method
 from benchmarks.plan.make_plan import choose_garment
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.plan import Motions, Network, OwnGarment
 from benchmarks.results.run_folder import RunFolder, digest_of_file
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.metric_task import _training_poses
 from benchmarks.tasks.task import Context, Task
 from snug.garments.options import GarmentFile
@@ -36,7 +36,7 @@ def test_the_key_of_a_training_is_that_of_all_it_depends_on(tmp_path, monkeypatc
     plan = plan_of(tmp_path, motions=MOTIONS)
     before = network(plan).key
     assert before and network(plan).key == before
-    monkeypatch.setattr("benchmarks.runner.source._version", lambda package: "another")
+    monkeypatch.setattr("benchmarks.fingerprint.dependencies._version", lambda package: "another")
     assert network(plan).key != before
 
 

@@ -21,6 +21,7 @@ import pytest
 pytest.importorskip("distributed")
 
 from benchmarks import run
+from benchmarks.fingerprint.digest import digest
 from benchmarks.plan.make_plan import choose_scheduler
 from benchmarks.plan.plan import PlanError
 from benchmarks.results.run_folder import RunFolder, digest_of_file
@@ -29,7 +30,6 @@ from benchmarks.runner import cluster_worker
 from benchmarks.runner import whole_run as execution
 from benchmarks.runner.cluster import ClusterExecutor
 from benchmarks.runner.local_executor import LocalExecutor
-from benchmarks.runner.source import digest
 from benchmarks.tasks.task import Outcome, RunStopped
 from snug.networks.tensor_file import read_tensors
 from tests.benchmarks.runner.cluster_by_hand import PATH, Cluster, cluster, finish, write

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from benchmarks import run
+from benchmarks.cell import Cell
 from benchmarks.methods import find_method
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.results.run_folder import RunFolder
@@ -24,7 +25,6 @@ from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import of_garment
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.task import Outcome, Task
 from tests.benchmarks.runner.misbehaving import interrupt_at
 from tests.benchmarks.runner.tasks_by_hand import InProcess

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.assets import Assets
+from benchmarks.cell import Cell
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.networks.push_out import CleanUp
 from benchmarks.metric import RollOut, SceneRollOuts
@@ -22,7 +23,6 @@ from benchmarks.rows import rows_of_cell
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import find_scene, out_of_distribution
 from benchmarks.scenes.variations import FEW, FEWEST, ORDINARY, OUT_OF_DISTRIBUTION
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.metric_task import measured
 from benchmarks.tasks.task import Context, Outcome
 from reference_sim import Trajectory

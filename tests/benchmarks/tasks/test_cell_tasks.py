@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
+from benchmarks.cell import Cell
 from benchmarks.methods import find_method
 from benchmarks.methods.outside.program import program
 from benchmarks.plan.plan import Plan
@@ -26,7 +27,6 @@ from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.runner.loop import NoLog, Runner
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import SCENES as DECLARED
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.task import Context, Outcome, failure
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 import pytest
 
+from benchmarks.cell import Cell
 from benchmarks.methods import METHODS, find_method
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks import ground_truth
-from benchmarks.tasks.cell_task import Cell
 from benchmarks.tasks.ground_truth import SimulateClips, SimulateQuasiStatic
 from benchmarks.tasks.training import LONGEST, TrainNetwork
 from reference_sim import Trajectory, simulate

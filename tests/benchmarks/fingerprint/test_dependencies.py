@@ -7,11 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from benchmarks.fingerprint import dependencies as source
+from benchmarks.fingerprint.dependencies import code_of, data_of, packages_of
+from benchmarks.fingerprint.digest import digest
 from benchmarks.methods import METHODS
-from benchmarks.metrics import MODULES
+from benchmarks.metrics import MODULE_OF
 from benchmarks.performance.registry import MICROBENCHMARKS
-from benchmarks.runner import source
-from benchmarks.runner.source import code_of, data_of, digest, packages_of
 from benchmarks.scenes import FURTHER, SCENES
 
 FILES = {
@@ -146,15 +147,23 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
     """A line more in one of them makes nothing stale."""
     lists = {f"benchmarks/{name}" for name in (
         "scenes/__init__.py", "methods/__init__.py", "methods/solvers.py", "methods/learned.py",
-        "request/presets.py", "request/selection.py", "request/suites.py", "request/plan.py",
+        "presets.py", "plan/selection.py", "plan/suites.py", "plan/plan.py",
         "runner/schedule.py", "validation/registry.py",
     )}  # fmt: skip
     lists.add("snug/recipes/named.py")
-    names = ("cell", "ground_truth", "training", "training_windows", "metrics", "case", "microbenchmark")
+    names = (
+        "cell_task",
+        "ground_truth",
+        "training",
+        "training_windows",
+        "metric_task",
+        "case",
+        "microbenchmark",
+    )
     modules = [f"benchmarks.tasks.{name}" for name in names]
     modules += [entry.module for entry in (*SCENES, *FURTHER, *METHODS)]
     modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets.assets"]
-    modules += [f"benchmarks.metrics.{name}" for name in MODULES]
+    modules += list(MODULE_OF.values())
     assert {name: found for name in modules if (found := lists & set(code_of(name)))} == {}
     # A shirt of preset quick is measured.
     lists -= {"benchmarks/presets.py", "benchmarks/scenes/__init__.py"}

@@ -12,17 +12,15 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-import hashlib
 import importlib.util
-import json
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
+from benchmarks.fingerprint.digest import digest
 from benchmarks.registry import DeclarationError
 from benchmarks.results.run_folder import digest_of_file
 
@@ -32,23 +30,11 @@ LAYERS = ("reference_sim", "snug", "benchmarks")
 NO_DATA = (".py", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
 
 
-def digest(value: Any) -> str:
-    """16 hexadecimal digits of a value: JSON, bytes, dataclasses, or anything with a plain repr inside."""
-    if not isinstance(value, bytes):
-        value = json.dumps(value, sort_keys=True, default=_plain).encode()
-    return hashlib.sha256(value).hexdigest()[:16]
-
-
-def _plain(value: Any) -> Any:
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
-    if hasattr(value, "tobytes"):  # an array
-        return [str(value.dtype), list(value.shape), digest(value.tobytes())]
-    if isinstance(value, set | frozenset):
-        return sorted(value)
-    if hasattr(value, "items"):
-        return dict(value)
-    raise TypeError(f"cannot tell apart by content: {type(value).__name__}")
+def software(*modules: str) -> dict[str, str]:
+    """Return name -> digest or version of the source, packages and data files of these modules."""
+    code = code_of(*modules)
+    packages = {f"package {name}": version for name, version in packages_of(code).items()}
+    return code | packages | data_of(code)
 
 
 def code_of(*modules: str) -> dict[str, str]:

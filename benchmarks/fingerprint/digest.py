@@ -1,0 +1,27 @@
+"""A short digest of any plain value."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from typing import Any
+
+
+def digest(value: Any) -> str:
+    """16 hexadecimal digits of a value: JSON, bytes, dataclasses, or anything with a plain repr inside."""
+    if not isinstance(value, bytes):
+        value = json.dumps(value, sort_keys=True, default=_plain).encode()
+    return hashlib.sha256(value).hexdigest()[:16]
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+    if hasattr(value, "tobytes"):  # an array
+        return [str(value.dtype), list(value.shape), digest(value.tobytes())]
+    if isinstance(value, set | frozenset):
+        return sorted(value)
+    if hasattr(value, "items"):
+        return dict(value)
+    raise TypeError(f"cannot tell apart by content: {type(value).__name__}")

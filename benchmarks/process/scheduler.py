@@ -1,0 +1,33 @@
+"""The scheduler of a cluster of dask.distributed that a user has started."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from benchmarks.process.errors import one_line
+
+FIRST = 5.0  # [s] in which a scheduler answers at first
+
+
+class ClusterError(ValueError):
+    """There is no such cluster; the message names it and the remedy."""
+
+
+def connect(address: str, *, seconds: float) -> Any:
+    """A client of the scheduler, which looks for one that it has lost for so long. Raises ClusterError."""
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ClusterError("--scheduler needs dask.distributed: pip install '.[cluster]'") from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
+    try:
+        return Client(address, timeout=seconds, name="benchmarks.run", set_as_default=False)
+    except (OSError, ValueError) as error:
+        remedy = "start one by `dask scheduler` and give the address that it prints, as tcp://HOST:8786"
+        raise ClusterError(f"--scheduler {address}: {one_line(error)}; {remedy}") from None
+
+
+def check_scheduler(address: str) -> None:
+    """Raises ClusterError where no scheduler answers."""
+    connect(address, seconds=FIRST).close()
