@@ -64,7 +64,7 @@ def posed_body(dressed: Dressed) -> Callable[[int], tuple[np.ndarray, np.ndarray
 
     def inputs(frame: int) -> tuple[np.ndarray, np.ndarray]:
         poses, translations = motion.poses[frame : frame + 1], motion.translations[frame : frame + 1]
-        return pose(poses, translations)[0], garment.body_transported(body, poses, translations)[0]
+        return pose(poses, translations)[0], garment.pin_positions(body, poses, translations)[0]
 
     return inputs
 

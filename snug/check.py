@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reference_sim.command.command_line import Parser, command
-from snug.garments.options import GarmentFile, add_garment_options, garment_file
+from snug.garments.options import GarmentFile, add_garment_options, make_garment_file
 
 if TYPE_CHECKING:
     from snug.body.parametric_body import Body
-    from snug.garments.fit import Wearer
+    from snug.garments.fit import DressForm
 
 PROGRAM = "snug.check"
 USABLE, UNUSABLE, UNREADABLE = 0, 1, 2
@@ -52,24 +52,24 @@ def make_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     options = make_parser().parse_args(arguments)
-    files = [garment_file(path, options) for path in options.files]
+    files = [make_garment_file(path, options) for path in options.files]
     if options.picture and not options.picture.parent.is_dir():
         raise ValueError(f"--picture {options.picture}: no such folder")
     from snug.body.parametric_body import Body
-    from snug.garments.fit import Wearer
+    from snug.garments.fit import DressForm
 
     body = Body.from_file(options.body) if options.body else Body.load()
-    wearer = Wearer(body)
+    wearer = DressForm(body)
     return max(_check(file, body, wearer, options.picture) for file in files)
 
 
-def _check(file: GarmentFile, body: Body, wearer: Wearer, picture: Path | None) -> int:
+def _check(file: GarmentFile, body: Body, wearer: DressForm, picture: Path | None) -> int:
     """Print the table of one file; its exit status."""
     from snug.garments.garment import GarmentError
-    from snug.garments.reading import examine
+    from snug.garments.reading import examine_file
 
     try:
-        reading = examine(file, wearer, body)
+        reading = examine_file(file, wearer, body)
     except GarmentError as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return UNREADABLE

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reference_sim.command.command_line import command
-from snug.garments.options import demand_a_file, garment_file, is_file_name
-from snug.motion.options import reading_of
+from snug.garments.options import demand_garment_file, is_garment_file, make_garment_file
+from snug.motion.options import parse_motion_options
 from snug.recipes.named import TRAININGS, find_recipe
 from snug.training.options import check, parse
 
@@ -42,10 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from snug.training.simulated_data import DataSet
 
     check(options)
-    if not any(map(is_file_name, options.garment)):
-        demand_a_file(options)
+    if not any(map(is_garment_file, options.garment)):
+        demand_garment_file(options)
     templates = [
-        _of_file(word, options) if is_file_name(word) else find_template(word)
+        _of_file(word, options) if is_garment_file(word) else find_template(word)
         for word in dict.fromkeys(options.garment or [TSHIRT])
     ]
     outs = _outs(Path(options.out), templates)
@@ -78,7 +78,7 @@ def _of_file(path: str, options: argparse.Namespace) -> GarmentTemplate:
     from snug.garments.reading import read_garment
     from snug.garments.templates import GarmentTemplate
 
-    file = garment_file(path, options)
+    file = make_garment_file(path, options)
 
     def tailor(body: Body, *, vertices: int) -> Garment:
         return read_garment(file, body)
@@ -107,10 +107,10 @@ def _motions(options: argparse.Namespace, data: DataSet | None) -> tuple[list[An
     from snug.motion.files import load_motions
     from snug.motion.library import TRAIN, VALIDATION, make_motion
 
-    reading = reading_of(options)
+    reading = parse_motion_options(options)
     motions = data.motions() if data else [make_motion(name) for name in TRAIN]
     if options.motions:
-        motions = load_motions(options.motions, reading=reading)
+        motions = load_motions(options.motions, options=reading)
     names = [motion.name for motion in motions]
     others = [name for name in VALIDATION if name not in names]  # of the library: they never train
     for word, known in (("hold_out", names), ("validation", [*names, *others])):

@@ -27,8 +27,8 @@ from benchmarks.runner.whole_run import executor_of
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.sequence import SimulateSequence
 from benchmarks.tasks.task import Outcome
-from snug.garments.options import demand_a_file, is_file_name
-from snug.motion.options import reading_of
+from snug.garments.options import demand_garment_file, is_garment_file
+from snug.motion.options import parse_motion_options
 from snug.recipes.recipe import DEFAULT
 from snug.training.simulated_data import INDEX, DataSet, SimulatedSequence, settings_of
 
@@ -82,10 +82,10 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
     if options.method not in methods:
         raise PlanError(f"--method {options.method}: no solver is called so; see benchmarks.run --list")
     own = None
-    if is_file_name(options.garment):
+    if is_garment_file(options.garment):
         own = choose_garment(options)
     else:
-        demand_a_file(options)
+        demand_garment_file(options)
     worn = (own.scenes,) if own else (of_garment(options.garment),)
     if why := methods[options.method].skip(worn[0].scene("")):
         raise PlanError(f"--method {options.method}: {why}")
@@ -116,10 +116,10 @@ def choose_motions(options: argparse.Namespace, *, dynamic: bool) -> dict[str, M
     from snug.motion.files import load_motions
     from snug.training.motion_augmentation import FRAMES, SHARED_SEED, mixed_motions
 
-    reading, given = reading_of(options), list[Any]()
+    reading, given = parse_motion_options(options), list[Any]()
     for path in options.motions or ["library"]:
         names = library.DYNAMIC_TRAIN if dynamic else library.TRAIN
-        given += embedded_motions(names) if path == "library" else load_motions(path, reading=reading)
+        given += embedded_motions(names) if path == "library" else load_motions(path, options=reading)
     count = len(given) if options.sequences is None else options.sequences
     if more := max(0, count - len(given)):
         turn, lifted = DEFAULT.mixed_turn, DEFAULT.mixed_lift

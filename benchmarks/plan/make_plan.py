@@ -24,8 +24,8 @@ from benchmarks.provenance import usable_cores
 from benchmarks.results.run_folder import ResultsError, RunFolder, digest_of_file
 from benchmarks.scenes import GARMENT_SCENES, all_scenes
 from benchmarks.tasks.task import DEFAULT_ONLY, STATES
-from snug.garments.options import demand_a_file, garment_file
-from snug.motion.options import reading_of
+from snug.garments.options import demand_garment_file, make_garment_file
+from snug.motion.options import parse_motion_options
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 
@@ -46,7 +46,7 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
     methods, own_methods = outside.resolved(
         outside.METHODS, split(options.methods), {entry.name for entry in METHODS}
     )
-    motions, reading = Motions(), reading_of(options)
+    motions, reading = Motions(), parse_motion_options(options)
     tests, validates = split(options.test_motions), split(options.validation_motions)
     if options.motions or tests or validates or not names_no_motion(scenes, own_scenes):
         motions = choose_motions(
@@ -116,9 +116,9 @@ def choose_garment(options: argparse.Namespace) -> OwnGarment | None:
     snug.garments.garment.GarmentError for a file that holds none for this body.
     """
     if options.garment is None:
-        demand_a_file(options)
+        demand_garment_file(options)
         return None
-    file = garment_file(options.garment, options)
+    file = make_garment_file(options.garment, options)
     taken = {scene.split("/")[0] for scene in all_scenes((), ())} | {
         scenes.garment for scenes in GARMENT_SCENES
     }

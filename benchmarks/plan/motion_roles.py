@@ -11,7 +11,7 @@ from benchmarks.presets import Preset
 
 if TYPE_CHECKING:
     from snug.motion.motion import Motion
-    from snug.motion.options import Reading
+    from snug.motion.options import MotionFileOptions
 
 FEWEST = 3  # frames of a motion: inertia needs two before the one that is judged
 
@@ -20,7 +20,7 @@ def choose_motions(
     paths: Sequence[str],
     test_names: Sequence[str],
     preset: Preset,
-    reading: Reading | None = None,
+    reading: MotionFileOptions | None = None,
     *,
     validation_names: Sequence[str] = (),
     split: str = "test",
@@ -74,10 +74,10 @@ def choose_motions(
     return motions
 
 
-def _motions_in(path: str, reading: Reading | None) -> list[Motion]:
+def _motions_in(path: str, reading: MotionFileOptions | None) -> list[Motion]:
     from snug.motion.files import load_motions  # its readers are slow to load
 
-    return load_motions(path, reading=reading)
+    return load_motions(path, options=reading)
 
 
 def nearest(word: str, names: Sequence[str]) -> str:

@@ -51,7 +51,7 @@ def build(
         return moved_along(cloth, energies, body, garment, before.followed_by(motion.cut(0, 1)), start, shape)
 
     cloth = garment.cloth()
-    handles = garment.body_transported(body, motion.poses, motion.translations, shape)
+    handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
     energies = declared_energies(cloth)
     # Which faces a vertex may touch is a matter of the body that the garment was made for.
     obstacle = Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped())
@@ -135,7 +135,7 @@ def _simulated(
 ) -> np.ndarray:  # fmt: skip
     """Positions (T,V,3) [m] of every frame of the motion. Raises RuntimeError, with what it did not."""
     posed = body.vertices(motion.poses, motion.translations, betas)
-    handles = garment.body_transported(body, motion.poses, motion.translations, betas)
+    handles = garment.pin_positions(body, motion.poses, motion.translations, betas)
     trajectory: Trajectory = simulate(
         cloth, energies, dt=1.0 / motion.fps, frames=motion.frames, start=start,
         obstacle=Obstacle(posed, body.faces, rest_positions=body.shaped()),

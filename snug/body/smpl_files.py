@@ -24,10 +24,10 @@ import numpy as np
 import scipy.sparse
 
 from reference_sim.files.array_file import ArrayFileError, read_arrays
+from reference_sim.geometry.topology import boundary_loops
 from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
 from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, BodyError
-from snug.body.t_pose import arm_turns, arms_below_horizontal, turned_rest
-from snug.garments.remeshing import boundary_loops
+from snug.body.t_pose import arm_angles, arm_rotations, turn_rest_pose
 
 SHAPES = 10  # coefficients kept when a file has more, and read by networks of pose and shape
 JOINTS = len(JOINT_NAMES)
@@ -219,7 +219,7 @@ def _check_place(path: Path, template: np.ndarray, joints: np.ndarray) -> None:
 
 
 def _in_t_pose(path: Path, rest: dict[str, Any]) -> dict[str, Any]:
-    lowered = arms_below_horizontal(rest["joint_template"])
+    lowered = arm_angles(rest["joint_template"])
     if np.abs(lowered).max() <= T_POSE:
         return rest
     degrees = " and ".join(f"{angle:.0f}" for angle in np.degrees(lowered))
@@ -233,7 +233,7 @@ def _in_t_pose(path: Path, rest: dict[str, Any]) -> dict[str, Any]:
         np.concatenate([rest[f"{what}template"][..., None], rest[directions]], axis=2)
         for what, directions in (("", "shape_directions"), ("joint_", "joint_directions"))
     )
-    points, joints = turned_rest(points, joints, rest["skinning_weights"], arm_turns(lowered))
+    points, joints = turn_rest_pose(points, joints, rest["skinning_weights"], arm_rotations(lowered))
     return {
         **rest,
         "template": points[..., 0],

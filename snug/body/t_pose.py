@@ -11,13 +11,13 @@ ARM = ("shoulder", "elbow", "wrist", "hand")
 SIDES = (("left", 1.0), ("right", -1.0))
 
 
-def arms_below_horizontal(joints: Array) -> Array:
+def arm_angles(joints: Array) -> Array:
     """Angle (2,) [rad] by which the left and the right arm, shoulder to wrist, hang down; joints (24, 3)."""
     arms = [joints[JOINT[f"{side}_wrist"]] - joints[JOINT[f"{side}_shoulder"]] for side, _ in SIDES]
     return np.array([np.arctan2(-arm[1], sign * arm[0]) for arm, (_, sign) in zip(arms, SIDES, strict=True)])
 
 
-def arm_turns(angles: Array) -> Array:
+def arm_rotations(angles: Array) -> Array:
     """World rotation of each joint (24, 3, 3) that lifts each arm, as one piece, by angles (2,) [rad]."""
     turns = np.broadcast_to(np.eye(3), (len(JOINT), 3, 3)).copy()
     for (side, sign), angle in zip(SIDES, angles, strict=True):
@@ -26,7 +26,7 @@ def arm_turns(angles: Array) -> Array:
     return turns
 
 
-def turned_rest(points: Array, joints: Array, weights: Array, turns: Array) -> tuple[Array, Array]:
+def turn_rest_pose(points: Array, joints: Array, weights: Array, turns: Array) -> tuple[Array, Array]:
     """Vertices (B, 3, K) and joints (24, 3, K) of a body whose joints turn by (24, 3, 3) in the world.
 
     The new rest pose is the one that linear blend skinning takes back to the old one exactly: each vertex is

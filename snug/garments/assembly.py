@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from reference_sim.geometry.topology import boundary_loops
 from snug.body.parametric_body import Body
-from snug.garments.body_surface import SHIRT_BONES, build_surface, dominated_by, joint
 from snug.garments.cuts import SEAM, CutPlane
 from snug.garments.garment import Garment, GarmentError, smooth_weights
+from snug.garments.implicit_surface import build_surface
+from snug.garments.landmarks import SHIRT_BONES, joint_position, skin_of
 from snug.garments.meshing import mesh_garment
-from snug.garments.remeshing import boundary_loops
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -22,11 +23,11 @@ SMOOTHED_OVER = 0.1  # [m] about the hip joints: from a shirt's own weights to s
 
 def nearest_body_vertices(body: Body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
     """Nearest template vertex (V,), of those that follow one of `bones`, to each position (V,3) [m]."""
-    allowed = np.flatnonzero(dominated_by(body, bones))
+    allowed = np.flatnonzero(skin_of(body, bones))
     return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
 
 
-def sewn(
+def assemble_garment(
     name: str, body: Body, vertices: int, cut: Mapping[str, float], surface: Mapping[str, Any],
     cuts: list[CutPlane], bones: Sequence[str], smoothing: int = 0,
 ) -> Garment:  # fmt: skip
@@ -45,7 +46,7 @@ def sewn(
     own = np.asarray(body.skinning_weights)[nearest]
     weights = smooth_weights(own, faces, round(smoothing * vertices / 1000))
     if smoothing and "waist" not in loops:
-        above = positions[:, 1] - joint(body, "left_hip")[1]
+        above = positions[:, 1] - joint_position(body, "left_hip")[1]
         share = np.clip(above / SMOOTHED_OVER + 0.5, 0.0, 1.0)[:, None]
         weights = share * own + (1 - share) * weights
     return Garment(

@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_sim.geometry.topology import boundary_loops
 from snug.body.parametric_body import Body
-from snug.garments.body_surface import SHIRT_BONES, TORSO_BONES, ImplicitSurface, dominated_by, joint
-from snug.garments.remeshing import boundary_loops
+from snug.garments.implicit_surface import ImplicitSurface
+from snug.garments.landmarks import SHIRT_BONES, TORSO_BONES, joint_position, skin_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -80,9 +81,9 @@ def neck_cut(body: Body, clearance: float) -> CutPlane:
 
     Lifted where shoulders stand so high that the cut would take them with it.
     """
-    neck, shoulder = joint(body, "neck"), joint(body, "left_shoulder")[0]
+    neck, shoulder = joint_position(body, "neck"), joint_position(body, "left_shoulder")[0]
     cut = CutPlane("neck", (0.0, 1.0, 0.3), (0.0, neck[1], neck[2]), reach=0.85 * shoulder, bend=3.0)
-    skin = body.template[dominated_by(body, SHIRT_BONES)]
+    skin = body.template[skin_of(body, SHIRT_BONES)]
     over = skin[np.abs(np.abs(skin[:, 0]) - cut.reach) < 0.1 * shoulder]
     lift = max(0.0, cut.height(over).max(initial=-np.inf) + clearance + NECK_ROOM)
     return replace(cut, point=(0.0, neck[1] + lift, neck[2]))
@@ -94,15 +95,15 @@ def armhole_cut(
     """A plane from a strap's width [m] beside the neck to under the arm, leaning outwards so far that the
     flanks stay, with what build_surface adds to them.
     """
-    shoulder, skin = joint(body, "left_shoulder"), body.template
-    arm = skin[dominated_by(body, ("left_shoulder",))]
+    shoulder, skin = joint_position(body, "left_shoulder"), body.template
+    arm = skin[skin_of(body, ("left_shoulder",))]
     under = arm[arm[:, 0] < shoulder[0] + ARMPIT_ROOM, 1].min(initial=shoulder[1]) - ARMPIT_ROOM
-    shirt = skin[dominated_by(body, SHIRT_BONES)]
-    collar = skin[dominated_by(body, (*SHIRT_BONES, "neck"))]
+    shirt = skin[skin_of(body, SHIRT_BONES)]
+    collar = skin[skin_of(body, (*SHIRT_BONES, "neck"))]
     edge = strap + clearance + collar[neck.beyond(collar) > -clearance, 0].max(initial=0.0)
     over = shirt[np.abs(shirt[:, 0] - edge) < ARMPIT_ROOM]
     top = over[:, 1].max(initial=shoulder[1]) + clearance
-    flank = skin[dominated_by(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
+    flank = skin[skin_of(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
     flank = flank[np.argsort(-flank[:, 1])]
     wide = np.append(np.maximum.accumulate(np.abs(flank[:, 0])), np.abs(flank[:, 0]).max(initial=edge))
     down = top - np.append(flank[:, 1], hem)

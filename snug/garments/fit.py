@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
-from snug.garments.body_surface import dominated_by
+from snug.garments.landmarks import skin_of
 
 Array = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ class Fit:
         return float(uneven / self.size + self.at_ends)
 
 
-def file_pose(body: Body) -> Array:
+def pose_in_file(body: Body) -> Array:
     """The pose (24,3) [rad] that a body has in its file, in which garments were made for it."""
     pose = np.zeros((len(body.joint_names), 3))
     if body.arms_lowered is None:
@@ -91,25 +91,25 @@ def file_pose(body: Body) -> Array:
     return pose
 
 
-def as_in_file(body: Body) -> Body:
+def body_as_in_file(body: Body) -> Body:
     """The mean body with template and joints as its file has them."""
     if body.arms_lowered is None:
         return body
-    pose, here = file_pose(body)[None], np.zeros((1, 3))
+    pose, here = pose_in_file(body)[None], np.zeros((1, 3))
     moved = body.transforms(pose, here)[0]
     joints = np.einsum("jab,jb->ja", moved[..., :3], body.joint_template) + moved[..., 3]
     return replace(body, template=body.vertices(pose, here)[0], joint_template=joints)
 
 
-class Wearer:
+class DressForm:
     """The mean body, as its file has it, as something to measure distances to. body: that one."""
 
     def __init__(self, body: Body) -> None:
-        self.body = body = as_in_file(body)
+        self.body = body = body_as_in_file(body)
         self.height = body.height
         self.low, self.high = body.template.min(axis=0), body.template.max(axis=0)
         self.skin = Obstacle(body.template, body.faces)
-        at_ends = np.isin(body.faces, np.flatnonzero(dominated_by(body, ENDS)))
+        at_ends = np.isin(body.faces, np.flatnonzero(skin_of(body, ENDS)))
         self.ends: NDArray[np.bool_] = at_ends.sum(axis=1) == 3  # faces (F,)
 
     def fit(self, positions: Array) -> Fit:
@@ -172,7 +172,7 @@ class Wearer:
 
 
 @dataclass(frozen=True)
-class Mend:
+class Placement:
     """What would bring a garment onto the body: units and axis of its file, and a shift (3,) [m]."""
 
     units: str
@@ -180,7 +180,7 @@ class Mend:
     shift: tuple[float, float, float]
 
 
-def find_mend(wearer: Wearer, raw: Array, units: str, up: str, shift: Array) -> Mend | None:
+def find_placement(wearer: DressForm, raw: Array, units: str, up: str, shift: Array) -> Placement | None:
     """What to say instead of units, up and shift of a file's vertices (V,3), so that they lie on the body.
 
     First other units and axes alone, then a shift, then both. None where nothing of it helps.
@@ -191,10 +191,10 @@ def find_mend(wearer: Wearer, raw: Array, units: str, up: str, shift: Array) -> 
     placed = {choice: to_metres_y_up(raw, units=choice[0], up=choice[1]) for choice in choices}
     fits = {choice: wearer.fit(positions + shift) for choice, positions in placed.items()}
     if worn := [choice for choice, fit in fits.items() if not fit.problem and fit.cost < DOUBTFUL]:
-        return Mend(*min(worn, key=lambda choice: fits[choice].cost), _three(shift))
+        return Placement(*min(worn, key=lambda choice: fits[choice].cost), _three(shift))
     for (u, a), positions in placed.items():
         if SIZES[0] < fits[u, a].size < SIZES[1] and (found := wearer.shift(positions)) is not None:
-            return Mend(u, a, _three(found))
+            return Placement(u, a, _three(found))
     return None
 
 

@@ -68,7 +68,7 @@ class Garment:
             return self.loops["hem"]
         return np.concatenate([self.loops["left_leg"], self.loops["right_leg"]])
 
-    def body_transported(
+    def pin_positions(
         self, body: Body, poses: Array, translations: Array, betas: ArrayLike | None = None
     ) -> Array:
         """Where the pins are (T,P,3) [m] on the body of that shape in poses (T,24,3) [rad] at translations

@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_sim.geometry.topology import boundary_loops, corner_angles, triangle_areas
 from snug.body.parametric_body import Body
-from snug.garments.body_surface import ImplicitSurface
 from snug.garments.cuts import SEAM, CutPlane, cut_sheet, outlines
-from snug.garments.remeshing import boundary_loops, corner_angles, remesh, triangle_areas
+from snug.garments.implicit_surface import ImplicitSurface
+from snug.garments.remeshing import remesh
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

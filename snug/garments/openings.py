@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_sim.geometry.topology import boundary_loops
 from snug.body.parametric_body import Body
-from snug.garments.body_surface import joint
-from snug.garments.remeshing import boundary_loops
+from snug.garments.landmarks import joint_position
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -16,7 +16,7 @@ ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
 MIDDLE = 0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
 
 
-def named_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
+def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
     """Name -> boundary vertices in order, from the front-most on, of a garment (V,3) [m] on the unposed body.
 
     An opening beside the middle is a sleeve above the hips, or far out, and a leg else; a sleeve that ends
@@ -48,12 +48,12 @@ def named_openings(body: Body, positions: Array, faces: Index) -> dict[str, Inde
 
 def _beside(body: Body, centre: Array) -> str:
     """The sleeve or leg that ends there, or nothing in the middle."""
-    hip, shoulder = joint(body, "left_hip"), joint(body, "left_shoulder")
-    middle = joint(body, "pelvis")[0]
+    hip, shoulder = joint_position(body, "left_hip"), joint_position(body, "left_shoulder")
+    middle = joint_position(body, "pelvis")[0]
     out = abs(centre[0] - middle)
     if out < MIDDLE * (hip[0] - middle):
         return ""
-    arm = float(np.linalg.norm(joint(body, "left_elbow") - shoulder))
+    arm = float(np.linalg.norm(joint_position(body, "left_elbow") - shoulder))
     beyond = out > shoulder[0] - middle + ARMHOLE * arm
     limb = "sleeve" if beyond else "armhole" if centre[1] > hip[1] else "leg"
     return f"{'left' if centre[0] > middle else 'right'}_{limb}"
@@ -64,7 +64,7 @@ def _in_the_middle(body: Body, loops: list[tuple[Index, Array]], legs: bool) -> 
         return {}
     by_height = sorted(loops, key=lambda pair: -pair[1][1])
     (top, centre), (bottom, _) = by_height[0], by_height[-1]
-    half_way = 0.5 * (joint(body, "pelvis")[1] + joint(body, "neck")[1])
+    half_way = 0.5 * (joint_position(body, "pelvis")[1] + joint_position(body, "neck")[1])
     name = "neck" if centre[1] > half_way else "waist"
     if len(loops) == 1:
         return {name if legs else "hem": top}

@@ -48,7 +48,7 @@ class GarmentFile:
         return (*found, self.material) if self.material else tuple(found)
 
 
-def is_file_name(word: str) -> bool:
+def is_garment_file(word: str) -> bool:
     """Whether a garment is named by its file."""
     return Path(word).suffix.lower() in SUFFIXES
 
@@ -69,7 +69,7 @@ def add_garment_options(parser: ArgumentParser) -> None:
         "bending_stiffness [J] (default: the cotton of the paper)")  # fmt: skip
 
 
-def demand_a_file(options: Namespace) -> None:
+def demand_garment_file(options: Namespace) -> None:
     """Raises ValueError for an option of `add_garment_options` where no garment is a file."""
     plain = ArgumentParser()
     add_garment_options(plain)
@@ -80,7 +80,7 @@ def demand_a_file(options: Namespace) -> None:
             )
 
 
-def garment_file(path: str, options: Namespace) -> GarmentFile:
+def make_garment_file(path: str, options: Namespace) -> GarmentFile:
     """The file with the options of `add_garment_options`. Raises ValueError for one that means nothing."""
     try:
         shift = tuple(float(word) for word in options.garment_shift.split(","))

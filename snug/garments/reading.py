@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.mesh_files import METRES, Surface, read_mesh, to_metres_y_up
 from reference_sim.files.uv_chart import flattened, join_seams, rest_chart, stretches
+from reference_sim.geometry.topology import corner_angles
 from reference_sim.material import Material, MaterialError
 from snug.body.parametric_body import Body
-from snug.garments.fit import Wearer, as_in_file, file_pose, find_mend
+from snug.garments.fit import DressForm, body_as_in_file, find_placement, pose_in_file
 from snug.garments.garment import Garment, GarmentError, smooth_weights
-from snug.garments.openings import named_openings
+from snug.garments.openings import name_openings
 from snug.garments.options import OPTION, GarmentFile
-from snug.garments.remeshing import corner_angles
-from snug.garments.weights import Carried, authored_weights, carried_by
+from snug.garments.weights import GarmentWeights, find_weights, read_authored_weights
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -45,7 +45,7 @@ class Finding:
 
 
 @dataclass
-class Reading:
+class Examination:
     """What a file came to, as far as it could be read; garment: None where something cannot be used."""
 
     findings: list[Finding] = field(default_factory=list)
@@ -63,24 +63,24 @@ class Reading:
 
 def read_garment(file: GarmentFile, body: Body) -> Garment:
     """The garment of a file on the unposed body. Raises GarmentError: file, what is wrong, remedy."""
-    reading = examine(file, Wearer(body), body)
+    reading = examine_file(file, DressForm(body), body)
     for finding in reading.unusable:
         raise GarmentError(f"{file.path}: {finding.says}" + f": {finding.remedy}" * bool(finding.remedy))
     assert reading.garment is not None
     return reading.garment
 
 
-def examine(file: GarmentFile, wearer: Wearer, body: Body) -> Reading:
+def examine_file(file: GarmentFile, wearer: DressForm, body: Body) -> Examination:
     """Everything that is to be said of a file. Raises GarmentError where it cannot be read at all."""
     try:
         raw = read_mesh(file.path)
         material = Material.from_file(file.material) if file.material else Material()
     except (MeshError, MaterialError) as error:
         raise GarmentError(str(error)) from None
-    authored = authored_weights(file.path, raw.vertex_data, file.weights, len(raw.positions))
+    authored = read_authored_weights(file.path, raw.vertex_data, file.weights, len(raw.positions))
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
     surface, kept, _ = join_seams(replace(raw, positions=positions))
-    reading = Reading(surface=surface)
+    reading = Examination(surface=surface)
     _of_size(reading, raw, surface, kept)
     fits = _of_place(reading, file, wearer, raw)
     chart = _of_rest(reading, file, surface)
@@ -95,14 +95,14 @@ def examine(file: GarmentFile, wearer: Wearer, body: Body) -> Reading:
     return reading
 
 
-def _of_size(reading: Reading, raw: Surface, surface: Surface, kept: Index) -> None:
+def _of_size(reading: Examination, raw: Surface, surface: Surface, kept: Index) -> None:
     quads = f", {raw.quads} quads cut in two" if raw.quads else ""
     reading.find("mesh", f"{len(surface.positions)} vertices, {len(surface.faces)} triangles{quads}")
     if doubled := len(raw.positions) - len(kept):
         reading.find("doubled vertices", f"{doubled} joined with another at the same place", level="note")
 
 
-def _of_place(reading: Reading, file: GarmentFile, wearer: Wearer, raw: Surface) -> bool:
+def _of_place(reading: Examination, file: GarmentFile, wearer: DressForm, raw: Surface) -> bool:
     """Whether the garment lies on the body."""
     assert reading.surface is not None
     positions = reading.surface.positions
@@ -116,7 +116,7 @@ def _of_place(reading: Reading, file: GarmentFile, wearer: Wearer, raw: Surface)
         reading.find("place", f"{fit.below:.1%} of the vertices below the skin, the deepest by "
                      f"{1e3 * fit.depth:.1f} mm", level=level)  # fmt: skip
         return True
-    mend = find_mend(wearer, raw.positions, file.units, file.up, np.asarray(file.shift))
+    mend = find_placement(wearer, raw.positions, file.units, file.up, np.asarray(file.shift))
     remedy = "move it onto the unposed body, facing +z with y up"
     if mend:
         shift = ",".join(f"{value:g}" for value in mend.shift)
@@ -128,7 +128,7 @@ def _of_place(reading: Reading, file: GarmentFile, wearer: Wearer, raw: Surface)
     return False
 
 
-def _of_rest(reading: Reading, file: GarmentFile, surface: Surface) -> Array | None:
+def _of_rest(reading: Examination, file: GarmentFile, surface: Surface) -> Array | None:
     """The chart (F,3,2) [m] where it is the rest shape."""
     asked = file.rest == "uv"
     if surface.uv is None and not asked:
@@ -151,7 +151,7 @@ def _of_rest(reading: Reading, file: GarmentFile, surface: Surface) -> Array | N
     return chart if asked else None
 
 
-def _of_winding(reading: Reading, surface: Surface, wearer: Wearer) -> Surface:
+def _of_winding(reading: Examination, surface: Surface, wearer: DressForm) -> Surface:
     """The surface, turned where it is inside out."""
     corners = surface.positions[surface.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -166,7 +166,7 @@ def _of_winding(reading: Reading, surface: Surface, wearer: Wearer) -> Surface:
     return replace(surface, faces=np.ascontiguousarray(surface.faces[:, ::-1]), uv=uv)
 
 
-def _of_mesh(reading: Reading, surface: Surface, chart: Array | None) -> bool:
+def _of_mesh(reading: Examination, surface: Surface, chart: Array | None) -> bool:
     """Whether the mesh can be simulated: one or several sheets, consistently wound."""
     same = np.sort(surface.faces, axis=1)
     _, first, count = np.unique(same, axis=0, return_index=True, return_counts=True)
@@ -200,7 +200,7 @@ def _pieces(surface: Surface) -> int:
 
 
 def _dressed(
-    reading: Reading,
+    reading: Examination,
     file: GarmentFile,
     body: Body,
     surface: Surface,
@@ -213,9 +213,9 @@ def _dressed(
     body: in T pose. The surface lies on it as its file has it: there openings and weights are found, and from
     there vertices are brought to the T pose by the inverse of their blended transforms. Its rest shape stays.
     """
-    positions, faces, filed = surface.positions, surface.faces, as_in_file(body)
+    positions, faces, filed = surface.positions, surface.faces, body_as_in_file(body)
     try:
-        loops = named_openings(filed, positions, faces)
+        loops = name_openings(filed, positions, faces)
     except ValueError as error:
         reading.find("openings", str(error), "separate them", "unusable")
         return None
@@ -226,7 +226,7 @@ def _dressed(
         return None
     reading.find("openings", ", ".join(f"{name} ({len(loop)} vertices)" for name, loop in loops.items()))
     legs = "left_leg" in loops or "right_leg" in loops
-    carried: Carried = carried_by(filed, positions, faces, legs=legs, authored=authored)
+    carried: GarmentWeights = find_weights(filed, positions, faces, legs=legs, authored=authored)
     how = "as they came with it" if carried.authored else "of the closest skin"
     reading.find("weights", f"{how}; encloses {', '.join(carried.followed)}")
     if body.arms_lowered is not None:
@@ -245,11 +245,11 @@ def _dressed(
     )  # fmt: skip
 
 
-def _in_t_pose(body: Body, positions: Array, faces: Index, carried: Carried) -> Array:
+def _in_t_pose(body: Body, positions: Array, faces: Index, carried: GarmentWeights) -> Array:
     """Positions (V,3) [m], made for the body as its file has it, on the body in T pose."""
     weights = carried.weights
     if not carried.authored:
         weights = smooth_weights(weights, faces, round(UNPOSED_SMOOTHING * len(positions) / 1000))
-    moved = body.transforms(file_pose(body)[None], np.zeros((1, 3)))[0]
+    moved = body.transforms(pose_in_file(body)[None], np.zeros((1, 3)))[0]
     blended = np.einsum("vj,jab->vab", weights, moved)
     return np.linalg.solve(blended[..., :3], (positions - blended[..., 3])[..., None])[..., 0]

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from reference_sim.geometry.topology import boundary_loops, triangle_areas
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Projection = Callable[[Array], Array]  # points (N,3) [m] onto a surface
@@ -21,42 +23,6 @@ Projection = Callable[[Array], Array]  # points (N,3) [m] onto a surface
 EVENNESS = 3
 STEP = 0.2
 ROUNDS = 40  # of relax
-
-
-def boundary_loops(faces: Index) -> list[Index]:
-    """Boundary loops of a manifold mesh: vertex indices in order, longest first, along the faces' winding.
-
-    Errors: ValueError where the mesh is not manifold at its boundary.
-    """
-    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    size = int(faces.max()) + 1
-    forward, backward = halves @ [size, 1], halves @ [1, size]
-    rim = halves[~np.isin(forward, backward)]
-    following = dict(rim.tolist())
-    if len(following) != len(rim) or set(following) != set(following.values()):
-        raise ValueError("boundary loops touch or the winding is not consistent: the mesh is not manifold")
-    loops = []
-    while following:
-        vertex, after = next(iter(following.items()))
-        loop = [vertex]
-        del following[vertex]
-        while after != loop[0]:
-            loop.append(after)
-            after = following.pop(after)
-        loops.append(np.array(loop, dtype=np.int64))
-    return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
-
-
-def triangle_areas(points: Array, faces: Index) -> Array:
-    """Areas (F,) [m^2]."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-
-
-def corner_angles(points: Array, faces: Index) -> Array:
-    """Angles (F,3) [rad] at the faces' corners."""
-    after, before = (points[np.roll(faces, -k, axis=1)] - points[faces] for k in (1, 2))
-    return np.arctan2(np.linalg.norm(np.cross(after, before), axis=2), np.sum(after * before, axis=2))
 
 
 def vertex_normals(points: Array, faces: Index) -> Array:

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from snug.body.parametric_body import Body
-from snug.garments.assembly import sewn
-from snug.garments.body_surface import SHIRT_BONES, joint, legs_part
+from snug.garments.assembly import assemble_garment
 from snug.garments.cuts import SEAM_CUT, CutPlane, armhole_cut, level_cut, neck_cut
 from snug.garments.garment import Garment, GarmentError
+from snug.garments.implicit_surface import legs_part
+from snug.garments.landmarks import SHIRT_BONES, joint_position
 
 TSHIRT = "tshirt"  # the garment that a command takes where none is named
 
@@ -123,11 +124,11 @@ def tailor_skirt(
     """
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length, "flare": flare}
     _demand_in_range("skirt", {"vertices": vertices, **cut})
-    hip = joint(body, "left_hip")[1]
+    hip = joint_position(body, "left_hip")[1]
     hem, top = hip - length, hip + rise
     cuts = [SEAM_CUT, level_cut("hem", hem, down=True), level_cut("waist", top)]
     surface = {"hem": hem, "top": top, "ease": ease, "flare": flare, "waistband": True}
-    return sewn("skirt", body, vertices, cut, surface, cuts, SKIRT_BONES, SKIRT_SMOOTHING)
+    return assemble_garment("skirt", body, vertices, cut, surface, cuts, SKIRT_BONES, SKIRT_SMOOTHING)
 
 
 def tailor_trousers(
@@ -224,15 +225,15 @@ def _shirt(
 ) -> Garment:  # fmt: skip
     """A garment with two sleeves, a neck and a hem; its sleeves end on the way from the shoulder to `end`."""
     _demand_in_range(name, {"vertices": vertices, **cut})
-    shoulder, far = joint(body, "left_shoulder"), joint(body, end)
-    hem = joint(body, "left_hip")[1] - cut["length"]
+    shoulder, far = joint_position(body, "left_shoulder"), joint_position(body, end)
+    hem = joint_position(body, "left_hip")[1] - cut["length"]
     cuff = shoulder[0] + cut["sleeve"] * (far[0] - shoulder[0])
     neck = neck_cut(body, cut["clearance"])
     sleeve = CutPlane("left_sleeve", (1.0, 0.0, 0.0), (cuff, 0.0, 0.0), twin="right_sleeve")
     cuts = [SEAM_CUT, level_cut("hem", hem, down=True), sleeve, neck]
     surface = {"hem": hem, "cuff": cuff, "top": neck.point[1] + 0.04, "ease": cut["ease"],
                "flare": cut.get("flare", 0.0)}  # fmt: skip
-    return sewn(name, body, vertices, cut, surface, cuts, bones)
+    return assemble_garment(name, body, vertices, cut, surface, cuts, bones)
 
 
 def _sleeveless(
@@ -240,22 +241,22 @@ def _sleeveless(
 ) -> Garment:
     """A garment with two armholes, a neck and a hem."""
     _demand_in_range(name, {"vertices": vertices, **cut})
-    hem = joint(body, "left_hip")[1] - cut["length"]
+    hem = joint_position(body, "left_hip")[1] - cut["length"]
     neck = neck_cut(body, cut["clearance"])
     fit = {"ease": cut["ease"], "flare": cut.get("flare", 0.0), "hem": hem}
     armhole = armhole_cut(body, neck, strap=cut["strap"], clearance=cut["clearance"], **fit)
     cuts = [SEAM_CUT, level_cut("hem", hem, down=True), armhole, neck]
     surface = {**fit, "top": neck.point[1] + 0.04}
-    return sewn(name, body, vertices, cut, surface, cuts, SHIRT_BONES, smoothing)
+    return assemble_garment(name, body, vertices, cut, surface, cuts, SHIRT_BONES, smoothing)
 
 
 def _trousers(name: str, body: Body, vertices: int, cut: Mapping[str, float]) -> Garment:
     """A garment with a waist and two legs."""
     _demand_in_range(name, {"vertices": vertices, **cut})
     crotch = legs_part(body, cut["clearance"] + cut["ease"] / (2 * np.pi))
-    hem = crotch - cut["length"] * (crotch - joint(body, "left_ankle")[1])
-    top = joint(body, "left_hip")[1] + cut["rise"]
+    hem = crotch - cut["length"] * (crotch - joint_position(body, "left_ankle")[1])
+    top = joint_position(body, "left_hip")[1] + cut["rise"]
     leg = replace(level_cut("left_leg", hem, down=True), twin="right_leg")
     surface = {"hem": hem, "top": top, "ease": cut["ease"], "waistband": True, "legs": True}
     cuts = [SEAM_CUT, leg, level_cut("waist", top)]
-    return sewn(name, body, vertices, cut, surface, cuts, TROUSER_BONES, TROUSER_SMOOTHING)
+    return assemble_garment(name, body, vertices, cut, surface, cuts, TROUSER_BONES, TROUSER_SMOOTHING)

@@ -14,8 +14,8 @@ from reference_sim.contact.closest_point import FaceTree
 from reference_sim.files.array_file import ArrayFileError, read_arrays
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
-from snug.garments.body_surface import dominated_by, joint
 from snug.garments.garment import GarmentError, smooth_weights
+from snug.garments.landmarks import joint_position, skin_of
 from snug.garments.templates import SKIRT_SMOOTHING
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both le
 
 
 @dataclass(frozen=True)
-class Carried:
+class GarmentWeights:
     """What carries a garment: weights (V,24), nearest body vertices (V,), names of the joints followed."""
 
     weights: Array
@@ -38,7 +38,9 @@ class Carried:
     authored: bool = False
 
 
-def carried_by(body: Body, positions: Array, faces: Index, *, legs: bool, authored: Array | None) -> Carried:
+def find_weights(
+    body: Body, positions: Array, faces: Index, *, legs: bool, authored: Array | None
+) -> GarmentWeights:
     """What carries a garment (V,3) [m], (F,3) wound outward, on the unposed body.
 
     legs: whether each leg has its own opening. Weights are the authored ones (V,24), or blended from the
@@ -46,22 +48,22 @@ def carried_by(body: Body, positions: Array, faces: Index, *, legs: bool, author
     both legs is smoothed below the hips as a skirt is.
     """
     followed = enclosed_limbs(body, positions, faces)
-    skin = np.asarray(body.faces)[dominated_by(body, followed)[body.faces].all(axis=1)]
+    skin = np.asarray(body.faces)[skin_of(body, followed)[body.faces].all(axis=1)]
     tree = FaceTree(skin, body.template[skin].mean(axis=1))
     tree.refit(body.template)
     found = tree.nearest(positions)
     corners = skin[found.faces]
     nearest = corners[np.arange(len(corners)), found.barycentric.argmax(axis=1)]
     if authored is not None:
-        return Carried(authored, nearest, followed, authored=True)
+        return GarmentWeights(authored, nearest, followed, authored=True)
     weights = np.einsum("va,vaj->vj", found.barycentric, body.skinning_weights[corners])
-    below = joint(body, "left_hip")[1] - positions[:, 1]
+    below = joint_position(body, "left_hip")[1] - positions[:, 1]
     if not legs and below.max() > BELOW_HIPS:
         # As far as a template's skirt, whatever the size of the triangles.
         smooth = smooth_weights(weights, faces, round(SKIRT_SMOOTHING * len(positions) / 1000))
         share = np.clip(below / BELOW_HIPS, 0.0, 1.0)[:, None]
         weights = (1 - share) * weights + share * smooth
-    return Carried(weights, nearest, followed)
+    return GarmentWeights(weights, nearest, followed)
 
 
 def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...]:
@@ -81,7 +83,7 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
     return enclosed or tuple(name for name, own in limbs.items() if own.any())
 
 
-def authored_weights(path: Path, data: Mapping[str, Array], beside: Path, count: int) -> Array | None:
+def read_authored_weights(path: Path, data: Mapping[str, Array], beside: Path, count: int) -> Array | None:
     """Weights (count, 24) from a file beside a mesh, or from the mesh's own vertex data; None without either.
 
     Raises GarmentError for weights of another shape, negative, or whose rows do not sum to one.

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from snug.motion.motion import MotionError
-from snug.motion.recording import check_length, open_text
+from snug.motion.raw_motion import check_length, open_text
 
 INCH = 0.0254  # [m]
 _ROTATIONS = ("rx", "ry", "rz")

@@ -21,8 +21,8 @@ from snug.body.skeleton import (
 )
 from snug.motion.acclaim import Skeleton, read_amc, read_asf, turns
 from snug.motion.motion import MotionError
-from snug.motion.options import Reading
-from snug.motion.recording import Recording, rate
+from snug.motion.options import MotionFileOptions
+from snug.motion.raw_motion import RawMotion, rate
 
 CMU_RATE = 120.0  # [1/s] the .amc format has no field for it
 # Our joint: the CMU bone whose turn it takes. Thumbs and the half bones inside hips and neck are not needed.
@@ -48,7 +48,7 @@ _HINGES = {
 }  # fmt: skip
 
 
-def read_asf_amc(path: Path, reading: Reading) -> Recording:
+def read_asf_amc(path: Path, reading: MotionFileOptions) -> RawMotion:
     """One .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf). Raises MotionError."""
     stem = path.stem
     names = (stem, stem.split("_")[0])
@@ -58,7 +58,7 @@ def read_asf_amc(path: Path, reading: Reading) -> Recording:
         raise MotionError(f"{path}: its skeleton {stem.split('_')[0]}.asf is missing; put it beside the clip")
     skeleton = read_asf(skeleton_file)
     poses, translations = retarget(skeleton, read_amc(path, skeleton), skeleton_file)
-    return Recording(
+    return RawMotion(
         path=path, poses=poses, translations=translations, fps=rate(path, None, reading, CMU_RATE),
         source=f"{path.name} with {skeleton_file.name}",
     )  # fmt: skip

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from snug.motion.motion import MotionError
-from snug.motion.recording import check_length, open_text
+from snug.motion.raw_motion import check_length, open_text
 
 MOST_JOINTS = 1000
 MOST_TURNS = 5_000_000  # joints times frames: 11 minutes of 60 joints at 120 frames per second

@@ -17,14 +17,14 @@ from snug.motion.acclaim_to_smpl import LIMBS, foot_alignment, relative_poses
 from snug.motion.bvh import Clip, read_clip
 from snug.motion.joint_names import find_joints
 from snug.motion.motion import MotionError
-from snug.motion.options import Reading
-from snug.motion.recording import Recording, rate
+from snug.motion.options import MotionFileOptions
+from snug.motion.raw_motion import RawMotion, rate
 
 # How far a limb of the zero pose may be turned from ours: legs astride, arms down.
 ASTRIDE, ARMS_DOWN = np.deg2rad(60.0), np.deg2rad(95.0)
 
 
-def read_bvh(path: Path, reading: Reading) -> Recording:
+def read_bvh(path: Path, reading: MotionFileOptions) -> RawMotion:
     """A .bvh of one body, whatever its unit of length: the path is scaled by the length of the legs.
 
     Raises MotionError.
@@ -44,7 +44,7 @@ def read_bvh(path: Path, reading: Reading) -> Recording:
             rotations[:, ours] = turned[found[name]] @ axes @ _alignment(path, name, places @ axes, found)
         else:
             rotations[:, ours] = rotations[:, PARENTS[ours]]
-    return Recording(
+    return RawMotion(
         path=path, poses=relative_poses(rotations), translations=LEG_LENGTH / leg * pelvis,
         fps=rate(path, clip.fps, reading), source=f"{path.name} ({len(found)} of 24 joints)",
     )  # fmt: skip

@@ -9,10 +9,10 @@ import numpy as np
 
 from snug.body.skeleton import JOINT
 from snug.motion.formats import READERS
-from snug.motion.glitches import without_glitches
 from snug.motion.motion import Motion, MotionError, clear_arms, place, resample, spread_arms
-from snug.motion.options import Reading
-from snug.motion.upright import turned_upright
+from snug.motion.options import MotionFileOptions
+from snug.motion.recording_errors import without_glitches
+from snug.motion.vertical_axis import turned_upright
 
 # As the authors of SNUG did: recorded hands are noisy and drive nothing.
 HAND_DAMPING = 0.1
@@ -25,7 +25,7 @@ def load_motions(
     path: str | Path,
     *,
     spread_degrees: float | None = None,
-    reading: Reading | None = None,
+    reading: MotionFileOptions | None = None,
 ) -> list[Motion]:
     """Motions from a file, or from every motion file of a folder, in the order of their names.
 
@@ -42,13 +42,13 @@ def load_motions(
         files = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS)
     if not files:
         raise MotionError(f"{path}: holds no motion file ({known}); give a folder of motion capture clips")
-    clips = [resample(place(read_motion(file, reading or Reading()))) for file in files]
+    clips = [resample(place(read_motion(file, reading or MotionFileOptions()))) for file in files]
     if spread_degrees is None:
         return [clear_arms(clip) for clip in clips]
     return [spread_arms(clip, spread_degrees) for clip in clips]
 
 
-def read_motion(file: Path, reading: Reading) -> Motion:
+def read_motion(file: Path, reading: MotionFileOptions) -> Motion:
     """One clip as recorded, at the file's rate, upright and without glitches. Raises MotionError."""
     if not file.stem.isprintable() or len(file.stem.encode(errors="replace")) > LONGEST_NAME:
         raise MotionError(

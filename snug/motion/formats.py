@@ -7,12 +7,12 @@ from pathlib import Path
 
 from snug.motion.acclaim_to_smpl import read_asf_amc
 from snug.motion.bvh_to_smpl import read_bvh
-from snug.motion.options import Reading
-from snug.motion.recording import Recording
-from snug.motion.smpl import read_npy, read_npz, read_pkl
+from snug.motion.options import MotionFileOptions
+from snug.motion.raw_motion import RawMotion
+from snug.motion.smpl_arrays import read_npy, read_npz, read_pkl
 
 # Extension of a motion file: its reader. Each gives the clip as recorded, in the axes of the file.
-READERS: dict[str, Callable[[Path, Reading], Recording]] = {
+READERS: dict[str, Callable[[Path, MotionFileOptions], RawMotion]] = {
     ".amc": read_asf_amc,
     ".bvh": read_bvh,
     ".npz": read_npz,

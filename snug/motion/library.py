@@ -5,7 +5,7 @@ Nothing heavy is loaded before a motion is made, so that names can be listed qui
 
 from __future__ import annotations
 
-from snug.motion.motion import Motion, MotionError
+from snug.motion.motion import Motion, MotionError, spread_arms
 
 TRAIN: tuple[str, ...] = (
     "walk", "brisk_walk", "run", "jump", "jumping_jack", "squat", "arm_raise", "arm_circle", "torso_twist",
@@ -33,6 +33,7 @@ def make_motion(name: str) -> Motion:
     """
     if name not in LIBRARY:
         raise MotionError(f"unknown motion '{name}'; the library has: {', '.join(LIBRARY)}")
-    from snug.motion.clips import build
+    from snug.motion.clips.make_clip import FPS, make_clip
 
-    return build(name)
+    clip = make_clip(name)
+    return spread_arms(Motion(name, clip.poses, clip.translations, FPS, clip.kind, clip.source))

@@ -151,7 +151,7 @@ def place(motion: Motion) -> Motion:
     The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second
     percentile of the lower foot's height over all frames is taken for the floor.
     """
-    placed = turned(motion, -heading(motion.poses[0]))
+    placed = turn_about_vertical(motion, -heading(motion.poses[0]))
     poses, translations = placed.poses, placed.translations
     lowest = sole_points(poses, translations)[..., 1].min(axis=1)
     translations[:, 1] -= np.percentile(lowest, 2.0)
@@ -165,7 +165,7 @@ def heading(pose: np.ndarray) -> float:
     return float(np.arctan2(facing[0], facing[2])) if np.hypot(facing[0], facing[2]) > 0.1 else 0.0
 
 
-def turned(motion: Motion, angle: float) -> Motion:
+def turn_about_vertical(motion: Motion, angle: float) -> Motion:
     """The whole motion turned by that angle [rad] about the vertical, beginning above the origin."""
     turn = rotation_matrices(np.array([0.0, angle, 0.0]))
     poses = motion.poses.copy()
@@ -174,7 +174,7 @@ def turned(motion: Motion, angle: float) -> Motion:
     return replace(motion, poses=poses, translations=translations)
 
 
-def mirrored(motion: Motion) -> Motion:
+def mirror_motion(motion: Motion) -> Motion:
     """The motion as a mirror in the plane x = 0 shows it: sides change, turns about y and z change sign."""
     twin = [JOINT[_other_side(name)] for name in JOINT]
     return Motion(

@@ -10,7 +10,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class MotionFileOptions:
     """What a motion's file does not say itself, and what becomes of its glitches.
 
     up: its vertical axis, "y" or "z"; empty: found from the motion. fps: frames per second of a file that
@@ -38,14 +38,14 @@ def add_motion_options(add: Callable[..., Any]) -> None:
         "faster than 3600 degrees/s, a root faster than 10 m/s (default: refuse the file)")  # fmt: skip
 
 
-def reading_of(options: argparse.Namespace) -> Reading:
-    """The words of a command as a Reading. Raises ValueError for words without a file to read."""
+def parse_motion_options(options: argparse.Namespace) -> MotionFileOptions:
+    """The words of a command as a MotionFileOptions. Raises ValueError for words without a file to read."""
     joint_map = Path(options.joint_map) if options.joint_map else None
     if joint_map and not joint_map.is_file():
         raise ValueError(f"--joint-map {joint_map}: no such file")
-    reading = Reading(
+    reading = MotionFileOptions(
         up=options.motion_up, fps=options.motion_fps, joint_map=joint_map, repair=options.repair
     )
-    if reading != Reading() and not options.motions:
+    if reading != MotionFileOptions() and not options.motions:
         raise ValueError("--motion-up, --motion-fps, --joint-map, --repair: say of which files by --motions")
     return reading

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.body.skinning import unposed
+from snug.body.skinning import unskin
 from snug.body.smpl_files import SHAPES
 from snug.networks.regressor import Regressor
 from snug.training.vertex_targets import CM2_PER_M2, VertexTargets
@@ -173,7 +173,7 @@ class BandTargets(VertexTargets):
     def __init__(self, dressed: Any, *arguments: Any) -> None:
         super().__init__(dressed, *arguments)
         assert isinstance(self.vertices, Tensor)
-        offsets = unposed(self.vertices, self.weights, self.transforms) - dressed.rest()
+        offsets = unskin(self.vertices, self.weights, self.transforms) - dressed.rest()
         low = smoothed(offsets.numpy(), np.asarray(dressed.garment.faces))
         self.low = torch.as_tensor(low, dtype=torch.float32)
         self.high = offsets - self.low

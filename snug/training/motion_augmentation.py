@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from snug.body.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
-from snug.motion.motion import Motion, arm_clearance, mirrored
+from snug.motion.motion import Motion, arm_clearance, mirror_motion
 from snug.recipes.recipe import DEFAULT, Recipe
 
 PARTS: tuple[tuple[str, ...], ...] = (
@@ -117,7 +117,7 @@ def _mixed(
     for number, part in enumerate(PARTS):
         source = motions[int(random.integers(len(motions)))]
         if random.random() < 0.5:
-            source = mirrored(source)
+            source = mirror_motion(source)
         start = random.integers(max(1, source.frames - FRAMES + 1))
         # A clip that is too short rests at its end.
         taken = np.minimum(np.arange(start, start + FRAMES), source.frames - 1)

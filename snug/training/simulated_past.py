@@ -27,7 +27,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.body.skinning import unposed
+from snug.body.skinning import unskin
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.training.training_set import Batch, TrainingSet
 from snug.training.vertex_targets import Targets, all_relative, matched_targets
@@ -68,7 +68,7 @@ class SimulatedPast:
     def pretrain(self, network: MotionPerceptron, weights: Tensor, *, steps: int, seed: int) -> None:
         """Fit the network to the simulated offsets by so many updates. weights (V, J): of the skinning."""
         data, count = self.data, len(self.frames)
-        offsets = (unposed(self.frames, weights, data.transforms[:count]) - data.rest).flatten(1)
+        offsets = (unskin(self.frames, weights, data.transforms[:count]) - data.rest).flatten(1)
         offsets /= network.output_scale
         mean, most = offsets.mean(0), min(COMPONENTS, *offsets.shape)
         with torch.random.fork_rng(devices=[]):

@@ -16,7 +16,7 @@ import numpy as np
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
 from snug.motion.clips.posture import SPINE_SHARES
-from snug.motion.motion import Motion, heading, mirrored, resample, transition, turned
+from snug.motion.motion import Motion, heading, mirror_motion, resample, transition, turn_about_vertical
 
 GIVEN = 0.5  # share of the clips that are pieces of given motions
 SPEEDS = (0.6, 1.5)
@@ -38,7 +38,7 @@ def swinging_motion(clips: Sequence[Motion], name: str, *, seed: int, given: Seq
         after = _swinging(_or_piece(clip, given, random), random)
         height = after.translations[0] * VERTICAL
         # Each goes on the way the last one faced: to turn about on the spot in half a second is no motion.
-        after = turned(after, heading(joined.poses[-1]) - heading(after.poses[0]))
+        after = turn_about_vertical(after, heading(joined.poses[-1]) - heading(after.poses[0]))
         way = transition(joined.poses[-1], after.poses[0], BETWEEN + 1)[1:-1]
         # Horizontally it goes on where it was; it rises and falls with the timing of the joints.
         goal = joined.translations[-1] * [1.0, 0.0, 1.0] + height
@@ -61,7 +61,7 @@ def _or_piece(clip: Motion, given: Sequence[Motion], random: np.random.Generator
         return clip
     source = given[int(random.integers(len(given)))]
     if random.random() < 0.5:
-        source = mirrored(source)
+        source = mirror_motion(source)
     start = int(random.integers(max(1, source.frames - clip.frames + 1)))
     return source.cut(start, start + clip.frames)
 

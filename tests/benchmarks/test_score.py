@@ -30,7 +30,7 @@ from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from snug.motion.files import read_motion
-from snug.motion.options import Reading
+from snug.motion.options import MotionFileOptions
 from snug.networks.dressed_body import DressedBody
 from tests.benchmarks.runner.tasks_by_hand import InProcess, assets_of, dressed_scene, small_scene
 from tests.snug.training.dressing import swaying, tube_dress
@@ -284,7 +284,7 @@ def test_the_motion_as_amass_has_it_is_the_same_motion(home):
     y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     turned = skinned_elsewhere(folder, "motion_amass.npz", y_up)
     assert np.abs(turned - skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))).max() < 1e-12
-    read = read_motion(folder / "motion_amass.npz", Reading())
+    read = read_motion(folder / "motion_amass.npz", MotionFileOptions())
     assert np.abs(read.poses[:, :20] - swaying(12).poses[:, :20]).max() < 1e-12 and read.fps == 30.0
 
 

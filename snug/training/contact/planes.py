@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from reference_sim.energies import ContactPenalty
-from snug.body.skinning import corrected, skin
+from snug.body.skinning import add_pose_correctives, skin
 from snug.training.contact.cache import ContactCache, Patch
 from snug.training.contact.cache_torch import TensorContactCache
 from snug.training.loss import Planes
@@ -84,7 +84,7 @@ class TrainingContact:
         if self.correctives is not None:
             parents = self.data.dressed.parents
             directions = self.correctives[::every].to(rest.device)
-            rest = corrected(rest, directions, transforms, parents)
+            rest = add_pose_correctives(rest, directions, transforms, parents)
         return skin(rest, self.weights[::every].to(rest.device), transforms)
 
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:

@@ -289,14 +289,14 @@ def test_pose_correctives_are_what_smpl_says(small, layouts, tmp_path):
 def test_training_poses_the_body_with_its_correctives(small, tmp_path):
     import torch
 
-    from snug.body.skinning import corrected, skin
+    from snug.body.skinning import add_pose_correctives, skin
 
     posedirs = 0.003 * np.random.default_rng(0).normal(size=(len(small.template), 3, 189))
     user = dataclasses.replace(small, pose_directions=posedirs)
     poses = np.random.default_rng(1).normal(scale=0.5, size=(2, 24, 3))
     transforms = torch.as_tensor(user.transforms(poses, np.zeros((2, 3))))
     rest, weights = (torch.as_tensor(a) for a in (user.template, user.skinning_weights))
-    rest = corrected(rest, torch.as_tensor(posedirs), transforms, user.parents.tolist())
+    rest = add_pose_correctives(rest, torch.as_tensor(posedirs), transforms, user.parents.tolist())
     posed = skin(rest, weights, transforms).numpy()
     np.testing.assert_allclose(posed, user.vertices(poses, np.zeros((2, 3))), atol=1e-12)
 

@@ -22,9 +22,9 @@ from reference_sim.material import Material
 from snug import check
 from snug import train as train_command
 from snug.body.parametric_body import Body
-from snug.garments.fit import file_pose
+from snug.garments.fit import pose_in_file
 from snug.garments.garment import GarmentError
-from snug.garments.options import GarmentFile, add_garment_options, demand_a_file, garment_file
+from snug.garments.options import GarmentFile, add_garment_options, demand_garment_file, make_garment_file
 from snug.garments.reading import read_garment
 from snug.garments.templates import tailor_skirt, tailor_tshirt
 from snug.motion.motion import Motion
@@ -148,7 +148,7 @@ def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
 def test_a_garment_made_for_lowered_arms_is_brought_to_the_t_pose_with_its_rest_shape(tmp_path, body, shirt):
     filed = lowered(body, 40.0)
     read_body = read_again(plain_arrays(filed))
-    pose = file_pose(read_body)[None]
+    pose = pose_in_file(read_body)[None]
     hanging = Motion("file", np.repeat(pose, 2, axis=0), np.zeros((2, 3)), fps=30.0)
     made = DressedBody(read_body, shirt).skinned(hanging, smoothing=20)[0]
     read = read_garment(GarmentFile(path=saved(tmp_path, shirt, positions=made)), read_body)
@@ -251,9 +251,9 @@ def test_an_option_that_means_nothing_is_refused(words, expected):
     parser = argparse.ArgumentParser()
     add_garment_options(parser)
     with pytest.raises(ValueError, match=expected):
-        garment_file("a.obj", parser.parse_args(words))
+        make_garment_file("a.obj", parser.parse_args(words))
     with pytest.raises(ValueError, match="add --garment FILE"):
-        demand_a_file(parser.parse_args(words))
+        demand_garment_file(parser.parse_args(words))
 
 
 # --- the command that says all of it -----------------------------------------------------------------------

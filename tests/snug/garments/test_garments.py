@@ -10,7 +10,7 @@ import pytest
 from snug.body.parametric_body import Body
 from snug.garments.cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
 from snug.garments.garment import GarmentError, smooth_weights
-from snug.garments.openings import named_openings
+from snug.garments.openings import name_openings
 from snug.garments.templates import GARMENT_TEMPLATES, find_template, tailor_tshirt, tailor_tunic
 from tests.reference_sim.meshes import edge_counts, girth
 from tests.snug.body.other_bodies import BODIES, other_mesh, simulate_walk
@@ -52,7 +52,7 @@ def face_normals(points, faces):
 
 
 def test_openings_are_named_by_their_place(body, garment):
-    found = named_openings(body, garment.rest_positions, garment.faces)
+    found = name_openings(body, garment.rest_positions, garment.faces)
     assert found.keys() == garment.loops.keys()
     for name, loop in garment.loops.items():
         np.testing.assert_array_equal(found[name], loop)

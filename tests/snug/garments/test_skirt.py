@@ -81,11 +81,11 @@ def test_the_body_carries_the_waistband_close_and_nothing_of_a_shirt(body, skirt
     motion = make_motion("turning_stop")
     frames = slice(20, 60, 10)
     poses, translations = motion.poses[frames], motion.translations[frames]
-    transported, skins = skirt.body_transported(body, poses, translations), body.vertices(poses, translations)
+    transported, skins = skirt.pin_positions(body, poses, translations), body.vertices(poses, translations)
     assert transported.shape == (4, len(skirt.pins), 3)
     for band, skin in zip(transported, skins, strict=True):
         assert np.abs(igl.signed_distance(band, skin, body.faces)[0]).max() < 0.02
-    still = skirt.body_transported(body, np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
+    still = skirt.pin_positions(body, np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
     assert still == pytest.approx(skirt.rest_positions[skirt.pins], abs=1e-12)
     assert len(tailor_tshirt(body, vertices=300).pins) == 0
 

@@ -8,7 +8,7 @@ from snug.motion.acclaim import read_amc, read_asf
 from snug.motion.acclaim_to_smpl import local_turns, world_turns
 from snug.motion.files import load_motions, read_motion
 from snug.motion.motion import MotionError
-from snug.motion.options import Reading
+from snug.motion.options import MotionFileOptions
 from tests.snug.motion.cmu_clips import CHAIN, METRES, amc_frame, cmu_like, write_clip
 
 
@@ -49,13 +49,13 @@ class TestParser:
 
     def test_radians_and_degrees_agree(self, tmp_path):
         frames = [amc_frame(1, lfemur=(-40, 10, 5), root=(0, 17, 0, 10, 20, 30))]
-        degrees = read_motion(write_clip(tmp_path, frames), Reading())
+        degrees = read_motion(write_clip(tmp_path, frames), MotionFileOptions())
         turned = [
             amc_frame(1, lfemur=tuple(np.radians([-40, 10, 5])), root=(0, 17, 0, *np.radians([10, 20, 30])))
         ]
         clip = write_clip(tmp_path, turned, name="08_01", skeleton=cmu_like(radians=True))
         clip.write_text(clip.read_text().replace(":DEGREES", ":RADIANS"))
-        np.testing.assert_allclose(read_motion(clip, Reading()).poses, degrees.poses, atol=1e-12)
+        np.testing.assert_allclose(read_motion(clip, MotionFileOptions()).poses, degrees.poses, atol=1e-12)
 
 
 GOOD = [amc_frame(1), amc_frame(2)]

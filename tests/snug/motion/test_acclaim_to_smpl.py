@@ -20,7 +20,7 @@ from snug.motion.acclaim import read_amc, read_asf
 from snug.motion.acclaim_to_smpl import CMU_RATE, JOINT_BONES, LIMBS, read_asf_amc
 from snug.motion.files import load_motions, read_motion
 from snug.motion.motion import MotionError
-from snug.motion.options import Reading
+from snug.motion.options import MotionFileOptions
 from tests.snug.motion.cmu_clips import amc_frame, write_clip
 
 CLIPS = Path(os.environ.get("CMU_MOTIONS", Path(__file__).parents[4] / "shared/data/cmu"))
@@ -33,7 +33,7 @@ class TestRetargeting:
         return arm / np.linalg.norm(arm)
 
     def test_the_zero_pose_has_the_files_limb_directions(self, tmp_path):
-        motion = read_asf_amc(write_clip(tmp_path, [amc_frame(1)]), Reading())
+        motion = read_asf_amc(write_clip(tmp_path, [amc_frame(1)]), MotionFileOptions())
         s, c = np.sin(np.radians(20)), np.cos(np.radians(20))
         expected = {
             "left_hip": (s, -c, 0),
@@ -56,7 +56,7 @@ class TestRetargeting:
             amc_frame(1, lfemur=(-90, 0, 0), rtibia=(60,), lradius=(90,)),
             amc_frame(2, lfemur=(0, 0, -20), rradius=(90,), lhumerus=(0, 0, 70)),
         ]
-        motion = read_asf_amc(write_clip(tmp_path, frames), Reading())
+        motion = read_asf_amc(write_clip(tmp_path, frames), MotionFileOptions())
         assert self.limb(motion, "left_hip")[2] == pytest.approx(1.0, abs=0.01)
         assert self.limb(motion, "right_knee")[2] < -0.8  # the shin goes back
         assert self.limb(motion, "left_elbow")[2] > 0.8  # the forearm comes forward
@@ -68,13 +68,13 @@ class TestRetargeting:
 
     def test_root_path_is_scaled_to_our_legs(self, tmp_path):
         frames = [amc_frame(1), amc_frame(2, root=(0, 0, 10, 0, 0, 0))]
-        motion = read_asf_amc(write_clip(tmp_path, frames), Reading())
+        motion = read_asf_amc(write_clip(tmp_path, frames), MotionFileOptions())
         step = motion.translations[1] - motion.translations[0]
         np.testing.assert_allclose(step, [0, 0, 10 * LEG_LENGTH / 14.4], atol=1e-12)
         assert motion.fps == CMU_RATE
 
     def test_hands_are_damped(self, tmp_path):
-        motion = read_motion(write_clip(tmp_path, [amc_frame(1, lhand=(50,))]), Reading())
+        motion = read_motion(write_clip(tmp_path, [amc_frame(1, lhand=(50,))]), MotionFileOptions())
         assert np.linalg.norm(motion.poses[0, JOINT["left_wrist"]]) == pytest.approx(np.radians(5))
 
 
@@ -83,8 +83,8 @@ def test_a_spike_of_a_bone_is_bridged_and_named(tmp_path):
     angles[30] = 150
     clip = write_clip(tmp_path, [amc_frame(k + 1, rradius=(a,)) for k, a in enumerate(angles)])
     with pytest.raises(MotionError, match="right_elbow jumps in frames 28-32; give --repair"):
-        read_motion(clip, Reading())
-    motion = read_motion(clip, Reading(repair=True))
+        read_motion(clip, MotionFileOptions())
+    motion = read_motion(clip, MotionFileOptions(repair=True))
     assert "repaired: right_elbow jumps in frames 28-32" in motion.source
     turned = np.linalg.norm(motion.poses[:, JOINT["right_elbow"]], axis=1)
     np.testing.assert_allclose(np.degrees(turned), np.linspace(0, 30, 61), atol=1e-6)
@@ -97,7 +97,9 @@ class TestRecordedClips:
         chosen = [p for p in CLIPS.iterdir() if p.suffix == ".asf" or p.stat().st_size < largest]
         for path in chosen:
             (tmp_path / path.name).symlink_to(path.resolve())
-        motions = {motion.name: motion for motion in load_motions(tmp_path, reading=Reading(repair=True))}
+        motions = {
+            motion.name: motion for motion in load_motions(tmp_path, options=MotionFileOptions(repair=True))
+        }
         assert len(motions) == sum(path.suffix == ".amc" for path in chosen)
         for motion in motions.values():
             assert motion.fps == 30.0
@@ -129,7 +131,7 @@ class TestRecordedClips:
             turned[bone.name] = (
                 (turned[bone.parent] if bone.parent else Rotation.identity()) * own * turn * own.inv()
             )
-        motion = read_motion(CLIPS / f"{name}.amc", Reading(repair=True))
+        motion = read_motion(CLIPS / f"{name}.amc", MotionFileOptions(repair=True))
         positions = joint_positions(motion.poses, motion.translations, Body.load().joints())
         for near, far in LIMBS.items():
             limb = positions[:, JOINT[far]] - positions[:, JOINT[near]]

@@ -12,7 +12,7 @@ from snug.motion.files import read_motion
 from snug.motion.joint_names import NEEDED, _side, find_joints
 from snug.motion.library import make_motion
 from snug.motion.motion import MotionError
-from snug.motion.options import Reading
+from snug.motion.options import MotionFileOptions
 from tests.snug.motion.motion_forms import MIXAMO, bvh
 
 WALK = make_motion("walk").cut(20, 40)
@@ -148,11 +148,13 @@ def test_a_map_names_joints_that_no_guess_finds(tmp_path):
     with pytest.raises(
         MotionError, match=r"odd\.bvh: no joint is known as 'left_hip'; name it by --joint-map"
     ):
-        read_motion(path, Reading())
+        read_motion(path, MotionFileOptions())
     table = tmp_path / "map.toml"
     table.write_text("\n".join(f'{ours} = "{theirs}"' for ours, theirs in odd.items()))
-    mapped = read_motion(path, Reading(joint_map=table))
-    np.testing.assert_array_equal(mapped.poses, read_motion(written(tmp_path / "b.bvh"), Reading()).poses)
+    mapped = read_motion(path, MotionFileOptions(joint_map=table))
+    np.testing.assert_array_equal(
+        mapped.poses, read_motion(written(tmp_path / "b.bvh"), MotionFileOptions()).poses
+    )
     for text, words in (
         ('left_hip = "bone99"', "no joint 'bone99' for left_hip; did you mean bone9"),
         ('left_tail = "bone1"', "'left_tail' is none of our joints"),
@@ -161,9 +163,9 @@ def test_a_map_names_joints_that_no_guess_finds(tmp_path):
     ):
         table.write_text(text)
         with pytest.raises(MotionError, match=words):
-            read_motion(path, Reading(joint_map=table))
+            read_motion(path, MotionFileOptions(joint_map=table))
     with pytest.raises(MotionError, match=r"none\.toml: cannot be read"):
-        read_motion(path, Reading(joint_map=tmp_path / "none.toml"))
+        read_motion(path, MotionFileOptions(joint_map=tmp_path / "none.toml"))
 
 
 def test_limbs_of_another_skeleton_point_where_its_own_do(tmp_path):
@@ -180,7 +182,7 @@ def test_limbs_of_another_skeleton_point_where_its_own_do(tmp_path):
     zero, world = np.zeros((2, 24, 3)), Rotation.from_euler("zx", [0, 90], degrees=True)
     heading = Rotation.from_euler("z", 60, degrees=True) * world
     text = bvh(zero, np.zeros((2, 3)), 60.0, rest=heading.apply(rest))
-    motion = read_motion(written(tmp_path / "a.bvh", text), Reading())
+    motion = read_motion(written(tmp_path / "a.bvh", text), MotionFileOptions())
     back = Rotation.from_matrix(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])) * heading
     limbs = ("left_shoulder left_elbow", "right_elbow right_wrist", "left_hip left_knee")
     for near, far in map(str.split, limbs):
@@ -194,7 +196,7 @@ def test_limbs_of_another_skeleton_point_where_its_own_do(tmp_path):
 
 def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
     lengths = written(tmp_path / "a.bvh", bvh(WALK.poses, 2 * WALK.translations, 30.0, rest=2 * REST_JOINTS))
-    large = read_motion(lengths, Reading())
+    large = read_motion(lengths, MotionFileOptions())
     travelled = large.translations - large.translations[0]
     np.testing.assert_allclose(travelled, WALK.translations - WALK.translations[0], atol=1e-6)
 
@@ -226,7 +228,7 @@ def test_a_broken_file_is_refused_by_name(tmp_path, change, words):
     path = written(tmp_path / "clip.bvh")
     path.write_text(change(path.read_text()))
     with pytest.raises(MotionError, match=words) as caught:
-        read_motion(path, Reading())
+        read_motion(path, MotionFileOptions())
     assert "clip.bvh" in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -236,7 +238,7 @@ def test_a_zero_pose_that_does_not_stand_is_refused(tmp_path):
         arms_up[JOINT[name]] = REST_JOINTS[JOINT["left_shoulder"]] - [
             REST_JOINTS[JOINT[name], 0] - REST_JOINTS[JOINT["left_shoulder"], 0], 0, 0]  # fmt: skip
     with pytest.raises(MotionError, match=r"no T or A pose: left_shoulder is turned by 180 degrees"):
-        read_motion(written(tmp_path / "a.bvh", rest=arms_up), Reading())
+        read_motion(written(tmp_path / "a.bvh", rest=arms_up), MotionFileOptions())
     flat = np.zeros((24, 3))
     with pytest.raises(MotionError, match="legs or hips of its zero pose have no length"):
-        read_motion(written(tmp_path / "a.bvh", rest=flat), Reading())
+        read_motion(written(tmp_path / "a.bvh", rest=flat), MotionFileOptions())

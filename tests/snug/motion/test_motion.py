@@ -38,7 +38,7 @@ from snug.motion.motion import (
     resample,
     spread_arms,
     transition,
-    turned,
+    turn_about_vertical,
 )
 
 ACTING = TRAIN + VALIDATION + TEST
@@ -233,7 +233,7 @@ def test_unknown_names_list_the_known_ones():
 
 
 def test_names_list_equals_the_tables():
-    from snug.motion.clips import ACTIONS, GAITS, STOPS
+    from snug.motion.clips.make_clip import ACTIONS, GAITS, STOPS
 
     assert set(ACTING) == set(ACTIONS) | set(GAITS)
     assert set(STOPS) == set(STOPPING)
@@ -304,9 +304,11 @@ def test_spread_arms_lifts_both_upper_arms_by_the_angle():
 
 def test_a_turned_motion_faces_that_much_further_round_and_keeps_its_shape():
     motion = make_motion("walk")
-    around = turned(motion, 2.0)
+    around = turn_about_vertical(motion, 2.0)
     assert heading(around.poses[5]) == pytest.approx(heading(motion.poses[5]) + 2.0)
-    assert heading(turned(around, 2.0).poses[0]) == pytest.approx(heading(motion.poses[0]) + 4.0 - 2 * np.pi)
+    assert heading(turn_about_vertical(around, 2.0).poses[0]) == pytest.approx(
+        heading(motion.poses[0]) + 4.0 - 2 * np.pi
+    )
     np.testing.assert_array_equal(around.poses[:, 1:], motion.poses[:, 1:])
     np.testing.assert_array_equal(around.translations[0], 0.0)
     path = motion.translations - motion.translations[0]

@@ -11,7 +11,7 @@ from snug.body.skeleton import JOINT
 from snug.motion.files import HAND_DAMPING, HANDS, load_motions, read_motion
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion, MotionError, place, transition
-from snug.motion.options import Reading
+from snug.motion.options import MotionFileOptions
 from tests.snug.motion.cmu_clips import amc_frame, write_clip
 from tests.snug.motion.motion_forms import TO_Z_UP, Y_UP, of_root, write_forms
 
@@ -28,7 +28,7 @@ def write(path, motion, turn=Y_UP, **changes):
 def refused(path, words, **reading):
     """Whether reading the file is refused in one line that names it and holds a match of the words."""
     with pytest.raises(MotionError) as caught:
-        load_motions(path, reading=Reading(**reading))
+        load_motions(path, options=MotionFileOptions(**reading))
     said = str(caught.value)
     assert re.search(words, said), said
     return path.name in said and "\n" not in said and len(said) < 500
@@ -59,13 +59,13 @@ class TestForms:
         poses = np.zeros((3, joints, 3))
         poses[:, 20:, 2] = 0.5
         path = write(tmp_path / "clip.npz", replace(KICK.cut(0, 3), poses=np.zeros((3, 24, 3))), poses=poses)
-        motion = read_motion(path, Reading())
+        motion = read_motion(path, MotionFileOptions())
         np.testing.assert_allclose(motion.poses[:, [20, 21, 22, 23], 2], [[0.05, 0.05, hand, hand]] * 3)
 
     def test_a_file_of_poses_alone_needs_a_rate_and_stays_in_place(self, tmp_path):
         np.save(tmp_path / "poses.npy", KICK.poses.reshape(-1, 72))
         assert refused(tmp_path / "poses.npy", "no frame rate; give --motion-fps N")
-        motion = read_motion(tmp_path / "poses.npy", Reading(fps=30.0))
+        motion = read_motion(tmp_path / "poses.npy", MotionFileOptions(fps=30.0))
         assert (motion.translations == 0).all() and "the root stays" in motion.source
 
     @pytest.mark.parametrize(
@@ -138,8 +138,8 @@ class TestForms:
 
     def test_a_rate_is_said_once(self, tmp_path):
         assert refused(write(tmp_path / "clip.npz", KICK), "states 30 .* says 60", fps=60.0)
-        assert read_motion(write(tmp_path / "clip.npz", KICK), Reading(fps=30.0)).fps == 30.0
-        assert read_motion(write_clip(tmp_path, [amc_frame(1)]), Reading(fps=60.0)).fps == 60.0
+        assert read_motion(write(tmp_path / "clip.npz", KICK), MotionFileOptions(fps=30.0)).fps == 30.0
+        assert read_motion(write_clip(tmp_path, [amc_frame(1)]), MotionFileOptions(fps=60.0)).fps == 60.0
 
 
 class TestUpAxis:
@@ -172,7 +172,7 @@ class TestUpAxis:
         assert refused(write(tmp_path / "z.npz", walk, TO_Z_UP), "with y up .* --motion-up z", up="y")
         for up in ("y", "z"):
             path = write(tmp_path / "clip.npz", walk, TO_Z_UP if up == "z" else Y_UP)
-            assert f"{up} up as given" in read_motion(path, Reading(up=up)).source
+            assert f"{up} up as given" in read_motion(path, MotionFileOptions(up=up)).source
         camera, side = np.diag([1.0, -1.0, -1.0]), np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
         assert refused(write(tmp_path / "camera.npz", walk, camera), "neither along y nor along z: along -y")
         assert refused(write(tmp_path / "side.npz", walk, side), "neither along y nor along z: along x")
@@ -187,7 +187,9 @@ class TestUpAxis:
         path = np.zeros((len(poses), 3))
         path[:30], path[30:] = standing.translations, standing.translations[-1]
         path[30:, 1] -= np.minimum(np.arange(26) / 12, 1.0) * 0.75
-        motion = read_motion(write(tmp_path / "fall.npz", Motion("fall", poses, path), turn), Reading())
+        motion = read_motion(
+            write(tmp_path / "fall.npz", Motion("fall", poses, path), turn), MotionFileOptions()
+        )
         assert re.search(r"as the body stands in [67]\d % of the frames", motion.source)
         np.testing.assert_allclose(
             place(motion).translations, place(Motion("", poses, path)).translations, atol=1e-9
@@ -212,9 +214,11 @@ class TestGlitches:
     def test_a_joint_that_jumps_is_named_or_mended(self, tmp_path):
         path = write(tmp_path / "clip.npz", self.spoiled())
         assert refused(path, "right_elbow jumps in frames 18-22; give --repair")
-        motion = read_motion(path, Reading(repair=True))
+        motion = read_motion(path, MotionFileOptions(repair=True))
         assert "repaired: right_elbow jumps in frames 18-22" in motion.source
-        error = angles(motion.poses, read_motion(write(tmp_path / "whole.npz", KICK), Reading()).poses)
+        error = angles(
+            motion.poses, read_motion(write(tmp_path / "whole.npz", KICK), MotionFileOptions()).poses
+        )
         assert 0 < error.max() < 0.2  # the shortest arc over six frames of a kick
 
     @pytest.mark.parametrize("form", ["poses", "rotations", "quaternions"])
@@ -230,7 +234,7 @@ class TestGlitches:
         np.savez(tmp_path / "clip.npz", trans=trans, fps=30.0, **{form: array})
         named = "left_knee is not finite in frames 5-6, the root's path is not finite in frames 39-39"
         assert refused(tmp_path / "clip.npz", f"{named}; give --repair")
-        motion = read_motion(tmp_path / "clip.npz", Reading(repair=True))
+        motion = read_motion(tmp_path / "clip.npz", MotionFileOptions(repair=True))
         assert f"repaired: {named}" in motion.source
         np.testing.assert_array_equal(motion.translations[-1], KICK.translations[-2])
         middle = Rotation.from_rotvec(motion.poses[4:8, JOINT["left_knee"]])
@@ -244,15 +248,15 @@ class TestGlitches:
         poses[at, JOINT["neck"]] = [0.0, 2.6, 0.0]
         path = write(tmp_path / "clip.npz", replace(KICK, poses=poses))
         assert refused(path, "neck jumps in frames")
-        whole = read_motion(write(tmp_path / "whole.npz", still), Reading())
-        assert angles(read_motion(path, Reading(repair=True)).poses, whole.poses).max() < 1e-7
+        whole = read_motion(write(tmp_path / "whole.npz", still), MotionFileOptions())
+        assert angles(read_motion(path, MotionFileOptions(repair=True)).poses, whole.poses).max() < 1e-7
 
     def test_a_root_that_jumps_and_comes_back_is_mended_and_one_that_stays_is_not(self, tmp_path):
         trans = KICK.translations.copy()
         trans[11] += [1.0, 0.0, 0.0]
         path = write(tmp_path / "clip.npz", replace(KICK, translations=trans))
         assert refused(path, "the root's path jumps in frames 9-13")
-        mended = read_motion(path, Reading(repair=True)).translations
+        mended = read_motion(path, MotionFileOptions(repair=True)).translations
         assert np.abs(mended - KICK.translations).max() < 0.05
         trans[11:] += [9.0, 0.0, 0.0]
         path = write(tmp_path / "clip.npz", replace(KICK, translations=trans))

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from reference_sim.energies.energy import Energy
-from snug.body.skinning import skin, unposed
+from snug.body.skinning import skin, unskin
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.tailornet import DROPOUT, FrequencyMixture, smoothed
@@ -138,7 +138,7 @@ def test_unposing_is_the_inverse_of_skinning():
     dressed, motion = tube_dress(), swaying(6)
     weights, transforms = dressed.weights(20), dressed.transforms(motion.poses)
     posed = skin(dressed.rest(), weights, transforms)
-    assert (unposed(posed, weights, transforms) - dressed.rest()).abs().max() < 1e-6
+    assert (unskin(posed, weights, transforms) - dressed.rest()).abs().max() < 1e-6
 
 
 def test_the_springs_of_pbns_by_hand():

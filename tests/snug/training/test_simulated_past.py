@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
-from snug.motion.motion import Motion, joint_speeds, turned
+from snug.motion.motion import Motion, joint_speeds, turn_about_vertical
 from snug.networks.inputs import HISTORY, RATED, motion_history, motion_rates
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
@@ -165,7 +165,7 @@ def test_swinging_motions_turn_stop_and_go_on_without_a_jump():
 
 def test_no_body_turns_about_between_two_swinging_clips():
     still = Motion("still", np.zeros((60, 24, 3)), np.zeros((60, 3)))
-    clips = [turned(still, angle) for angle in (0.0, np.pi, 0.5, -2.5, 1.5)]
+    clips = [turn_about_vertical(still, angle) for angle in (0.0, np.pi, 0.5, -2.5, 1.5)]
     pelvis = motion_rates(swinging_motion(clips, "swing", seed=1))[:, 7]  # [rad/s] about y
     assert np.abs(pelvis).max() < 1.01 * np.deg2rad(2 * np.pi * FASTEST)
 

@@ -12,7 +12,7 @@ from reference_sim.energies import StretchStVK
 from snug.body.skeleton import JOINT, joint_positions
 from snug.body.skinning import skin
 from snug.motion.library import TRAIN, make_motion
-from snug.motion.motion import Motion, arm_clearance, mirrored
+from snug.motion.motion import Motion, arm_clearance, mirror_motion
 from snug.networks import trained_model
 from snug.networks.roll_out import roll_out
 from snug.networks.tensor_file import read_tensors
@@ -285,12 +285,12 @@ def test_untrained_is_not_skinning_alone():
 
 def test_mirror_swaps_the_sides():
     motion = make_motion("kick")
-    mirror = mirrored(motion)
+    mirror = mirror_motion(motion)
     plain = joint_positions(motion.poses, motion.translations)
     other = joint_positions(mirror.poses, mirror.translations)
     assert np.abs(other[:, 1] - plain[:, 2] * [-1, 1, 1]).max() < 1e-9  # left hip, right hip
     assert np.abs(other[:, 20] - plain[:, 21] * [-1, 1, 1]).max() < 1e-9  # wrists
-    assert np.abs(mirrored(mirror).poses - motion.poses).max() == 0
+    assert np.abs(mirror_motion(mirror).poses - motion.poses).max() == 0
 
 
 def test_mixed_motions_are_continuous_and_repeat():

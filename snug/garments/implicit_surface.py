@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from snug.body.parametric_body import Body
+from snug.garments.landmarks import ARM_BONES, CROTCH_BONES, LEG_BONES, TORSO_BONES, joint_position, skin_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -34,23 +35,6 @@ ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each oth
 CROTCH_FILLET = 0.03  # [m] the same between torso and leg
 TAPER = 0.4  # how steeply trousers may narrow from the seat to the thighs
 MOST_CELLS = 4e6  # of the grid: a person takes a tenth
-TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
-# What a shirt may borrow weights from: never hands, head or shins, even where they come near.
-SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
-ARM_BONES = ("left_shoulder", "left_elbow")
-LEG_BONES = ("left_hip", "left_knee")
-CROTCH_BONES = ("pelvis", "left_hip", "right_hip")
-
-
-def dominated_by(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
-    """Which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
-    wanted = [body.joint_names.index(name) for name in names]
-    return np.isin(np.argmax(body.skinning_weights, axis=1), wanted)
-
-
-def joint(body: Body, name: str) -> Array:
-    """Rest position (3,) [m] of the joint called `name`."""
-    return np.asarray(body.joint_template, dtype=np.float64)[body.joint_names.index(name)]
 
 
 @dataclass(frozen=True)
@@ -151,7 +135,7 @@ def _torso(
     growth += flare * np.clip((waist - y) / (waist - hem), 0.0, None)  # a cone: its sides are straight
     plane = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     field = _tube(support, growth, plane, normals).reshape(len(y), len(x), len(z)).transpose(1, 0, 2)
-    return np.maximum(field, (y - joint(body, "left_shoulder")[1])[None, :, None])
+    return np.maximum(field, (y - joint_position(body, "left_shoulder")[1])[None, :, None])
 
 
 def _sleeve(
@@ -160,7 +144,7 @@ def _sleeve(
 ) -> Array:  # fmt: skip
     """Field (nx,ny,nz) of the left sleeve."""
     x, y, z = nodes
-    shoulder = joint(body, "left_shoulder")[0]
+    shoulder = joint_position(body, "left_shoulder")[0]
     support = _filled(_section_support(points, edges, x, 0, normals))
     support = ndimage.gaussian_filter1d(support, 0.02 / SPACING, axis=0, mode="nearest")
     growth = clearance + ease / (2 * np.pi) * _ramp(x, shoulder, cuff)
@@ -175,7 +159,7 @@ def _leg(
 ) -> Array:  # fmt: skip
     """Field (nx,ny,nz) of the left leg of trousers."""
     x, y, z = nodes
-    hip, knee = joint(body, "left_hip")[1], joint(body, "left_knee")[1]
+    hip, knee = joint_position(body, "left_hip")[1], joint_position(body, "left_knee")[1]
     support = _filled(_section_support(points, edges, y, 1, normals))
     support = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
     # Legs that part once do not meet again above: up from the knee the inner side only comes nearer.
@@ -191,10 +175,12 @@ def legs_part(body: Body, room: float) -> float:
     """Height [m] below which trousers have two legs: `room` [m] between the left thigh's skin and x = 0."""
     points = np.asarray(body.template, dtype=np.float64)
     edges = _edges(body, LEG_BONES)
-    levels = np.arange(joint(body, "left_knee")[1], joint(body, "left_hip")[1], 0.5 * SPACING)
+    levels = np.arange(
+        joint_position(body, "left_knee")[1], joint_position(body, "left_hip")[1], 0.5 * SPACING
+    )
     inner = _filled(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
     near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
-    middle = dominated_by(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, SPACING))
+    middle = skin_of(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, SPACING))
     crotch = points[middle, 1].min(initial=levels[-1]) - room  # of legs that are apart all the way up
     return float(min(levels[near[0]], crotch) if len(near) else crotch)
 
@@ -203,7 +189,7 @@ def _edges(body: Body, bones: Sequence[str]) -> Index:
     """Edges (E,2) of the body between vertices that follow `bones`. Errors: ValueError for none."""
     faces = np.asarray(body.faces, dtype=np.int64)
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    found = edges[dominated_by(body, bones)[edges].all(axis=1)]
+    found = edges[skin_of(body, bones)[edges].all(axis=1)]
     if not len(found):
         raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")
     return found
@@ -224,9 +210,9 @@ def build_surface(
     points = np.asarray(body.template, dtype=np.float64)
     faces = np.asarray(body.faces, dtype=np.int64)
     torso_edges, arm_edges, leg_edges = (_edges(body, b) for b in (TORSO_BONES, ARM_BONES, LEG_BONES))
-    torso, arm, leg = (dominated_by(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
-    hang = top if waistband else points[dominated_by(body, ARM_BONES[:1]), 1].min()
-    levels = hang, joint(body, "pelvis" if waistband else "spine1")[1], hem
+    torso, arm, leg = (skin_of(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
+    hang = top if waistband else points[skin_of(body, ARM_BONES[:1]), 1].min()
+    levels = hang, joint_position(body, "pelvis" if waistband else "spine1")[1], hem
     margin = 0.04
     depth = points[torso | (leg if legs else arm), 2]
     reach = clearance + ease + flare + 2 * margin

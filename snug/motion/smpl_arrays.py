@@ -16,8 +16,8 @@ from reference_sim.files.array_file import ArrayFileError, array_names, read_arr
 from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
 from snug.body.skeleton import JOINT_NAMES, axis_angles
 from snug.motion.motion import MotionError
-from snug.motion.options import Reading
-from snug.motion.recording import Recording, check_length, rate
+from snug.motion.options import MotionFileOptions
+from snug.motion.raw_motion import RawMotion, check_length, rate
 
 LAYOUTS = {22: "body", 24: "SMPL", 52: "SMPL+H", 55: "SMPL-X"}  # joints, the root among them
 BODY_JOINTS = 22
@@ -35,7 +35,7 @@ PLAIN = (np.ndarray, int, float)
 UNIT = 0.02  # a quaternion's length, and a matrix's entries, may be off by as much
 
 
-def read_npz(path: Path, reading: Reading) -> Recording:
+def read_npz(path: Path, reading: MotionFileOptions) -> RawMotion:
     """An .npz with rotations, a path of the root (T, 3) [m] and a frame rate [1/s]. Raises MotionError."""
     try:
         arrays = read_arrays(path, NAMES)
@@ -47,7 +47,7 @@ def read_npz(path: Path, reading: Reading) -> Recording:
     return recording_of(path, arrays, reading)
 
 
-def read_npy(path: Path, reading: Reading) -> Recording:
+def read_npy(path: Path, reading: MotionFileOptions) -> RawMotion:
     """An .npy with rotations alone, as 'poses' of an .npz. The root stays in place. Raises MotionError."""
     try:
         poses = read_array(path)
@@ -57,7 +57,7 @@ def read_npy(path: Path, reading: Reading) -> Recording:
     return recording_of(path, {"poses": poses, "trans": in_place}, reading, "; no path: the root stays")
 
 
-def read_pkl(path: Path, reading: Reading) -> Recording:
+def read_pkl(path: Path, reading: MotionFileOptions) -> RawMotion:
     """A pickle of a dict with the arrays of an .npz. Nothing in it is executed. Raises MotionError."""
     try:
         held = read_plain_pickle(path)
@@ -72,7 +72,9 @@ def read_pkl(path: Path, reading: Reading) -> Recording:
     return recording_of(path, arrays, reading)
 
 
-def recording_of(path: Path, arrays: dict[str, np.ndarray], reading: Reading, note: str = "") -> Recording:
+def recording_of(
+    path: Path, arrays: dict[str, np.ndarray], reading: MotionFileOptions, note: str = ""
+) -> RawMotion:
     """The motion in arrays by name, as docs/bring-your-own.md lists them. Raises MotionError."""
     arrays = {name: _numbers(path, name, array) for name, array in arrays.items()}
     turns, what = _rotations(path, arrays)
@@ -90,7 +92,7 @@ def recording_of(path: Path, arrays: dict[str, np.ndarray], reading: Reading, no
     poses[:, :kept] = turns[:, :kept]
     stated = _stated_rate(path, arrays)
     source = f"{path.name} ({what}, {LAYOUTS[turns.shape[1]]} layout{note})"
-    return Recording(
+    return RawMotion(
         path=path, poses=poses, translations=translations.reshape(-1, 3), fps=rate(path, stated, reading),
         source=source,
     )  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 
 from snug.body.skeleton import JOINT_NAMES, axis_angles, rotation_matrices
 from snug.motion.motion import MotionError, slerp
-from snug.motion.recording import Recording
+from snug.motion.raw_motion import RawMotion
 
 # 30 degrees in 1/120 s: twice the fastest joint of a kick or a sprint. A swapped or lost marker does it.
 FASTEST_TURN = np.deg2rad(30.0) * 120.0  # [rad/s]
@@ -25,7 +25,7 @@ FARTHEST = 1e4  # [m]
 NAMED = 4  # joints, and glitches of each, in a message; the others are counted
 
 
-def without_glitches(recording: Recording, *, repair: bool) -> Recording:
+def without_glitches(recording: RawMotion, *, repair: bool) -> RawMotion:
     """The recording, all of its numbers finite and no jump in it; its source names what was mended.
 
     Mended: the shortest arc, or the straight line, between the good frames around a glitch; at an end of the

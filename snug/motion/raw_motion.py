@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from snug.motion.motion import MotionError
-from snug.motion.options import Reading
+from snug.motion.options import MotionFileOptions
 
 LARGEST_TEXT = 64 << 20  # [bytes] of a file of text
 MOST_FRAMES = 100_000  # 14 minutes at 120 frames per second
@@ -17,7 +17,7 @@ SLOWEST, FASTEST = 5.0, 1000.0  # [1/s] rates of frames that a recording may hav
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recording:
+class RawMotion:
     """poses: (T, 24, 3) axis-angle [rad], relative to the parent, as in snug.body.parametric_body; translations: (T, 3) [m].
 
     The root's rotation and path are in the axes of the file. Numbers that the file lacks are NaN.
@@ -52,7 +52,7 @@ def check_length(path: Path, frames: int) -> None:
         raise MotionError(f"{path}: {frames} frames; between 1 and {MOST_FRAMES} are read: {remedy}")
 
 
-def rate(path: Path, stated: float | None, reading: Reading, usual: float | None = None) -> float:
+def rate(path: Path, stated: float | None, reading: MotionFileOptions, usual: float | None = None) -> float:
     """Frames per second: what the file states, else what was given, else what is usual for such files.
 
     Raises MotionError where there is none of them, file and command disagree, or no recording has that rate.

@@ -8,7 +8,7 @@ import numpy as np
 
 from snug.body.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
 from snug.motion.motion import MotionError
-from snug.motion.recording import Recording
+from snug.motion.raw_motion import RawMotion
 
 # From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
 TO_Y_UP = {
@@ -20,7 +20,7 @@ LYING = 0.3  # cosine between the vertical and the way from ankles to head, belo
 RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
 
 
-def turned_upright(recording: Recording, up: str) -> Recording:
+def turned_upright(recording: RawMotion, up: str) -> RawMotion:
     """The recording with y up. up: its vertical axis, "y" or "z"; empty: the one along which the body stands.
 
     In a frame the body stands along the axis that is nearest to the way from its ankles to its head. The
@@ -63,7 +63,7 @@ def _remedy(likely: str) -> str:
     return "turn the root's rotation and path so that y or z is up, or give a clip that stands"
 
 
-def _turned(recording: Recording, up: str, note: str) -> Recording:
+def _turned(recording: RawMotion, up: str, note: str) -> RawMotion:
     turn = TO_Y_UP[up]
     poses = recording.poses.copy()
     poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
