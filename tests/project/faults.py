@@ -1,4 +1,4 @@
-"""One-line faults in the physics, in its minimisers and in a metric: tests/project/test_mutations.py plants them."""
+"""One-line faults in the physics, in its minimisers and in a metric; test_mutations.py plants them."""
 
 from __future__ import annotations
 

@@ -1,46 +1,47 @@
-"""One-line faults in the metrics, and the file of tests that has to notice each: tests/project/test_mutations.py."""
+"""One-line faults in the metrics, by the file of tests that has to notice each."""
 
 from __future__ import annotations
 
 from tests.project.faults import Fault
 
-OPTIMALITY, STEP, ENERGY, CURVATURE, GEOMETRY, BODY, HEM, DYNAMICS, EXCESS, CONSERVATION = (
+ENERGY_GAP, STEP, ENERGY, CURVATURE, DISTANCES, BODY, HEM, DYNAMICS, EXCESS, CONSERVATION = (
     f"benchmarks/metrics/{name}.py"
     for name in (
-        "optimality", "step", "energy", "curvature", "geometry", "body", "hem", "dynamics", "excess",
-        "conservation",
+        "energies/energy_gap", "energies/time_step", "energies/energy", "surface/curvature",
+        "surface/distances", "surface/body_intersections", "motion/hem", "motion/dynamics",
+        "energies/excess", "motion/conservation",
     )
 )  # fmt: skip
 FRICTION = "reference_sim/energies/contact_friction.py"
 
 METRIC_FAULTS = {
-    "test_optimality": (
-        Fault("gap of the frame before", OPTIMALITY, "ascontiguousarray(positions[frame])\n        guess",
+    "benchmarks/metrics/test_energy_gap": (
+        Fault("gap of the frame before", ENERGY_GAP, "ascontiguousarray(positions[frame])\n        guess",
               "ascontiguousarray(positions[frame - 1])\n        guess"),
         Fault("past one frame late", STEP, "previous = positions[frame - 1]",
               "previous = positions[max(frame - 2, 0)]"),
         Fault("velocity over two steps", STEP, "2, 0)]) / scene.dt", "2, 0)]) / (2 * scene.dt)"),
-        Fault("scale of the guess alone", OPTIMALITY, "potential.value(start) - potential.value(here)",
+        Fault("scale of the guess alone", ENERGY_GAP, "potential.value(start) - potential.value(here)",
               "potential.value(start)"),
-        Fault("gap to the minimum below", OPTIMALITY, "found.gaps.append(here - best)",
+        Fault("gap to the minimum below", ENERGY_GAP, "found.gaps.append(here - best)",
               "found.gaps.append(here - below.energy)"),
-        Fault("warm-up judged", OPTIMALITY, "range(scene.warm_up, len(", "range(2, len("),
-        Fault("areas of the frame instead of the minimum", OPTIMALITY,
+        Fault("warm-up judged", ENERGY_GAP, "range(scene.warm_up, len(", "range(2, len("),
+        Fault("areas of the frame instead of the minimum", ENERGY_GAP,
               "ours, _ = mean_curvature(x, faces)\n    theirs, areas = mean_curvature(y, faces)",
               "ours, areas = mean_curvature(x, faces)\n    theirs, _ = mean_curvature(y, faces)"),
-        Fault("distance of coordinates", OPTIMALITY, "np.linalg.norm(x - y, axis=1)",
+        Fault("distance of coordinates", ENERGY_GAP, "np.linalg.norm(x - y, axis=1)",
               "np.abs(x - y).mean(axis=1)"),
-        Fault("standard error of an endless population", OPTIMALITY, "left = 1.0 - count / self.judged",
+        Fault("standard error of an endless population", ENERGY_GAP, "left = 1.0 - count / self.judged",
               "left = 1.0"),
-        Fault("planes not searched again", OPTIMALITY, "positions, frame, guess=x)", "positions, frame)"),
+        Fault("planes not searched again", ENERGY_GAP, "positions, frame, guess=x)", "positions, frame)"),
     ),
-    "test_friction": (
+    "reference_sim/energies/test_friction": (
         Fault("terms copied one by one", STEP,
               "vars(twin).update({name: twins[id(v)] for name, v in vars(twin).items() if id(v) in twins})",
               "pass"),
         Fault("the step before not prepared", STEP, "if frame > 1 and", "if frame < 0 and"),
     ),
-    "test_metrics": (
+    "benchmarks/metrics/test_metrics": (
         Fault("curvature areas of the wrong surface", CURVATURE, "reference.curvature), reference.area",
               "reference.curvature), series.area"),
         Fault("gravity at a fixed height", ENERGY, "scene.origin_heights[frame] - term.origin_height",
@@ -49,11 +50,11 @@ METRIC_FAULTS = {
               "velocity=(previous - before) / (2 * scene.dt)"),
         Fault("inside by the skin itself", BODY, "x + OFF * vertex_normals", "x - OFF * vertex_normals"),
         Fault("inside at rest too", BODY, "& ~at_rest", ""),
-        Fault("depth outside too", GEOMETRY, "share=(depth > 0.0).mean(1)", "share=(depth >= 0.0).mean(1)"),
+        Fault("depth outside too", DISTANCES, "share=(depth > 0.0).mean(1)", "share=(depth >= 0.0).mean(1)"),
         Fault("histogram of equal weights", CURVATURE, "area / area.sum(), -area_ref / area_ref.sum()",
               "area / area.sum(), -np.full(len(area_ref), 1 / len(area_ref))"),
     ),
-    "test_uncertainty": (
+    "benchmarks/metrics/test_uncertainty": (
         Fault("least change of the reference", "benchmarks/tasks/metric_task.py", "Estimate(value, max(",
               "Estimate(value, min("),
         Fault("smaller steps are as right", "benchmarks/results/run_folder.py", '"simulation-refrozen")',
@@ -64,11 +65,11 @@ METRIC_FAULTS = {
         Fault("common dynamics by the own static answer", DYNAMICS, "common = hem.measure(x)",
               "common = hem.measure(x, own)"),
     ),
-    "test_dynamics": (
+    "benchmarks/metrics/test_dynamics": (
         Fault("static answer one frame late", HEM, "difference = moving - static\n",
               "difference = moving - np.roll(static, 1, axis=0)\n"),
     ),
-    "test_conservation": (
+    "benchmarks/metrics/test_conservation": (
         Fault("momentum without the time step", CONSERVATION, "v) - dt * force", "v) - force"),
     ),
 }  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -153,11 +154,64 @@ def demand_no_circle(sources: Mapping[str, str]) -> None:
     TopologicalSorter(graph).prepare()
 
 
+def sources_of(layer: str) -> dict[str, str]:
+    """Module name -> source, of a layer."""
+    names = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files_of(layer)}
+    return {name.removesuffix(".__init__"): path.read_text(encoding="utf-8") for path, name in names.items()}
+
+
+def rooms_in_order(sources: Mapping[str, str]) -> list[str]:
+    """Sort the rooms of a layer from the ground up; raise CycleError where two import each other.
+
+    A room is a folder of the layer, or a module that lies in none.
+    """
+    graph: dict[str, set[str]] = {}
+    for module, source in sources.items():
+        room = module.split(".")[1:2]
+        if not room:
+            continue  # the layer's own face
+        above = graph.setdefault(room[0], set())
+        for _, name in imports(ast.parse(source), module):
+            layer, *rest = name.split(".")
+            if (
+                rest
+                and layer == module.split(".")[0]
+                and rest[0] != room[0]
+                and f"{layer}.{rest[0]}" in sources
+            ):
+                above.add(rest[0])
+    return list(TopologicalSorter(graph).static_order())
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_no_two_rooms_import_each_other(layer):
+    order = rooms_in_order(sources_of(layer))
+    print("\n", layer, ":", " < ".join(order))  # pytest -s shows from the ground up who may import whom
+    assert len(order) > 5
+
+
+def test_a_planted_circle_of_rooms_is_found():
+    sources = {
+        "snug.body": "",
+        "snug.body.skin": "def f():\n    from snug.motion.clip import g",
+        "snug.motion": "",
+        "snug.motion.clip": "from snug.body.bones import h",
+    }
+    with pytest.raises(CycleError):
+        rooms_in_order(sources)
+    assert rooms_in_order({**sources, "snug.motion.clip": ""}) == ["motion", "body"]
+
+
+def test_no_folder_is_a_hall():
+    """A newcomer reads a folder's names at a glance: at most 15 modules beside its face."""
+    folders = Counter(path.parent for layer in (*LAYERS, "tests") for path in files_of(layer))
+    faces = Counter(path.parent for layer in LAYERS for path in files_of(layer) if path.name == "__init__.py")
+    halls = {str(folder.relative_to(ROOT)): n - faces[folder] for folder, n in folders.items()}
+    assert {folder: count for folder, count in halls.items() if count > 15} == {}
+
+
 def test_no_module_imports_itself_by_a_circle():
-    sources = {}
-    for path in (path for layer in LAYERS for path in files_of(layer)):
-        module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        sources[module] = path.read_text(encoding="utf-8")
+    sources = {name: source for layer in LAYERS for name, source in sources_of(layer).items()}
     assert len(sources) > 150
     demand_no_circle(sources)
 

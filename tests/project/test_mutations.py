@@ -23,6 +23,7 @@ from tests.project.witnesses import WITNESSES
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("reference_sim", "snug", "benchmarks")
 ENOUGH = 2  # checks that fail before the others are left out
+OF_METRICS = [(file, fault) for file, faults in METRIC_FAULTS.items() for fault in faults]
 RUNNER = """
 import json, sys
 from benchmarks.validation.registry import KNOWN_ANSWERS
@@ -89,6 +90,13 @@ def test_a_check_fails_where_it_should(title, tmp_path):
     assert {name for name, _ in caught} == set(WITNESSES[title])
 
 
+@pytest.mark.parametrize(
+    "fault", [*FAULTS, *(fault for _, fault in OF_METRICS)], ids=lambda fault: fault.title
+)
+def test_the_line_of_a_fault_is_in_its_file(fault):
+    assert fault.right in (ROOT / fault.file).read_text(encoding="utf-8")
+
+
 def test_every_judged_check_has_a_fault_that_it_notices():
     witnessed = [name for names in WITNESSES.values() for name in names]
     assert sorted(witnessed) == sorted(case.name for case in KNOWN_ANSWERS if case.tolerance is not None)
@@ -98,9 +106,6 @@ def test_every_judged_check_has_a_fault_that_it_notices():
 def test_a_fault_is_caught_by_the_check_made_for_it(fault, tmp_path):
     _, caught = outcome(planted(fault, tmp_path), fault.fast)
     assert [name for name, _ in caught] == list(fault.fast)
-
-
-OF_METRICS = [(file, fault) for file, faults in METRIC_FAULTS.items() for fault in faults]
 
 
 def notices(file: str, fault: Fault | None, folder: Path) -> bool:
@@ -116,7 +121,7 @@ def notices(file: str, fault: Fault | None, folder: Path) -> bool:
         "-p",
         "no:cacheprovider",
         "-o",
-        "addopts=",
+        "addopts=--import-mode=importlib",
         "--rootdir",
         str(copy),
     )
