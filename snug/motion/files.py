@@ -25,13 +25,13 @@ def load_motions(
     path: str | Path,
     *,
     spread_degrees: float | None = None,
-    reading: MotionFileOptions | None = None,
+    options: MotionFileOptions | None = None,
 ) -> list[Motion]:
     """Motions from a file, or from every motion file of a folder, in the order of their names.
 
     Each comes back whole, at 30 frames per second, placed on the floor at the origin facing +z, with the arms
     spread by `spread_degrees` (0: as recorded; None: as far as clear_arms finds needed) and the hands' turns
-    at a tenth. reading: what the files do not say. CMU files (.amc) need their skeleton (.asf) beside them.
+    at a tenth. options: what the files do not say. CMU files (.amc) need their skeleton (.asf) beside them.
     Raises MotionError, one line with file, element and remedy, for anything that cannot be read.
     """
     path, known = Path(path), ", ".join(READERS)
@@ -42,7 +42,7 @@ def load_motions(
         files = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS)
     if not files:
         raise MotionError(f"{path}: holds no motion file ({known}); give a folder of motion capture clips")
-    clips = [resample(place(read_motion(file, reading or MotionFileOptions()))) for file in files]
+    clips = [resample(place(read_motion(file, options or MotionFileOptions()))) for file in files]
     if spread_degrees is None:
         return [clear_arms(clip) for clip in clips]
     return [spread_arms(clip, spread_degrees) for clip in clips]

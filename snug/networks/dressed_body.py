@@ -7,7 +7,7 @@ the pelvis. World positions come back by adding the pelvis, in float64.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -19,6 +19,11 @@ from snug.body.skinning import skin
 from snug.body.smpl_files import SHAPES
 from snug.networks.inputs import HISTORY, motion_history
 from snug.recipes.recipe import Recipe
+
+if TYPE_CHECKING:
+    from snug.body.parametric_body import Body
+    from snug.garments.garment import Garment
+    from snug.motion.motion import Motion
 
 # Which inputs there are, and the frames before one that they are made from: rates are first and second
 # differences.
@@ -33,7 +38,7 @@ class DressedBody:
     stretched shirt.
     """
 
-    def __init__(self, body: Any, garment: Any, *, material: Material | None = None) -> None:
+    def __init__(self, body: Body, garment: Garment, *, material: Material | None = None) -> None:
         self.body, self.garment = body, garment
         self.cloth = garment.cloth(material)
         self.vertices = len(garment.rest_positions)
@@ -80,7 +85,7 @@ class DressedBody:
             self._rest_directions = torch.as_tensor(np.stack(moved), dtype=torch.float32)
         return self._rest_directions
 
-    def pelvis(self, motion: Any, betas: np.ndarray | None = None) -> np.ndarray:
+    def pelvis(self, motion: Motion, betas: np.ndarray | None = None) -> np.ndarray:
         """World position of the pelvis in each frame, (T, 3) [m] float64."""
         return self.body.joints(betas)[0] + motion.translations
 
@@ -93,7 +98,7 @@ class DressedBody:
 
     def features(
         self,
-        motion: Any,
+        motion: Motion,
         recipe: Recipe,
         betas: np.ndarray | None = None,
         *,
@@ -124,7 +129,7 @@ class DressedBody:
 
     def skinned(
         self,
-        motion: Any,
+        motion: Motion,
         betas: np.ndarray | None = None,
         *,
         smoothing: int = 0,
@@ -149,7 +154,7 @@ def _pose_numbers(poses: np.ndarray, rotations: np.ndarray, pose_input: str) -> 
     return np.concatenate([up, columns.reshape(len(poses), -1)], axis=1)
 
 
-def _root_velocity(motion: Any, root: np.ndarray, frame: str) -> np.ndarray:
+def _root_velocity(motion: Motion, root: np.ndarray, frame: str) -> np.ndarray:
     """Velocity of the root joint, (T, 3) [m/s]; zero in the first frame, which has no past."""
     velocity = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * motion.fps
     return velocity if frame == "world" else np.einsum("tji,tj->ti", root, velocity)

@@ -9,11 +9,14 @@ does now began some time ago: the longer ago, the coarser it need be known.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
+
+if TYPE_CHECKING:
+    from snug.motion.motion import Motion
 
 # Trunk, thighs and upper arms carry cloth; their rates are inputs. Of the trunk the accelerations too.
 RATED = (
@@ -25,7 +28,7 @@ SPANS = (1, 1, 1, 1, 1, 2, 2, 3, 3, 4, 4)  # frames that one mean of a history i
 HISTORY = sum(SPANS)  # frames: three quarters of a second, in which a swing dies down by some two thirds
 
 
-def motion_rates(motion: Any) -> np.ndarray:
+def motion_rates(motion: Motion) -> np.ndarray:
     """(T, 48): root velocity [m/s] and acceleration [m/s^2]; angular velocity [rad/s] of each of RATED, and
     angular acceleration [rad/s^2] of each of TRUNK. Backward differences: the first frame is at rest.
     """
@@ -47,7 +50,7 @@ def motion_rates(motion: Any) -> np.ndarray:
     return np.concatenate(parts, axis=1)
 
 
-def motion_history(motion: Any) -> np.ndarray:
+def motion_history(motion: Motion) -> np.ndarray:
     """(T, 48 x 11): means of the rates over SPANS, this frame's first; a motion begins at rest."""
     rates = motion_rates(motion)
     padded = np.concatenate([np.zeros((HISTORY - 1, rates.shape[1])), rates])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -19,6 +19,9 @@ from snug.body.skinning import skin
 from snug.networks.dressed_body import FEATURE_SETS, DressedBody
 from snug.networks.one_frame import CompiledFrame
 from snug.networks.trained_model import TrainedModel, find_kind
+
+if TYPE_CHECKING:
+    from snug.motion.motion import Motion
 
 WARM_UP = 10  # frames run and thrown away, before whoever times the rest starts a clock
 QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
@@ -31,7 +34,7 @@ class RollOutError(ValueError):
 def roll_out(
     model: TrainedModel,
     dressed: DressedBody,
-    motion: Any,
+    motion: Motion,
     betas: np.ndarray | None = None,
     *,
     quasi_static: bool = False,
@@ -54,7 +57,7 @@ def roll_out(
 def ready_to_roll_out(
     model: TrainedModel,
     dressed: DressedBody,
-    motion: Any,
+    motion: Motion,
     betas: np.ndarray | None = None,
     *,
     kept: np.ndarray | None = None,
@@ -78,7 +81,7 @@ def ready_to_roll_out(
 
 
 def ready_for_many(
-    model: TrainedModel, dressed: DressedBody, motion: Any, *, copies: int
+    model: TrainedModel, dressed: DressedBody, motion: Motion, *, copies: int
 ) -> Callable[[], np.ndarray]:
     """What computes, when called, `copies` bodies in that motion at once: (T, copies, V, 3) [m], float32.
 
@@ -118,7 +121,7 @@ def collected(frames: Iterator[np.ndarray], held: np.ndarray) -> tuple[np.ndarra
 def _trajectory(
     model: TrainedModel,
     dressed: DressedBody,
-    motion: Any,
+    motion: Motion,
     positions: np.ndarray,
     held: np.ndarray,
     seconds: np.ndarray | None = None,
@@ -145,7 +148,7 @@ def _trajectory(
 def predictions(
     model: TrainedModel,
     dressed: DressedBody,
-    motion: Any,
+    motion: Motion,
     betas: np.ndarray | None = None,
     *,
     before: Any = None,
@@ -166,7 +169,7 @@ def predictions(
 
 
 def skinned_frames(
-    dressed: DressedBody, motion: Any, smoothing: int, betas: np.ndarray | None = None
+    dressed: DressedBody, motion: Motion, smoothing: int, betas: np.ndarray | None = None
 ) -> Callable[[], Iterator[np.ndarray]]:
     """As `predictions`, of skinning alone, with weights smoothed by that many sweeps."""
     nothing = np.empty((motion.frames, 0), np.float32)
@@ -177,7 +180,7 @@ def skinned_frames(
 def frame_inputs(
     model: TrainedModel | None,
     dressed: DressedBody,
-    motion: Any,
+    motion: Motion,
     betas: np.ndarray | None = None,
     *,
     before: Any = None,
@@ -202,14 +205,14 @@ def frame_inputs(
     return inputs
 
 
-def _joined(before: Any, motion: Any) -> Any:
+def _joined(before: Motion | None, motion: Motion) -> Motion:
     return motion if before is None else before.followed_by(motion)
 
 
 def _features(
     model: TrainedModel,
     dressed: DressedBody,
-    motion: Any,
+    motion: Motion,
     betas: np.ndarray | None,
     *,
     still: bool = False,
@@ -228,7 +231,7 @@ def _features(
 
 
 def _one_by_one(
-    frame: CompiledFrame, features: np.ndarray, dressed: DressedBody, motion: Any, betas: np.ndarray | None
+    frame: CompiledFrame, features: np.ndarray, dressed: DressedBody, motion: Motion, betas: np.ndarray | None
 ) -> Callable[[], Iterator[np.ndarray]]:
     """What begins the frames of the motion anew, from the state that earlier features leave; it is compiled
     and warmed up at once.

@@ -4,7 +4,7 @@ file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -182,7 +182,7 @@ def find_kind(name: str) -> Kind:
 
 
 def make_network(
-    kind: str, inputs: int, vertices: int, recipe: Recipe, *, seed: int, pins: Sequence[int] = ()
+    kind: str, inputs: int, vertices: int, recipe: Recipe, *, seed: int, pins: Iterable[int] = ()
 ) -> Any:
     """A network at its start. The same seed gives the same weights, whatever was drawn before.
 
@@ -196,7 +196,7 @@ def make_network(
     network.pins = tuple(pins)
     if network.pins:
         free = torch.ones(vertices, 1)
-        free[list(pins)] = 0.0
+        free[list(network.pins)] = 0.0
 
         def hold(_network: Any, _features: Any, output: tuple[Tensor, Any]) -> tuple[Tensor, Any]:
             return output[0] * free.to(output[0].device), output[1]

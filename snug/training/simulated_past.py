@@ -21,7 +21,7 @@ update costs a fifth of one by the energies.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -31,6 +31,9 @@ from snug.body.skinning import unskin
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.training.training_set import Batch, TrainingSet
 from snug.training.vertex_targets import Targets, all_relative, matched_targets
+
+if TYPE_CHECKING:
+    from snug.motion.motion import Motion
 
 NEARNESS = 1.0
 COMPONENTS = 96  # of the pretraining: they hold 98.7 % of the variance
@@ -45,7 +48,7 @@ class SimulatedPast:
     """
 
     def __init__(
-        self, data: TrainingSet, motions: Sequence[Any], trajectories: Mapping[str, Targets] | None
+        self, data: TrainingSet, motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None
     ) -> None:
         self.data, dressed = data, data.dressed
         targets = matched_targets(motions, trajectories, dressed.vertices)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from snug.recipes.recipe import DEFAULT, Recipe
 
 if TYPE_CHECKING:
+    from snug.motion.motion import Motion
     from snug.networks.dressed_body import DressedBody
     from snug.networks.trained_model import TrainedModel
     from snug.training.process_group import Group
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 def train(
     model_kind: str,
     dressed: DressedBody,
-    motions: Sequence[Any],
+    motions: Sequence[Motion],
     *,
     steps: int,
     seed: int,
@@ -69,7 +70,7 @@ def train(
 
 
 def untrained_model(
-    model_kind: str, dressed: DressedBody, motions: Sequence[Any], *, seed: int, recipe: Recipe = DEFAULT
+    model_kind: str, dressed: DressedBody, motions: Sequence[Motion], *, seed: int, recipe: Recipe = DEFAULT
 ) -> TrainedModel:
     """The network before any step, as a row of a table.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -31,6 +31,9 @@ from snug.training.stopwatch import Stopwatch
 from snug.training.training_set import Batch, TrainingError, TrainingSet
 from snug.training.vertex_targets import Targets, VertexTargets
 
+if TYPE_CHECKING:
+    from snug.motion.motion import Motion
+
 DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
@@ -44,7 +47,7 @@ class Trainer:
         self,
         kind: str,
         dressed: DressedBody,
-        motions: Sequence[Any],
+        motions: Sequence[Motion],
         *,
         steps: int,
         seed: int,
@@ -104,7 +107,9 @@ class Trainer:
         self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
 
-    def _set_up_supervision(self, motions: Sequence[Any], trajectories: Mapping[str, Targets] | None) -> None:
+    def _set_up_supervision(
+        self, motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None
+    ) -> None:
         """By simulated vertices, or by the energies, and then perhaps about a simulated past."""
         how, recipe, data = self.how, self.recipe, self.data
         if how.targets:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -14,6 +14,9 @@ from snug.body.skinning import joint_transforms
 from snug.networks.dressed_body import DressedBody
 from snug.recipes.recipe import Recipe
 from snug.training.device import CPU
+
+if TYPE_CHECKING:
+    from snug.motion.motion import Motion
 
 # Spread below which an input's is not taken for a scale: rotations are numbers up to 1 in size, and one that
 # hardly moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
@@ -46,7 +49,7 @@ class TrainingSet:
     def __init__(
         self,
         dressed: DressedBody,
-        motions: Sequence[Any],
+        motions: Sequence[Motion],
         recipe: Recipe,
         *,
         features: str,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -20,6 +20,7 @@ from snug.body.skinning import skin
 from snug.training.training_set import Batch, TrainingError, TrainingSet
 
 if TYPE_CHECKING:
+    from snug.motion.motion import Motion
     from snug.training.trainer import Trainer
     from snug.training.vertex_targets import Targets
 
@@ -31,7 +32,7 @@ class Validation:
     trajectories: as for training, for the kinds that simulated vertices teach.
     """
 
-    motions: Sequence[Any]
+    motions: Sequence[Motion]
     every: int = 200
     patience: int = 10
     trajectories: Mapping[str, Targets] | None = None

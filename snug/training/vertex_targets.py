@@ -18,6 +18,7 @@ from snug.body.skinning import skin
 from snug.training.device import CPU
 
 if TYPE_CHECKING:
+    from snug.motion.motion import Motion
     from snug.training.training_set import Batch
 
 CM2_PER_M2 = 1e4
@@ -48,7 +49,7 @@ class VertexTargets:
     def __init__(
         self,
         dressed: Any,
-        motions: Sequence[Any],
+        motions: Sequence[Motion],
         trajectories: Mapping[str, Targets] | None,
         weights: Tensor,
         transforms: Tensor,
@@ -113,7 +114,7 @@ Targets = np.ndarray | StoredVertices
 class StoredFrames:
     """The frames of several files in a row, read when they are asked for."""
 
-    def __init__(self, motions: Sequence[Any], parts: Sequence[Any]) -> None:
+    def __init__(self, motions: Sequence[Motion], parts: Sequence[Any]) -> None:
         self.names, self.parts = [motion.name for motion in motions], parts
         self.first = np.cumsum([0, *(part.shape[0] for part in parts)])
         self.device = CPU
@@ -138,7 +139,7 @@ class StoredFrames:
         return self.parts[part].read(slice(start, start + count), self.names[part])
 
 
-def all_relative(dressed: Any, motions: Sequence[Any], parts: Sequence[Any]) -> Tensor:
+def all_relative(dressed: Any, motions: Sequence[Motion], parts: Sequence[Any]) -> Tensor:
     """Vertices of all frames of all motions, (F, V, 3) [m], seen from the pelvis.
 
     Raises TargetError for a number that is not finite.
@@ -160,7 +161,7 @@ def _check_finite(positions: np.ndarray, motion: str, first: int = 0) -> None:
 
 
 def matched_targets(
-    motions: Sequence[Any], trajectories: Mapping[str, Targets] | None, vertices: int
+    motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None, vertices: int
 ) -> list[Any]:
     """For each motion an array (T, V, 3) [m, world], or what is still in its file.
 
