@@ -1,8 +1,9 @@
 """Read a pickle that holds plain values only: containers, numbers, strings, arrays, sparse matrices.
 
-A pickle is a program: it names functions and calls them. Here a name can only stand for a class of this
-module, by an allow-list, so nothing outside of this module is ever called. Files of Python 2 and 3 and of old
-and new NumPy and SciPy are read. chumpy's arrays (official SMPL files) are taken as the array that they hold.
+A pickle is a program: it names functions and calls them. Here a name can only stand for a class of the table
+`ALLOWED` at the end of this module. Such a stand-in keeps what it is called with; nothing is converted before
+the whole file has been read. Files of Python 2 and 3 and of old and new NumPy and SciPy are read.
+chumpy's arrays (official SMPL files) are taken as the array that they hold.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import math
 import pickle
 import pickletools
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +25,24 @@ MAX_OPERATIONS = 1_000_000  # of a pickle: an array takes some 30 of them, whate
 MAX_TUPLES = 20_000  # the hash of a deeper nest of tuples would overflow the stack
 REMEDY = "write plain arrays, as numpy.savez does"
 
+Plain = Callable[[Any], Any]  # a value as unpickled -> the plain value that it stands for
+Convert = Callable[[tuple[Any, ...], Any, Plain], Any]  # arguments and state of a name -> its plain value
+
 
 class PlainPickleError(ValueError):
     """A pickle that cannot be read as plain values; the message names the file and the remedy."""
 
 
 def read_plain_pickle(path: str | Path) -> Any:
-    """What a pickle holds: dict, list, tuple, set, numbers, str, bytes, None, numpy arrays, scipy.sparse.
+    """Read a pickle of plain values without running anything that it names.
 
-    Arrays have plain dtypes (bool, integers, floats, strings), may be of either byte order and cannot be
-    written to. Text of Python 2 is taken as latin-1. Raises PlainPickleError: file, what, remedy.
+    Returns:
+        dict, list, tuple, set, numbers, str, bytes, None, numpy arrays or scipy.sparse matrices. Arrays have
+        plain dtypes (bool, integers, floats, strings), may be of either byte order and cannot be written to.
+        Text of Python 2 is taken as latin-1.
+
+    Raises:
+        PlainPickleError: file, problem, remedy.
     """
     path = Path(path)
     if not path.is_file():
@@ -41,7 +52,7 @@ def read_plain_pickle(path: str | Path) -> Any:
     try:
         content = path.read_bytes()
         _check_operations(content)
-        return _plain(_Unpickler(io.BytesIO(content), encoding="latin1").load(), {})
+        return _to_plain(_Unpickler(io.BytesIO(content), encoding="latin1").load(), {})
     # A broken pickle can fail in nearly every way, and none of them is this program's own.
     except Exception as error:
         why = " ".join(str(error).split())[:200] or type(error).__name__
@@ -51,7 +62,7 @@ def read_plain_pickle(path: str | Path) -> Any:
 
 
 def _check_operations(content: bytes) -> None:
-    """Refuse what would make the unpickler allocate more than the file holds, or compute without end.
+    """Refuse a pickle that makes the unpickler allocate more than the file holds, or compute without end.
 
     The readers of pickletools return what is there, and fail where a declared size is larger.
     """
@@ -76,258 +87,168 @@ def _check_operations(content: bytes) -> None:
 
 
 class _Unpickler(pickle.Unpickler):
-    def find_class(self, module: str, name: str) -> Any:
-        found = _ALLOWED.get((module, name)) if isinstance(module, str) and isinstance(name, str) else None
-        if found is None:
+    def find_class(self, module: str, name: str) -> type:
+        stand_in = ALLOWED.get((module, name)) if isinstance(module, str) and isinstance(name, str) else None
+        if stand_in is None:
             raise ValueError(f"it needs {module}.{name}, which is no plain value")
-        return found
+        return stand_in
 
 
-class _Part:
-    """What a name stands for. Every one has a __setstate__, so that a state is never set in another way."""
+def _to_plain(value: Any, done: dict[int, Any]) -> Any:
+    """Return the value with every stand-in in it converted; `done`: values converted before, by their id."""
+    if isinstance(value, type):
+        raise ValueError("it holds a type as a value")
+    if not isinstance(value, _StandIn | dict | list | tuple | set | frozenset) or id(value) in done:
+        return done.get(id(value), value)
+    if isinstance(value, _StandIn):
+        plain = value.convert(value.arguments, value.state, lambda part: _to_plain(part, done))
+    elif isinstance(value, dict):
+        plain = {_to_plain(key, done): _to_plain(entry, done) for key, entry in value.items()}
+    else:
+        plain = type(value)(_to_plain(entry, done) for entry in value)
+    done[id(value)] = plain
+    return plain
 
-    __slots__ = ("state",)
+
+class _StandIn:
+    """A class or function that a pickle may name: keeps arguments and state, and runs nothing.
+
+    convert(arguments, state, plain) returns its plain value afterwards, or raises; plain: `_to_plain`.
+    """
+
+    __slots__ = ("arguments", "state")
+    arguments: tuple[Any, ...]
     state: Any
+    convert: Convert
 
-    def __new__(cls, *values: Any) -> Any:
-        raise ValueError(f"it calls {cls.__name__.strip('_')}")
+    def __new__(cls, *arguments: Any) -> Any:
+        stand_in = object.__new__(cls)
+        stand_in.arguments, stand_in.state = arguments, None
+        return stand_in
 
+    # Every stand-in has one, so that the unpickler never sets attributes in another way.
     def __setstate__(self, state: Any) -> None:
-        raise ValueError("it sets the state of what has none")
-
-    def plain(self) -> Any:
-        raise ValueError(f"it holds {type(self).__name__.strip('_')} as a value")
-
-
-class _Name(_Part):
-    """A type that is named, and neither called nor made: numpy.ndarray, object, the list of a defaultdict."""
-
-    __slots__ = ()
-
-
-class _Dict(_Part):
-    """An OrderedDict or a defaultdict: its entries come afterwards."""
-
-    __slots__ = ()
-
-    def __new__(cls, *values: Any) -> Any:
-        return dict(*values) if values and isinstance(values[0], list) else {}
-
-
-class _Set(_Part):
-    __slots__ = ()
-
-    def __new__(cls, values: Any = ()) -> Any:
-        return set(values)
-
-
-class _Encoded(_Part):
-    """_codecs.encode, or bytes where there are none: how protocols before 3 write bytes."""
-
-    __slots__ = ()
-
-    def __new__(cls, text: Any = "", encoding: Any = "latin1") -> Any:
-        if not isinstance(text, str) or encoding != "latin1":
-            raise ValueError("it encodes bytes in an unknown way")
-        return text.encode("latin-1")
-
-
-class _DType(_Part):
-    """numpy.dtype: a kind with a size; its state tells the byte order."""
-
-    __slots__ = ()
-
-    def __new__(cls, kind: Any, *flags: Any) -> Any:
-        if not isinstance(kind, str) or not re.fullmatch(
-            r"[<>|=]?(b1|[iu][1248]|f[248]|[SU][1-9]\d{0,5})", kind
-        ):
-            raise ValueError(f"arrays of dtype {str(kind)[:20]} are not plain numbers or strings")
-        made = object.__new__(cls)
-        made.state = np.dtype(kind)
-        return made
-
-    def __setstate__(self, state: Any) -> None:
-        order, subarray, names, fields = state[1:5]
-        if order not in ("<", ">", "|", "=") or any(x is not None for x in (subarray, names, fields)):
-            raise ValueError("a dtype has fields")
-        self.state = self.state if order == "|" else self.state.newbyteorder(order)
-
-
-class _Array(_Part):
-    """numpy's _reconstruct: an empty array whose state follows."""
-
-    __slots__ = ()
-
-    def __new__(cls, kind: Any, shape: Any, code: Any) -> Any:
-        if kind is not _Name or shape != (0,):
-            raise ValueError("it builds an array in an unknown way")
-        made = object.__new__(cls)
-        made.state = None
-        return made
-
-    def __setstate__(self, state: Any) -> None:
-        shape, dtype, fortran, raw = state[-4:]  # a version before them is not always there
-        self.state = _array(raw, dtype, shape, "F" if fortran else "C")
-
-    def plain(self) -> np.ndarray:
-        if self.state is None:
-            raise ValueError("an array has no content")
-        return self.state
-
-
-class _FromBuffer(_Part):
-    """numpy's _frombuffer: an array of protocol 5."""
-
-    __slots__ = ()
-
-    def __new__(cls, raw: Any, dtype: Any, shape: Any, order: Any, axes: Any = None) -> Any:
-        if order == "K" and axes is not None:
-            return _array(raw, dtype, shape, "C").transpose(axes)
-        return _array(raw, dtype, shape, "F" if order == "F" else "C")
-
-
-class _Scalar(_Part):
-    """numpy's scalar: a Python number or string."""
-
-    __slots__ = ()
-
-    def __new__(cls, dtype: Any, raw: Any) -> Any:
-        return _array(raw, dtype, (), "C").item()
-
-
-def _array(raw: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:
-    """The array of those bytes, which must be as many as dtype and shape need. Raises ValueError."""
-    content = raw.encode("latin-1") if isinstance(raw, str) else raw  # str: written by Python 2
-    if not isinstance(content, bytes | bytearray) or not isinstance(dtype, _DType):
-        raise ValueError("an array has no plain content")
-    if not isinstance(shape, tuple) or not all(type(n) is int and n >= 0 for n in shape):
-        raise ValueError("an array has no plain shape")
-    if len(content) != math.prod(shape) * dtype.state.itemsize:
-        raise ValueError(f"an array of shape {shape} and {dtype.state} has {len(content)} bytes")
-    return np.ndarray(shape, dtype.state, buffer=bytes(content), order=order)
-
-
-class _Object(_Part):
-    """An object that is made empty and then given its attributes as a dict."""
-
-    __slots__ = ()
-
-    def __new__(cls, *values: Any) -> Any:
-        made = object.__new__(cls)
-        made.state = {}
-        return made
-
-    def __setstate__(self, state: Any) -> None:
-        if not isinstance(state, dict):
-            raise ValueError("the attributes of an object are no dict")
         self.state = state
 
 
-class _Chumpy(_Object):
-    """chumpy's array of plain numbers; every other class of chumpy is computed from some, and refused."""
+class _Dict(_StandIn):
+    """An OrderedDict or a defaultdict, whose entries come afterwards."""
 
-    __slots__ = ()
-
-    def plain(self) -> np.ndarray:
-        return np.asarray(_plain(self.state["x"], {}))
+    def __new__(cls, *arguments: Any) -> Any:
+        return dict(*arguments) if arguments and isinstance(arguments[0], list) else {}
 
 
-class _Compressed(_Object):
-    """scipy's csc and csr matrices; the two differ in who is compressed, and in the name."""
+class _Reconstructor(_StandIn):
+    """copyreg's _reconstructor: how protocols 0 and 1 make an object, whose state follows at once."""
 
-    __slots__ = ()
-    format = "csc_matrix"
-
-    def plain(self) -> Any:
-        import scipy.sparse
-
-        parts = tuple(_numbers(self.state[key]) for key in ("data", "indices", "indptr"))
-        matrix = getattr(scipy.sparse, self.format)(parts, shape=_sparse_shape(self.state))
-        matrix.check_format(full_check=True)
-        return matrix
+    def __new__(cls, kind: Any, base: Any, state: Any) -> Any:
+        if not (isinstance(kind, type) and issubclass(kind, _StandIn)) or state is not None:
+            raise ValueError("it builds an object in an unknown way")
+        return kind()
 
 
-class _RowCompressed(_Compressed):
-    __slots__ = ()
-    format = "csr_matrix"
+def _refuse(arguments: tuple[Any, ...], state: Any, plain: Plain) -> Any:
+    raise ValueError("it holds an object of a type that is only named")
 
 
-class _Coordinates(_Object):
-    """scipy's coo matrix."""
+def _encoded_text(arguments: tuple[Any, ...], state: Any, plain: Plain) -> bytes:
+    """Convert _codecs.encode, or bytes without arguments: how protocols before 3 write bytes."""
+    text, encoding = arguments or ("", "latin1")
+    if encoding != "latin1":
+        raise ValueError("it encodes bytes in an unknown way")
+    return text.encode("latin-1")
 
-    __slots__ = ()
 
-    def plain(self) -> Any:
-        import scipy.sparse
+def _dtype(arguments: tuple[Any, ...], state: Any, plain: Plain) -> np.dtype:
+    """Convert numpy.dtype: a kind with a size; its state tells the byte order."""
+    kind = arguments[0]
+    if not isinstance(kind, str) or not re.fullmatch(r"[<>|=]?(b1|[iu][1248]|f[248]|[SU][1-9]\d{0,5})", kind):
+        raise ValueError(f"arrays of dtype {str(kind)[:20]} are not plain numbers or strings")
+    order: Any
+    order, *fields = state[1:5] if state else ("|",)
+    if order not in ("<", ">", "|", "=") or any(field is not None for field in fields):
+        raise ValueError("a dtype has fields")
+    return np.dtype(kind) if order == "|" else np.dtype(kind).newbyteorder(order)
 
-        row, column = self.state.get("coords") or (self.state["row"], self.state["col"])
-        where = (_numbers(row), _numbers(column))
-        return scipy.sparse.coo_matrix((_numbers(self.state["data"]), where), shape=_sparse_shape(self.state))
+
+def _array(arguments: tuple[Any, ...], state: Any, plain: Plain) -> np.ndarray:
+    """Convert numpy's _reconstruct: an empty array; its state follows, sometimes after a version."""
+    shape, dtype, fortran, content = plain(state)[-4:]
+    return _array_of(content, dtype, shape, "F" if fortran else "C")
+
+
+def _array_from_buffer(arguments: tuple[Any, ...], state: Any, plain: Plain) -> np.ndarray:
+    """Convert numpy's _frombuffer: an array of protocol 5."""
+    content, dtype, shape, order, *axes = map(plain, arguments)
+    array = _array_of(content, dtype, shape, "F" if order == "F" else "C")
+    return array.transpose(axes[0]) if order == "K" and axes and axes[0] is not None else array
+
+
+def _scalar(arguments: tuple[Any, ...], state: Any, plain: Plain) -> Any:
+    """Convert numpy's scalar: a Python number or string."""
+    dtype, content = map(plain, arguments)
+    return _array_of(content, dtype, (), "C").item()
+
+
+def _array_of(content: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:
+    """Return the array of these bytes. Raises ValueError unless they are as many as dtype and shape need."""
+    content = content.encode("latin-1") if isinstance(content, str) else content  # str: of Python 2
+    if not isinstance(content, bytes | bytearray) or not isinstance(dtype, np.dtype):
+        raise ValueError("an array has no plain content")
+    if not isinstance(shape, tuple) or not all(type(n) is int and n >= 0 for n in shape):
+        raise ValueError("an array has no plain shape")
+    if len(content) != math.prod(shape) * dtype.itemsize:
+        raise ValueError(f"an array of shape {shape} and {dtype} has {len(content)} bytes")
+    return np.ndarray(shape, dtype, buffer=bytes(content), order=order)
+
+
+def _sparse(kind: str, arguments: tuple[Any, ...], state: Any, plain: Plain) -> Any:
+    """Convert scipy's csc, csr and coo matrices."""
+    import scipy.sparse  # few pickles hold one
+
+    state = plain(state)
+    shape = tuple(map(int, state["_shape" if "_shape" in state else "shape"]))
+    data = _numbers(state["data"])
+    if kind == "coo_matrix":
+        row, column = state.get("coords") or (state["row"], state["col"])
+        return scipy.sparse.coo_matrix((data, (_numbers(row), _numbers(column))), shape=shape)
+    parts = data, _numbers(state["indices"]), _numbers(state["indptr"])
+    matrix = getattr(scipy.sparse, kind)(parts, shape=shape)
+    matrix.check_format(full_check=True)
+    return matrix
 
 
 def _numbers(value: Any) -> np.ndarray:
-    """An array of a sparse matrix, in the machine's byte order and its own to write."""
-    array = np.asarray(_plain(value, {}))
+    """Return an array of a sparse matrix in the machine's byte order, writeable."""
+    array = np.asarray(value)
     if array.ndim != 1 or array.dtype.kind not in "biuf":
         raise ValueError("a sparse matrix is not made of lists of numbers")
     return array.astype(array.dtype.newbyteorder("="))
 
 
-def _sparse_shape(state: dict[str, Any]) -> tuple[int, int]:
-    rows, columns = (int(_plain(n, {})) for n in state["_shape" if "_shape" in state else "shape"])
-    return rows, columns
-
-
-class _Reconstructor(_Part):
-    """copyreg's _reconstructor: how protocols 0 and 1 make an object."""
-
-    __slots__ = ()
-
-    def __new__(cls, kind: Any, base: Any, state: Any) -> Any:
-        if (
-            not (isinstance(kind, type) and issubclass(kind, _Object))
-            or base is not _Name
-            or state is not None
-        ):
-            raise ValueError("it builds an object in an unknown way")
-        return kind()
-
-
-def _plain(value: Any, done: dict[int, Any]) -> Any:
-    """The value with each part in it replaced by what it stands for; `done`: values met before, by id."""
-    if isinstance(value, _Part):
-        made = done[id(value)] if id(value) in done else value.plain()
-    elif isinstance(value, type):
-        raise ValueError("it holds a type as a value")
-    elif not isinstance(value, dict | list | tuple | set | frozenset) or id(value) in done:
-        return done.get(id(value), value)
-    elif isinstance(value, dict):
-        made = {_plain(key, done): _plain(entry, done) for key, entry in value.items()}
-    else:
-        made = type(value)(_plain(entry, done) for entry in value)
-    done[id(value)] = made
-    return made
-
-
-def _names(modules: str, names: str, part: type[_Part]) -> dict[tuple[str, str], type[_Part]]:
-    return {(module, name): part for module in modules.split() for name in names.split()}
+def _names(modules: str, names: str, rule: type[_StandIn] | Convert) -> dict[tuple[str, str], type]:
+    """Return one stand-in for these names of these modules; rule: the class, or how it is converted."""
+    if not isinstance(rule, type):
+        rule = type("StandIn", (_StandIn,), {"__slots__": (), "convert": staticmethod(rule)})
+    return {(module, name): rule for module in modules.split() for name in names.split()}
 
 
 # Modules of Python 2 and 3, of old and new NumPy and SciPy.
-_ALLOWED = {
-    **_names("numpy", "ndarray", _Name),
-    **_names("numpy", "dtype", _DType),
-    **_names("numpy.core.multiarray numpy._core.multiarray", "_reconstruct", _Array),
-    **_names("numpy.core.multiarray numpy._core.multiarray", "scalar", _Scalar),
-    **_names("numpy.core.numeric numpy._core.numeric", "_frombuffer", _FromBuffer),
-    **_names("scipy.sparse.csc scipy.sparse._csc", "csc_matrix csc_array", _Compressed),
-    **_names("scipy.sparse.csr scipy.sparse._csr", "csr_matrix csr_array", _RowCompressed),
-    **_names("scipy.sparse.coo scipy.sparse._coo", "coo_matrix coo_array", _Coordinates),
-    **_names("chumpy.ch", "Ch", _Chumpy),
+ALLOWED = {
+    **_names("numpy", "ndarray", _refuse),
+    **_names("numpy", "dtype", _dtype),
+    **_names("numpy.core.multiarray numpy._core.multiarray", "_reconstruct", _array),
+    **_names("numpy.core.multiarray numpy._core.multiarray", "scalar", _scalar),
+    **_names("numpy.core.numeric numpy._core.numeric", "_frombuffer", _array_from_buffer),
+    **_names("scipy.sparse.csc scipy.sparse._csc", "csc_matrix csc_array", partial(_sparse, "csc_matrix")),
+    **_names("scipy.sparse.csr scipy.sparse._csr", "csr_matrix csr_array", partial(_sparse, "csr_matrix")),
+    **_names("scipy.sparse.coo scipy.sparse._coo", "coo_matrix coo_array", partial(_sparse, "coo_matrix")),
+    # Every other class of chumpy is computed from some, and refused.
+    **_names("chumpy.ch", "Ch", lambda arguments, state, plain: np.asarray(plain(state)["x"])),
     **_names("copy_reg copyreg", "_reconstructor", _Reconstructor),
-    **_names("_codecs", "encode", _Encoded),
-    **_names("__builtin__", "bytes", _Encoded),
-    **_names("__builtin__ builtins", "set", _Set),
-    **_names("__builtin__ builtins", "object list dict int float", _Name),
+    **_names("_codecs", "encode", _encoded_text),
+    **_names("__builtin__", "bytes", _encoded_text),
+    **_names("__builtin__ builtins", "set", lambda arguments, state, plain: set(*map(plain, arguments))),
+    **_names("__builtin__ builtins", "object list dict int float", _refuse),
     **_names("collections", "OrderedDict defaultdict", _Dict),
 }
