@@ -51,7 +51,7 @@ def modules() -> dict[str, ModuleType]:
 @cache
 def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
     """Name -> metric, of all modules, of microbenchmarks, and of modules outside. Raises DeclarationError."""
-    from benchmarks.performance.metrics import METRICS
+    from benchmarks.metrics.cost.microbenchmarks import METRICS
 
     own: list[Metric] = []
     for name, module in modules().items():

@@ -13,8 +13,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.meshes import square_sheet
 from benchmarks.performance.microbenchmark import Settings
-from benchmarks.scenes.sheet import square_sheet
 from reference_sim import Cloth, Material, Potential, simulate
 from reference_sim.energies import Energy, Gravity, StretchStVK
 from reference_sim.minimise import minimise
@@ -51,7 +51,7 @@ def _sheet() -> Cloth:
 
 
 def _body() -> tuple[Run, Run]:
-    from benchmarks.scenes.sheet_on_sphere import sphere
+    from benchmarks.meshes import sphere
     from reference_sim import Obstacle
     from reference_sim.energies import ContactPenalty
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.meshes import square_sheet
 from benchmarks.scene import BuiltScene, Scene
-from benchmarks.scenes.sheet import square_sheet
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 

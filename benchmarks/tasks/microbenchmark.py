@@ -34,7 +34,7 @@ class RunMicrobenchmark(Task):
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """Measure. A failure has the memory of its process too."""
-        from benchmarks.performance.metrics import PROCESS_MEMORY
+        from benchmarks.metrics.cost.microbenchmarks import PROCESS_MEMORY
 
         files = self.benchmark.files
         settings = dataclasses.replace(
@@ -48,7 +48,7 @@ class RunMicrobenchmark(Task):
 
     def rows(self, outcome: Outcome) -> list[Row]:
         """One for each number; where the process died, one that says so."""
-        from benchmarks.performance.metrics import PROCESS_MEMORY
+        from benchmarks.metrics.cost.microbenchmarks import PROCESS_MEMORY
 
         benchmark, entry = self.benchmark, self.entry
         base = Row(

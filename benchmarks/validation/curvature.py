@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.meshes import cylinder_patch, icosphere, rectangle, torus
 from benchmarks.metrics.surface.curvature import boundary_mask, mean_curvature
 from benchmarks.validation.fitted_order import fitted_order
-from benchmarks.validation.meshes import cylinder_patch, icosphere, rectangle, torus
 
 
 def sphere_curvature() -> float:

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from benchmarks import export, run, score
 from benchmarks.cell import Cell
-from benchmarks.export_files import _write_obj, write_scene
+from benchmarks.export_files import write_scene
 from benchmarks.external.roll_out_option import RollOutOption, Stated
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.fingerprint.digest import digest
@@ -26,6 +26,7 @@ from benchmarks.plan.plan import Motions, Plan, PlanError
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
+from benchmarks.scene_files import write_obj
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
@@ -130,7 +131,7 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
     held = {"pred": trajectory.positions, "cloth_faces": trajectory.faces}
     held |= {"obstacle": obstacle, "obstacle_faces": scene.obstacle.faces}
     (tmp_path / "pred.pkl").write_bytes(pickle.dumps(held))
-    _write_obj(tmp_path / "rest.obj", scene.cloth.rest_positions, scene.cloth.faces, None)
+    write_obj(tmp_path / "rest.obj", scene.cloth.rest_positions, scene.cloth.faces, None)
     words = [str(tmp_path / "pred.pkl"), "--rest-mesh", str(tmp_path / "rest.obj"), "--no-reference"]
     assert score.main([*words, "--preset", "smoke", "-o", str(tmp_path / "out")]) == 0
     found = {
@@ -147,7 +148,7 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
     # All of it in centimetres, and nobody says so: nothing in the file contradicts it but its size.
     large = {**held, "pred": 100.0 * held["pred"], "obstacle": 100.0 * obstacle}
     (tmp_path / "pred.pkl").write_bytes(pickle.dumps(large))
-    _write_obj(tmp_path / "rest.obj", 100.0 * scene.cloth.rest_positions, scene.cloth.faces, None)
+    write_obj(tmp_path / "rest.obj", 100.0 * scene.cloth.rest_positions, scene.cloth.faces, None)
     assert score.main([*words, "--preset", "smoke", "-o", str(tmp_path / "no")]) == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert "m across in --units m: say --units cm" in said and not (tmp_path / "no").exists()
@@ -308,7 +309,7 @@ def test_what_is_exported_is_the_scene(home):
 
 def test_a_uv_of_corners_is_written_into_the_mesh(tmp_path):
     positions, faces = np.eye(3), np.array([[0, 1, 2]])
-    _write_obj(tmp_path / "a.obj", positions, faces, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]]))
+    write_obj(tmp_path / "a.obj", positions, faces, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]]))
     assert (tmp_path / "a.obj").read_text().endswith("vt 0.0 0.5\nf 1/1 2/2 3/3\n")
 
 

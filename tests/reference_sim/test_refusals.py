@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.scenes.sheet import square_sheet
-from benchmarks.scenes.sheet_on_sphere import sphere
+from benchmarks.meshes import sphere, square_sheet
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import BendHinge, Gravity, Inertia, StretchStVK
 

@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse.linalg as spla
 from scipy.integrate import solve_bvp
 
+from benchmarks.meshes import FAMILIES, ROW, in_space, rectangle
 from benchmarks.validation.converged import converged
 from benchmarks.validation.loads import DeadLoad
-from benchmarks.validation.meshes import FAMILIES, ROW, in_space, rectangle
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
 

@@ -11,9 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+from benchmarks.meshes import ROW, in_space, rectangle
 from benchmarks.validation.converged import converged
 from benchmarks.validation.loads import DeadLoad
-from benchmarks.validation.meshes import ROW, in_space, rectangle
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, StretchStVK
 

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from benchmarks.validation.meshes import ROW, in_space, rectangle
+from benchmarks.meshes import ROW, in_space, rectangle
 from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import BendHinge
 

@@ -13,9 +13,9 @@ from functools import cache
 
 import numpy as np
 
+from benchmarks.meshes import rectangle
 from benchmarks.validation.converged import converged
 from benchmarks.validation.loads import DeadLoad
-from benchmarks.validation.meshes import rectangle
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, StretchStVK
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.meshes import in_space, jittered_patch
 from benchmarks.validation.converged import converged
-from benchmarks.validation.meshes import in_space, jittered_patch
 from reference_sim import Cloth, Material, Obstacle, Potential, minimise
 from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
 from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS

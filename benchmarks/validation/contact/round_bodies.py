@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.converged import converged
 from benchmarks.validation.fitted_order import fitted_order
-from benchmarks.validation.meshes import in_space, right_grid
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
 from reference_sim.energies.contact_penalty import DEFAULT_MARGIN, DEFAULT_STIFFNESS

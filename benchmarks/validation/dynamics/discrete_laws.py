@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.meshes import in_space, jittered_patch, right_grid
 from benchmarks.scene import Scene
 from benchmarks.scenes import free_fall as fall
 from benchmarks.scenes import hanging_sheet
 from benchmarks.validation.converged import converged
-from benchmarks.validation.meshes import in_space, jittered_patch, right_grid
 from reference_sim import Cloth, Material, Potential, Trajectory, minimise, simulate
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 

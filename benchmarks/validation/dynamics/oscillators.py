@@ -12,9 +12,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
+from benchmarks.meshes import random_rotation
 from benchmarks.validation.converged import converged
 from benchmarks.validation.fitted_order import fitted_order
-from benchmarks.validation.meshes import random_rotation
 from reference_sim import Cloth, Material, simulate
 from reference_sim.energies import Gravity, StretchStVK
 from reference_sim.material import GRAVITY

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.meshes import sheet, square_sheet
 from benchmarks.scenes import hanging_sheet
-from benchmarks.scenes.sheet import sheet, square_sheet
 from benchmarks.validation.contact.round_bodies import RoundBody
 from benchmarks.validation.converged import converged
 from benchmarks.validation.dynamics.discrete_laws import HANGING, stretched_membrane

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.contact.round_bodies import DRUM, SLACK, RoundBody, wrapped
 from benchmarks.validation.converged import converged
 from benchmarks.validation.fitted_order import fitted_order
-from benchmarks.validation.meshes import in_space, right_grid
 from reference_sim import Cloth, Material, simulate
 from reference_sim.energies import ContactFriction, ContactPenalty, StretchStVK
 from reference_sim.energies.contact_penalty import DEFAULT_MARGIN

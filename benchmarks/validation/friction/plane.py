@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.contact.plane import box
 from benchmarks.validation.converged import converged
-from benchmarks.validation.meshes import in_space, right_grid
 from reference_sim import Cloth, Material, Obstacle, simulate
 from reference_sim.energies import ContactFriction, ContactPenalty, Gravity, StretchStVK
 from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS

@@ -24,9 +24,9 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.friction.plane import MU, slid
 from benchmarks.validation.membrane.hanging_strip import MATERIAL, WEIGHT, string_stretch
-from benchmarks.validation.meshes import in_space, right_grid
 from reference_sim import Cloth, Material
 from reference_sim.energies import StretchStVK
 from reference_sim.material import GRAVITY

@@ -10,8 +10,8 @@ from functools import cache
 
 import numpy as np
 
+from benchmarks.meshes import in_space, jittered_patch
 from benchmarks.validation.converged import converged
-from benchmarks.validation.meshes import in_space, jittered_patch
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, StretchStVK
 

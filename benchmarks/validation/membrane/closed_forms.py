@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.validation.meshes import in_space, jittered_patch, random_rotation
+from benchmarks.meshes import in_space, jittered_patch, random_rotation
 from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.converged import converged
 from benchmarks.validation.fitted_order import fitted_order
-from benchmarks.validation.meshes import in_space, right_grid
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import Gravity, StretchStVK
 from reference_sim.material import GRAVITY

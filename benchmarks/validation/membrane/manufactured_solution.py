@@ -13,10 +13,10 @@ from functools import cache
 
 import numpy as np
 
+from benchmarks.meshes import in_space, jittered_patch
 from benchmarks.validation.converged import converged
 from benchmarks.validation.fitted_order import fitted_order
 from benchmarks.validation.loads import DeadLoad
-from benchmarks.validation.meshes import in_space, jittered_patch
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import StretchStVK
 

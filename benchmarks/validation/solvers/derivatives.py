@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.validation.meshes import in_space, jittered_patch, random_rotation
+from benchmarks.meshes import in_space, jittered_patch, random_rotation
 from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import (
     AreaBarrier,

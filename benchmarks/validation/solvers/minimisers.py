@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.meshes import in_space, jittered_patch, right_grid
 from benchmarks.validation.converged import converged
 from benchmarks.validation.fitted_order import fitted_order
-from benchmarks.validation.meshes import in_space, jittered_patch, right_grid
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.scenes.sheet import square_sheet
-from benchmarks.scenes.sheet_on_sphere import sphere
+from benchmarks.meshes import sphere, square_sheet
 from benchmarks.validation.case import Measurement
 from benchmarks.validation.solvers.convergence_check import (
     CheckedResult,

@@ -13,12 +13,12 @@ from benchmarks.external import roll_out_files as files
 from benchmarks.external.roll_out_files import read_roll_out
 from benchmarks.external.roll_out_option import RollOutError, RollOutOption, Stated, parse
 from benchmarks.external.vertex_correspondence import same_topology
+from benchmarks.meshes import torus
 from benchmarks.methods import find_method
 from benchmarks.methods.outside.stored_roll_out import Stored, entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.scenes.from_roll_out import declared
 from benchmarks.tasks.metric_task import measured
-from benchmarks.validation.meshes import torus
 from reference_sim import Trajectory
 from reference_sim.trajectory.point_cache import HEADER, SIGNATURE, read_point_cache, write_point_cache
 from tests.benchmarks.runner.tasks_by_hand import small_scene

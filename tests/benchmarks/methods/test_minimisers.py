@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
 from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, weights
 from benchmarks.methods.minimisers.kernels import block, depth, fold, strain
@@ -14,8 +15,6 @@ from benchmarks.methods.minimisers.xpbd import XPBD
 from benchmarks.methods.solvers.warm_started import FromElsewhere, WarmStarted
 from benchmarks.metrics.energies.time_step import first_guess
 from benchmarks.scenes.free_fall import exact_fall
-from benchmarks.scenes.sheet import square_sheet
-from benchmarks.scenes.sheet_on_sphere import sphere
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import (
     BendHinge,

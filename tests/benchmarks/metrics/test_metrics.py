@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.meshes import cylinder_patch, icosphere, right_grid, torus
 from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut
 from benchmarks.metrics import declared, find_metric
@@ -30,7 +31,6 @@ from benchmarks.metrics.surface.intersections import intersecting, intersecting_
 from benchmarks.metrics.surface.rest_shape import area_change, dihedral_angle, edge_change
 from benchmarks.results.run_folder import Row
 from benchmarks.rows import remarked
-from benchmarks.validation.meshes import cylinder_patch, icosphere, right_grid, torus
 from reference_sim import Obstacle, Trajectory, simulate
 from snug.body.skeleton import JOINT
 from tests.benchmarks.runner.tasks_by_hand import small_scene

@@ -17,9 +17,9 @@ import snug.training.train
 from benchmarks import provenance, run, speedup
 from benchmarks.methods import find_method
 from benchmarks.metrics import find_metric
+from benchmarks.metrics.cost.microbenchmarks import METRICS, PROCESS_MEMORY
 from benchmarks.performance import convergence, garment, inference, left_out, sheet, training_step
 from benchmarks.performance.convergence import HELD_OUT
-from benchmarks.performance.metrics import METRICS, PROCESS_MEMORY
 from benchmarks.performance.microbenchmark import Microbenchmark, Settings
 from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan.plan import Motions, Plan, PlanError

@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.assets.liveliest_part import clip, joint_speeds
+from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods import find_method
 from benchmarks.metrics.surface import body_shape
 from benchmarks.plan.plan import network_of
@@ -21,8 +22,6 @@ from benchmarks.runner.cache import dependencies
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import FURTHER, GARMENT_SCENES, SCENES, all_scenes
 from benchmarks.scenes.free_fall import exact_fall
-from benchmarks.scenes.sheet import square_sheet
-from benchmarks.scenes.sheet_on_sphere import sphere
 from benchmarks.scenes.variations import SHAPES, shapes
 from reference_sim import simulate
 from snug.body.parametric_body import Body

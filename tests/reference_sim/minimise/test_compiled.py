@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.assets import open_assets
+from benchmarks.meshes import sphere, square_sheet
 from benchmarks.presets import find_preset
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import of_garment
 from benchmarks.scenes.long_motion import there_and_back
 from benchmarks.scenes.out_of_distribution import faster
-from benchmarks.scenes.sheet import square_sheet
-from benchmarks.scenes.sheet_on_sphere import sphere
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import AreaBarrier, BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import LBFGS, Newton, lbfgs

@@ -1,24 +1,24 @@
-"""What microbenchmarks measure. See benchmarks.metric for what a declaration says."""
+"""Metrics of microbenchmarks: times, sizes and memory under `performance/`; performance/ measures them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from benchmarks.metric import Metric
-from benchmarks.performance.microbenchmark import SUITE
 
-PROCESS_MEMORY = f"{SUITE}/process_memory"
+PART = "performance"  # the suite of benchmarks.performance, which lies above this room
+PROCESS_MEMORY = f"{PART}/process_memory"
 
 
 def _metrics(*declared: Metric, table: str = "") -> tuple[Metric, ...]:
     """These metrics as columns of the table of that part."""
-    name = f"{SUITE}_{table}" if table else SUITE
+    name = f"{PART}_{table}" if table else PART
     return tuple(replace(metric, table=name) for metric in declared)
 
 
 def _metric(name: str, unit: str, title: str, definition: str, lower_is_better: bool | None = True) -> Metric:
     return Metric(
-        name=f"{SUITE}/{name}", unit=unit, title=title, definition=definition, lower_is_better=lower_is_better
+        name=f"{PART}/{name}", unit=unit, title=title, definition=definition, lower_is_better=lower_is_better
     )
 
 

@@ -1,4 +1,4 @@
-"""Meshes of the plane in five families of triangles, and of surfaces whose curvature is known."""
+"""Meshes made by formula, for scenes and checks: sheets, families of plane triangles, spheres, tori."""
 
 from __future__ import annotations
 
@@ -154,3 +154,52 @@ def _crossed(points: np.ndarray, rows: int, columns: int) -> tuple[np.ndarray, n
     return np.concatenate([points, centres]), np.concatenate(
         [np.stack([one, other, middle], 1) for one, other in sides]
     )
+
+
+def square_sheet(cells: int, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """A horizontal square of `size` [m] about the origin, facing up: positions (V,3), faces (F,3)."""
+    return sheet((cells, cells), (size, size))
+
+
+def sheet(cells: tuple[int, int], size: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """A horizontal rectangle of that size along x and z [m], facing up: positions (V,3), faces (F,3).
+
+    The vertices of a regular grid are nudged by up to a quarter of a cell inside the rectangle and the
+    diagonals alternate, so that no direction of the mesh is special. Vertex i * (cells[1] + 1) + j is the
+    j-th along z of the i-th row along x.
+    """
+    rows, columns = cells[0] + 1, cells[1] + 1
+    i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
+    nudge = np.random.default_rng(0).uniform(-0.25, 0.25, (2, rows, columns))
+    nudge[:, [0, -1], :] = 0.0
+    nudge[:, :, [0, -1]] = 0.0
+    x = size[0] * ((i + nudge[0]) / cells[0] - 0.5)
+    z = size[1] * ((j + nudge[1]) / cells[1] - 0.5)
+    positions = np.stack([x, np.zeros_like(x), z], axis=-1).reshape(-1, 3)
+
+    a = (i[:-1, :-1] * columns + j[:-1, :-1]).ravel()
+    b, c, d = a + columns, a + columns + 1, a + 1
+    even = ((i + j)[:-1, :-1].ravel() % 2 == 0)[:, None]
+    first = np.where(even, np.stack([a, c, b], 1), np.stack([a, d, b], 1))
+    second = np.where(even, np.stack([a, d, c], 1), np.stack([b, d, c], 1))
+    return positions, np.concatenate([first, second])
+
+
+def sphere(radius: float, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """A closed sphere about the origin: positions (B,3) [m], outward faces (Fb,3).
+
+    A cube of `cells` x `cells` squares a side, pushed out to the radius; tan evens the squares out.
+    """
+    ticks = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
+    u, v = np.meshgrid(ticks, ticks, indexing="ij")
+    one = np.ones_like(u)
+    sides = [np.roll(np.stack([one * s, u, v * s], -1), k, axis=-1) for k in range(3) for s in (-1.0, 1.0)]
+    points = np.concatenate([side.reshape(-1, 3) for side in sides])
+    a = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    b, c, d = a + cells + 1, a + cells + 2, a + 1
+    square = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    faces = np.concatenate([square + k * (cells + 1) ** 2 for k in range(6)])
+    # Points on the cube's edges were made once for each side: keep one of each.
+    _, first, inverse = np.unique(np.round(points, 12) + 0.0, axis=0, return_index=True, return_inverse=True)
+    points, faces = points[first], inverse.ravel()[faces]
+    return radius * points / np.linalg.norm(points, axis=1, keepdims=True), faces
