@@ -16,7 +16,7 @@ from benchmarks.contract.findings import Findings
 from benchmarks.method import Method, MethodEntry
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.task import Context
-from benchmarks.validation.loads import DeadLoad
+from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Trajectory
 from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE, SCENE_FILE, TINY, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene

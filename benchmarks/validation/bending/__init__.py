@@ -1,1 +1,1 @@
-"""Known answers: bending."""
+"""Known answers: hinges against closed forms, plates and the elastica. `cases.py` declares them."""

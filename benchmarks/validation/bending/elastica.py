@@ -15,8 +15,8 @@ import scipy.sparse.linalg as spla
 from scipy.integrate import solve_bvp
 
 from benchmarks.meshes import FAMILIES, ROW, in_space, rectangle
-from benchmarks.validation.converged import converged
-from benchmarks.validation.loads import DeadLoad
+from benchmarks.validation.convergence import demand_converged
+from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
 
@@ -113,7 +113,7 @@ def bent_strip(family: str, weight: float, load: float) -> tuple[np.ndarray, np.
     guess[free, 1] = -np.interp(rest[free, 0], s, drop)
     strength = (weight + load) * made.D / MATERIAL.areal_density / 9.81
     result = minimise(Potential(energies), guess, tolerance=1e-6 * strength)
-    converged(result, f"the strip of {family} triangles")
+    demand_converged(result, f"the strip of {family} triangles")
     end = result.positions[tip(cloth)].mean(axis=0)
     return np.array([end[0], -end[1]]), np.array([x[-1], drop[-1]])
 

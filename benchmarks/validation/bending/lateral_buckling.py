@@ -12,8 +12,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from benchmarks.meshes import ROW, in_space, rectangle
-from benchmarks.validation.converged import converged
-from benchmarks.validation.loads import DeadLoad
+from benchmarks.validation.convergence import demand_converged
+from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, StretchStVK
 
@@ -49,7 +49,9 @@ def _ratio(rows: int) -> float:
     strain, stiff = StretchStVK(cloth), BendHinge(cloth)
     stiff.stiffness = 1e5 * stiff.stiffness  # keeps the loaded strip in its plane, where hinges do no work
     in_plane = Potential([strain, stiff, DeadLoad(cloth, forces)])
-    flat = converged(minimise(in_plane, cloth.rest_positions, tolerance=1e-9), "the strip in its plane")
+    flat = demand_converged(
+        minimise(in_plane, cloth.rest_positions, tolerance=1e-9), "the strip in its plane"
+    )
     free = np.setdiff1d(np.arange(len(points)), cloth.pins)
 
     def out_of_plane(potential: Potential, x: np.ndarray) -> sp.csc_matrix:

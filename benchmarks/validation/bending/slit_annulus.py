@@ -14,8 +14,8 @@ from functools import cache
 import numpy as np
 
 from benchmarks.meshes import rectangle
-from benchmarks.validation.converged import converged
-from benchmarks.validation.loads import DeadLoad
+from benchmarks.validation.convergence import demand_converged
+from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, StretchStVK
 
@@ -55,5 +55,5 @@ def _lifted() -> tuple[float, float]:
     for stage in range(1, STAGES + 1):
         forces[lip, 1] = LOAD * share * (stage / STAGES) ** 2
         potential = Potential([StretchStVK(cloth), BendHinge(cloth), DeadLoad(cloth, forces)])
-        x = converged(minimise(potential, x, tolerance=1e-4), f"the plate at stage {stage}").positions
+        x = demand_converged(minimise(potential, x, tolerance=1e-4), f"the plate at stage {stage}").positions
     return float(x[lip[0], 1]), float(x[lip[-1], 1])

@@ -1,1 +1,1 @@
-"""Known answers: contact."""
+"""Known answers: contact without friction on a plane, a sphere and a drum. `cases.py` declares them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.meshes import in_space, jittered_patch
-from benchmarks.validation.converged import converged
+from benchmarks.validation.convergence import demand_converged
 from reference_sim import Cloth, Material, Obstacle, Potential, minimise
 from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
 from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
@@ -47,7 +47,7 @@ def _sheet_at_rest(samples: str) -> tuple[ContactPenalty, np.ndarray, float]:
     still = np.zeros_like(start)
     contact.prepare(Step(previous=start, velocity=still, guess=start, dt=1 / 30, obstacle=floor))
     potential = Potential([StretchStVK(cloth), Gravity(cloth), contact])
-    result = converged(minimise(potential, start), "the sheet")
+    result = demand_converged(minimise(potential, start), "the sheet")
     return contact, result.positions, material.areal_density
 
 

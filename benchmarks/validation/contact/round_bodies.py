@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.meshes import in_space, right_grid
-from benchmarks.validation.converged import converged
-from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
 from reference_sim.energies.contact_penalty import DEFAULT_MARGIN, DEFAULT_STIFFNESS
@@ -86,7 +85,7 @@ def _leaving(rate: int) -> float:
         start=start,
         guess="extrapolated",
     )
-    converged(trajectory, "the slide")
+    demand_converged(trajectory, "the slide")
     middle = trajectory.positions.mean(axis=1)
     cosine = middle[:, 1] / np.linalg.norm(middle, axis=1)
     outside = np.linalg.norm(trajectory.positions, axis=2) - RADIUS
@@ -137,7 +136,7 @@ def _strip_on_drum() -> tuple[np.ndarray, ...]:
         contact.prepare(still)
         result = minimise(potential, x, tolerance=1e-9)
         x = result.positions
-    converged(result, "the strip")
+    demand_converged(result, "the strip")
     return _profiles(cloth, contact, x, points, weight)
 
 

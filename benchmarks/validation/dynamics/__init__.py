@@ -1,1 +1,1 @@
-"""Known answers: dynamics."""
+"""Known answers: backward Euler against its discrete laws, and orders in dt. `cases.py` declares them."""

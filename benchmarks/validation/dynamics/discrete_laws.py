@@ -11,7 +11,7 @@ from benchmarks.meshes import in_space, jittered_patch, right_grid
 from benchmarks.scene import Scene
 from benchmarks.scenes import free_fall as fall
 from benchmarks.scenes import hanging_sheet
-from benchmarks.validation.converged import converged
+from benchmarks.validation.convergence import demand_converged
 from reference_sim import Cloth, Material, Potential, Trajectory, minimise, simulate
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 
@@ -61,7 +61,7 @@ def moving_pins_in_substeps() -> float:
 
     def run(**options: Any) -> np.ndarray:
         trajectory = simulate(scene.cloth, scene.energies, start=scene.start, **options)
-        return converged(trajectory, "the pulled sheet").positions
+        return demand_converged(trajectory, "the pulled sheet").positions
 
     coarse = run(dt=scene.dt, frames=frames, substeps=steps, pin_positions=lambda n: places + pulled[n])
     fine = run(dt=scene.dt / steps, frames=steps * (frames - 1) + 1, pin_positions=between)
@@ -144,7 +144,7 @@ def _thrown_sheet() -> tuple[Trajectory, Cloth]:
         start=start,
         velocity=random.normal(0, 0.5, start.shape),
     )
-    return converged(trajectory, "the simulation"), cloth
+    return demand_converged(trajectory, "the simulation"), cloth
 
 
 def unique_step() -> float:
@@ -179,7 +179,7 @@ def _step_from_random_starts(share: float) -> list[np.ndarray]:
     ends = []
     for _ in range(2):
         start = random.uniform(-SPACING * cells, SPACING * cells, cloth.rest_positions.shape)
-        ends.append(converged(minimise(potential, start, tolerance=1e-12), "the step").positions)
+        ends.append(demand_converged(minimise(potential, start, tolerance=1e-12), "the step").positions)
     return ends
 
 
@@ -191,7 +191,7 @@ def energy_inequality() -> float:
     """
     scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10)
     trajectory = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=20, start=scene.start)
-    converged(trajectory, "the simulation")
+    demand_converged(trajectory, "the simulation")
     return _largest_rise(trajectory, scene.cloth, scene.energies, scene.dt)
 
 

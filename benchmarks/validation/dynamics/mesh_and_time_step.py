@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.metrics.surface.curvature import curvature_series
 from benchmarks.scenes import hanging_sheet
-from benchmarks.validation.converged import converged
+from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dynamics.discrete_laws import HANGING
 from reference_sim import simulate
 
@@ -33,7 +33,7 @@ def _means(cells: int, substeps: int) -> dict[str, float]:
     trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=FRAMES, start=scene.start, substeps=substeps
     )
-    converged(trajectory, "the simulation")
+    demand_converged(trajectory, "the simulation")
     fields = trajectory.frame_fields
     curvature = curvature_series(trajectory.positions[1:], trajectory.faces).means()
     return {

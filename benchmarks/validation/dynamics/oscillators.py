@@ -13,8 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
 from benchmarks.meshes import random_rotation
-from benchmarks.validation.converged import converged
-from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim import Cloth, Material, simulate
 from reference_sim.energies import Gravity, StretchStVK
 from reference_sim.material import GRAVITY
@@ -39,7 +38,7 @@ def _simulated_pendulum(start: np.ndarray, dt: float, frames: int, *, gravity: f
     x[2, :2] = start
     energies = [StretchStVK(cloth), Gravity(cloth, acceleration=gravity)]
     trajectory = simulate(cloth, energies, dt=dt, frames=frames, start=x, tolerance=1e-11)
-    return converged(trajectory, "the simulation").positions[:, 2, :2]
+    return demand_converged(trajectory, "the simulation").positions[:, 2, :2]
 
 
 def pendulum() -> float:
@@ -105,7 +104,7 @@ def rotor() -> float:
     trajectory = simulate(
         cloth, [StretchStVK(cloth)], dt=dt, frames=61, velocity=velocity @ turn.T, tolerance=1e-11
     )
-    converged(trajectory, "the simulation")
+    demand_converged(trajectory, "the simulation")
     area = cloth.areas.sum()
     rigidity = 2 * (SOFT.lame_lambda + SOFT.lame_mu) * area / 6  # for each vertex of the ring
     mass = SOFT.areal_density * area / 9  # two thirds of a triangle

@@ -15,9 +15,8 @@ import numpy as np
 from benchmarks.meshes import sheet, square_sheet
 from benchmarks.scenes import hanging_sheet
 from benchmarks.validation.contact.round_bodies import RoundBody
-from benchmarks.validation.converged import converged
+from benchmarks.validation.convergence import demand_converged, fitted_order
 from benchmarks.validation.dynamics.discrete_laws import HANGING, stretched_membrane
-from benchmarks.validation.fitted_order import fitted_order
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Step, StretchStVK
 from reference_sim.obstacle import Planes
@@ -42,7 +41,7 @@ def swing_order() -> float:
     upright = np.stack([flat[:, 2], -flat[:, 0], flat[:, 1]], axis=1)
     cloth = Cloth(upright, faces, Material(), pins=np.arange(7))
     energies = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
-    hanging = converged(minimise(Potential(energies), upright), "the hanging sheet").positions
+    hanging = demand_converged(minimise(Potential(energies), upright), "the hanging sheet").positions
     cosine, sine = np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20))
     turn = np.array([[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]])
     edge = upright[0] * [0, 1, 0]
@@ -156,4 +155,4 @@ def _end(
 ) -> np.ndarray:
     """Positions (V,3) [m] after `end` [s] in n steps, from rest."""
     trajectory = simulate(cloth, energies, dt=end / n, frames=n + 1, start=start, **options)
-    return converged(trajectory, "the simulation").positions[-1]
+    return demand_converged(trajectory, "the simulation").positions[-1]

@@ -1,1 +1,1 @@
-"""Known answers: friction."""
+"""Known answers: Coulomb friction on planes and drums. `cases.py` declares them."""

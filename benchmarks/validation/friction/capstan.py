@@ -18,8 +18,7 @@ import numpy as np
 
 from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.contact.round_bodies import DRUM, SLACK, RoundBody, wrapped
-from benchmarks.validation.converged import converged
-from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim import Cloth, Material, simulate
 from reference_sim.energies import ContactFriction, ContactPenalty, StretchStVK
 from reference_sim.energies.contact_penalty import DEFAULT_MARGIN
@@ -86,7 +85,7 @@ def _excess(mu: float, stiffness: float, columns: int) -> float:
         quasi_static=True,
         tolerance=1e-9,
     )
-    x = converged(trajectory, "the strip").positions[-1]
+    x = demand_converged(trajectory, "the strip").positions[-1]
     strain = StretchStVK(cloth).value_and_gradient(x)[1]
     pulls = [float(np.linalg.norm(strain[end].sum(axis=0))) for end in (left, right)]
     line = x.reshape(3, columns + 1, 3).mean(axis=0)

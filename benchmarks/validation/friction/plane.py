@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.contact.plane import box
-from benchmarks.validation.converged import converged
+from benchmarks.validation.convergence import demand_converged
 from reference_sim import Cloth, Material, Obstacle, simulate
 from reference_sim.energies import ContactFriction, ContactPenalty, Gravity, StretchStVK
 from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
@@ -146,4 +146,4 @@ def slid(
         substeps=substeps,
         tolerance=SOLVED,
     )
-    return converged(trajectory, "the slide").positions
+    return demand_converged(trajectory, "the slide").positions

@@ -1,1 +1,1 @@
-"""Known answers: membrane."""
+"""Known answers: the membrane against closed forms and scikit-fem. `cases.py` declares them."""

@@ -11,8 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from benchmarks.meshes import in_space, right_grid
-from benchmarks.validation.converged import converged
-from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import Gravity, StretchStVK
 from reference_sim.material import GRAVITY
@@ -101,4 +100,4 @@ def _catenary(columns: int) -> tuple[float, float]:
 
 def _at_rest(cloth: Cloth, start: np.ndarray) -> tuple[Potential, np.ndarray]:
     potential = Potential([StretchStVK(cloth), Gravity(cloth)])
-    return potential, converged(minimise(potential, start, tolerance=1e-9), "the strip").positions
+    return potential, demand_converged(minimise(potential, start, tolerance=1e-9), "the strip").positions

@@ -14,9 +14,8 @@ from functools import cache
 import numpy as np
 
 from benchmarks.meshes import in_space, jittered_patch
-from benchmarks.validation.converged import converged
-from benchmarks.validation.fitted_order import fitted_order
-from benchmarks.validation.loads import DeadLoad
+from benchmarks.validation.convergence import demand_converged, fitted_order
+from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import StretchStVK
 
@@ -82,7 +81,7 @@ def _errors(cells: int) -> tuple[float, float]:
     border = (np.abs(points - 0.5) > 0.5 - 1e-9).any(axis=1)
     cloth = Cloth(in_space(points), faces, material, pins=np.flatnonzero(border))
     potential = Potential([StretchStVK(cloth), DeadLoad(cloth, forces.assemble(basis)[numbers])])
-    result = converged(minimise(potential, surface(*points.T).T), "the membrane")
+    result = demand_converged(minimise(potential, surface(*points.T).T), "the membrane")
     state = np.zeros(basis.N)
     state[numbers.ravel()] = result.positions.ravel()
     field = basis.interpolate(state)

@@ -1,1 +1,1 @@
-"""Known answers: solvers."""
+"""Known answers: derivatives of all terms, and properties of the minimisers. `cases.py` declares them."""

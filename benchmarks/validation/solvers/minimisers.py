@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.meshes import in_space, jittered_patch, right_grid
-from benchmarks.validation.converged import converged
-from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim import Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
 
@@ -19,14 +18,16 @@ def work_on_a_quadratic() -> float:
     cloth = _patch(5)
     inertia = Inertia(cloth, 1 / 30)
     inertia.x_hat = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.1, cloth.rest_positions.shape)
-    result = converged(minimise(Potential([inertia, Gravity(cloth)]), cloth.rest_positions), "the minimiser")
+    result = demand_converged(
+        minimise(Potential([inertia, Gravity(cloth)]), cloth.rest_positions), "the minimiser"
+    )
     return float(result.factorisations)
 
 
 def newton_order() -> float:
     """Slope of log error over log of the error before it, on the last steps of a stretched sheet."""
     potential, start = _stretched()
-    end = converged(minimise(potential, start, tolerance=1e-13), "the minimiser").positions
+    end = demand_converged(minimise(potential, start, tolerance=1e-13), "the minimiser").positions
     errors = [
         float(np.abs(minimise(potential, start, max_iterations=k, tolerance=1e-13).positions - end).max())
         for k in range(1, 12)
@@ -81,7 +82,7 @@ def small_gradient() -> float:
     cloth = Cloth(flat, faces[:, ::-1], material, pins=np.flatnonzero(points[:, 0] < 0.06))
     potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth, acceleration=3e-6)])
     results = [minimise(potential, flat, tolerance=tolerance) for tolerance in (1e-6, 1e-10)]
-    loose, tight = (converged(result, "the minimiser").positions for result in results)
+    loose, tight = (demand_converged(result, "the minimiser").positions for result in results)
     if np.abs(tight - flat).max() < 0.005:
         raise RuntimeError("the strip hardly sags: nothing is proved")
     return float(np.linalg.norm(loose - tight, axis=1).max() / cloth.edge_lengths.mean())
@@ -96,7 +97,7 @@ def negative_curvature() -> float:
     border = (points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9)
     cloth = Cloth(0.3 * in_space(points), faces, Material(), pins=np.flatnonzero(border))
     potential = Potential([StretchStVK(cloth), BendHinge(cloth)])
-    result = converged(minimise(potential, cloth.rest_positions * [0.9, 1.0, 1.0]), "the minimiser")
+    result = demand_converged(minimise(potential, cloth.rest_positions * [0.9, 1.0, 1.0]), "the minimiser")
     free = np.repeat(~border, 3)
     values = np.linalg.eigvalsh(potential.hessian(result.positions).toarray()[np.ix_(free, free)])
     return float((values < -1e-9 * values[-1]).sum())
@@ -105,7 +106,7 @@ def negative_curvature() -> float:
 def lbfgs_distance() -> float:
     """Distance [m] of the end of L-BFGS, not finished by Newton, to Newton's; there is one minimiser."""
     potential, start = _stretched()
-    newton = converged(minimise(potential, start, tolerance=1e-12), "the minimiser").positions
+    newton = demand_converged(minimise(potential, start, tolerance=1e-12), "the minimiser").positions
     result = minimise(potential, start, "lbfgs", finish=False, max_iterations=LBFGS_STEPS, tolerance=1e-12)
     return float(np.linalg.norm(result.positions - newton, axis=1).max())
 

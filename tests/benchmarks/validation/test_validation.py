@@ -12,8 +12,8 @@ from benchmarks.plan.plan import Motions
 from benchmarks.plan.selection import Request, choose
 from benchmarks.presets import find_preset
 from benchmarks.validation.case import Case
+from benchmarks.validation.convergence import fitted_order
 from benchmarks.validation.dynamics.time_steps import VISCOSITY, Viscosity, halving_order
-from benchmarks.validation.fitted_order import fitted_order
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
 from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import Step
@@ -35,7 +35,7 @@ def test_there_are_enough_of_every_kind():
     assert all(case.reason for case in KNOWN_ANSWERS)
     # A number is judged against a number: declared, or solved by the check itself.
     modules = {case.module.rpartition(".")[2] for case in judged if case.expected is None}
-    assert modules <= {"membrane", "oscillators", "statics", "clamped_stretch"}
+    assert modules <= {"closed_forms", "oscillators", "hanging_strip", "clamped_stretch"}
 
 
 def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
@@ -65,11 +65,11 @@ def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
     ],
 )
 def test_how_a_number_is_judged(monkeypatch, found, expected, tolerance, status):
-    from benchmarks.validation import curvature
+    from benchmarks.validation.curvature import known_surfaces
 
-    monkeypatch.setattr(curvature, "torus_order", lambda: found)
+    monkeypatch.setattr(known_surfaces, "torus_order", lambda: found)
     case = Case(
-        name="planted", description="", reason="planted", module=curvature.__name__, function="torus_order",
+        name="planted", description="", reason="planted", module=known_surfaces.__name__, function="torus_order",
         expected=expected, tolerance=tolerance,
     )  # fmt: skip
     row = case.run()

@@ -1,8 +1,24 @@
-"""Known answers by a reference that is solved independently, by scipy or scikit-fem, in the case itself."""
+"""Cases of the hinges: folds, plates, the elastica, buckling and torsion."""
 
 from __future__ import annotations
 
 from benchmarks.validation.case import known_answer
+
+FOLDS = (
+    *(
+        known_answer(f"hinges_folded_{title}",
+            f"bending energy of a folded strip, {title}, over its closed form",
+            "bending.hinges", "folded", options={"scaling": scaling, "fold": fold}, expected=1.0,
+            tolerance=1e-12, reason="round-off")
+        for title, scaling, fold in (("unscaled", "none", 0.3), ("scaled", "length_area", -1.2))
+    ),
+    known_answer("hinges_past_half_a_turn",
+        "bending energy of folds of -3 rad with rest angles of 3 rad: the short way is 2 pi - 6",
+        "bending.hinges", "past_half_a_turn", expected=1.0, tolerance=1e-12, reason="round-off"),
+    known_answer("hinges_rest_shape_force", "largest force in a folded strip that was made folded",
+        "bending.hinges", "rest_shape_force", unit="N", expected=0.0, tolerance=1e-14,
+        reason="round-off of angles times k over a cell of 0.1 m"),
+)  # fmt: skip
 
 # C11/k of a lattice is rational or sqrt(3)/2: see plates.py.
 PLATES = (
@@ -63,56 +79,15 @@ ELASTICA = (
     ),
 )  # fmt: skip
 
-OTHERS = (
-    known_answer("clamped_stretch_force",
-        "pull on a square sheet stretched by 1.2 between clamps, against P2 of scikit-fem",
-        "membrane.clamped_stretch", "force", unit="N", tolerance=0.01, smoke=False,
-        reason="32 cells beside the singular corners of the clamps"),
-    known_answer("clamped_stretch_neck", "its width half-way between the clamps",
-        "membrane.clamped_stretch", "neck", unit="m", tolerance=3e-4, smoke=False,
-        reason="32 cells beside the singular corners of the clamps"),
-    known_answer("drum_tension",
-        "tension along a strip over a frictionless cylinder, worst error over the mean",
-        "contact.round_bodies", "drum_tension", expected=0.0, tolerance=5e-3,
-        reason="120 cells, and one of contact at each end of the arc"),
-    known_answer("drum_pressure", "mean contact pressure over (tension/R + w cos phi)",
-        "contact.round_bodies", "drum_pressure", expected=1.0, tolerance=2e-3,
-        reason="120 cells; the strip's depth in the margin over R"),
-    *(
-        known_answer(f"friction_capstan_{name}",
-            f"pull on the tight end of a strip over a turning drum over that on the slack one, mu = {mu:g}, "
-            "over exp(mu phi)",
-            "friction.capstan", "ratio", options={"mu": mu}, expected=1.0, tolerance=1e-3,
-            reason="60 cells: mu (1 + mu^2) phi b^2 / 12, at most 8e-4")
-        for name, mu in (("rough", 0.5), ("smooth", 0.1))
-    ),
-    known_answer("friction_capstan_order", "order of its error in the length of a cell",
-        "friction.capstan", "order", expected=2.0, tolerance=0.2,
-        reason="the strip's depth in the margin over R is left"),
-    known_answer("friction_capstan_soft", "the same ratio with the contact stiffness of garments",
-        "friction.capstan", "ratio", options={"mu": 0.5, "stiffness": 3.4e6},
-        reason="reported: the strip sinks by a millimetre of R = 200 towards its tight end"),
-    known_answer("friction_strip_pull",
-        "pull on the end of a strip that sticks to a table, worst error over mu times its weight",
-        "friction.pull", "strip_pull", expected=0.0, tolerance=1e-3,
-        reason="40 cells, and which of them slides last"),
-    known_answer("friction_strip_slide", "pull on that strip once all of it slides, over mu times its weight",
-        "friction.pull", "strip_slide", expected=1.0, tolerance=1e-5,
-        reason="its vertices move aside a little: all diagonals lean one way"),
-    known_answer("leaving_point",
-        "cos theta where a point leaves a sphere, over 2/3 cos theta_0, extrapolated in dt",
-        "contact.round_bodies", "leaving_point", expected=1.0, tolerance=2e-3,
-        reason="second order in dt; the point's depth over R"),
+TORSION = (
     known_answer("lateral_buckling", "buckling load of a strip on edge, over 4.0126 (EI GJ)^0.5 / L^2",
         "bending.lateral_buckling", "critical_load", expected=1.0, tolerance=0.03, smoke=False,
         reason="the clamp holds back warping over a width, 4 % of the length"),
     *(
         known_answer(f"slit_annulus_{corner}",
             f"lift of the {corner} corner of a slit annular plate; expected: shells (Sze 2004)",
-            "bending.slit_annulus", "corner", options={"which": corner}, unit="m", expected=expected, smoke=False,
-            reason="reported: hinges are too stiff in torsion by a half")
+            "bending.slit_annulus", "corner", options={"which": corner}, unit="m", expected=expected,
+            smoke=False, reason="reported: hinges are too stiff in torsion by a half")
         for corner, expected in (("inner", 13.891), ("outer", 17.528))
     ),
 )  # fmt: skip
-
-CASES = (*STIFFNESS, *SUPPORTED, *ELASTICA, *OTHERS)

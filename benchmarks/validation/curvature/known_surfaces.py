@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.meshes import cylinder_patch, icosphere, rectangle, torus
 from benchmarks.metrics.surface.curvature import boundary_mask, mean_curvature
-from benchmarks.validation.fitted_order import fitted_order
+from benchmarks.validation.convergence import fitted_order
 
 
 def sphere_curvature() -> float:
