@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from benchmarks.scene import BuiltScene, Dressed, Scene
+    from benchmarks.training import Training
     from reference_sim import Trajectory
-    from snug.recipes.named import Training
 
 
 class Method:
@@ -78,7 +78,7 @@ class MethodEntry:
     package; empty for those of the project, and filled in where it is read. files: what it reads besides,
     beside that file, so that a run knows when one has changed.
     needs_body: whether it works on dressed scenes alone. trained: the name of the network it needs, if any;
-    training: how that is trained, where snug.recipes.named.TRAININGS does not have it.
+    training: how that is trained, where benchmarks.methods.catalogue.trainings does not have it.
     seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
     dtype: the numbers it computes with; trajectories and metrics are float64 in any case.
     needs_no_obstacle: whether it knows no contact. package: what it needs installed besides this project.

@@ -59,7 +59,7 @@ class Preset:
     smallest: bool = False
 
     def steps_of(self, training: str, kind: str) -> int:
-        """Optimiser steps of that training of snug.recipes.named, by its kind; 0 for an untrained network."""
+        """Optimiser steps of a training (benchmarks.methods.catalogue.trainings), by its kind; 0 for an untrained network."""
         return self.steps.get(training, self.steps.get(kind, 0))
 
 

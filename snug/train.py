@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from reference_sim.command.command_line import command
 from snug.garments.options import demand_garment_file, is_garment_file, make_garment_file
 from snug.motion.options import parse_motion_options
-from snug.recipes.named import TRAININGS, find_recipe
+from snug.recipes.named import RECIPE_OF_KIND, find_recipe
 from snug.training.options import check, parse
 
 if TYPE_CHECKING:
@@ -154,6 +154,7 @@ def _train_one(
     stop: Callable[[], bool],
 ) -> None:
     from snug.networks.dressed_body import DressedBody
+    from snug.networks.trained_model import find_kind
     from snug.training.run import Saving
     from snug.training.simulated_data import settings_of
     from snug.training.tensorboard_log import TensorBoardLog
@@ -171,7 +172,7 @@ def _train_one(
     dressed = DressedBody(body, template.tailor(body, vertices=options.vertices))
     if data:
         data.check(settings_of(body, dressed.garment))
-    trajectories = data.targets() if data and TRAININGS[options.model].simulated else None
+    trajectories = data.targets() if data and not find_kind(options.model).physics else None
     learned_from = _digest(dressed, motions, held_out, trajectories or {})
     if options.resume and out.is_file() and not saving.path.is_file():
         _check_ended(out, options, dressed.vertices, learned_from)
@@ -209,7 +210,7 @@ def _train_one(
 
 def _recipe(options: argparse.Namespace) -> Recipe:
     """The one named, or the model's own."""
-    return find_recipe(options.recipe) if options.recipe else TRAININGS[options.model].recipe
+    return find_recipe(options.recipe) if options.recipe else RECIPE_OF_KIND[options.model]
 
 
 def _digest(

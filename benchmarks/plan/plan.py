@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.cell import Cell
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.presets import Preset
 from benchmarks.results.run_folder import LONGEST
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
-from snug.recipes.named import TRAININGS, Training
+from benchmarks.training import Training
 
 if TYPE_CHECKING:
     from benchmarks.performance.microbenchmark import Microbenchmark
@@ -29,7 +30,7 @@ class PlanError(ValueError):
 class Network:
     """A network that some cell needs: its name, its seed, the garment it is for.
 
-    own: how it is trained, where snug.recipes.named.TRAININGS does not have it; declared_in: where that is said.
+    own: how it is trained, where benchmarks.methods.catalogue.trainings does not have it; declared_in: where that is said.
     """
 
     name: str

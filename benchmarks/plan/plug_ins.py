@@ -19,9 +19,10 @@ from typing import Any
 from benchmarks.fingerprint.dependencies import code_of, find_module, place_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.registry import DeclarationError, by_name, demand_that_it_is, load
 from benchmarks.scene import Scene
-from snug.recipes.named import TRAININGS, Training
+from benchmarks.training import Training
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]*")
 

@@ -15,6 +15,7 @@ from benchmarks.fingerprint.dependencies import find_module
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.metrics import MODULE_OF, names_of
 from benchmarks.performance.microbenchmark import Microbenchmark, Settings
@@ -31,7 +32,7 @@ from benchmarks.tasks.microbenchmark import RunMicrobenchmark
 from benchmarks.tasks.task import Task
 from benchmarks.tasks.training import LONGEST, TrainNetwork
 from benchmarks.tasks.training_windows import SUITE, CompareWindows
-from snug.recipes.named import TRAININGS, Simulated
+from benchmarks.training import Simulated
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 TASKS = "benchmarks.tasks"

@@ -115,7 +115,7 @@ class SimulateClips(Task):
 
     scene: that of any motion in the garment; entry: the method that simulates; motions: those that are mixed.
     clips: a name of all of them; part: number of these: those that `part` + 1 mixed frames for each given one
-    have, and `part` have not; swinging: see snug.recipes.named.Simulated. Only clips that are whole and converged
+    have, and `part` have not; swinging: see benchmarks.training.Simulated. Only clips that are whole and converged
     are kept, and taught.
     """
 

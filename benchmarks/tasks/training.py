@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from benchmarks.assets.assets import Assets
+    from benchmarks.training import Training
     from snug.motion.motion import Motion
-    from snug.recipes.named import Training
 
 LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
 VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged

@@ -1,6 +1,6 @@
-"""Every choice in which the default recipe is not the paper's text, one by one: undone, or added to the text.
+"""Deviations of the default recipe from the paper's text, each of which can be undone or added alone.
 
-Together the deviations name every option in which the two recipes differ. Imports nothing heavy.
+Together they name every option in which the two recipes differ. Imports nothing heavy.
 """
 
 from __future__ import annotations
@@ -12,7 +12,13 @@ from snug.recipes.recipe import Recipe
 
 @dataclass(frozen=True)
 class Deviation:
-    """name: as part of a recipe's; options: of the recipe; words: what the default has, the text has not."""
+    """One deliberate difference between the default recipe and the paper's text.
+
+    Attributes:
+        name: part of the name of a recipe without it, or with it alone.
+        options: fields of Recipe that it changes.
+        words: what the default recipe has and the text has not, to be read behind "with" or "without".
+    """
 
     name: str
     options: tuple[str, ...]
@@ -38,14 +44,14 @@ DEVIATIONS = (
 )  # fmt: skip
 
 
-def with_and_without(default: Recipe, paper: Recipe) -> tuple[Recipe, ...]:
-    """`default` without each deviation, named "without-...", then `paper` with each, "paper-with-..."."""
+def exchange_deviations(default: Recipe, paper: Recipe) -> tuple[Recipe, ...]:
+    """Return `default` without each deviation ("without-..."), then `paper` with each ("paper-with-...")."""
     return (
-        *(_taken(d, default, paper, f"without-{d.name}") for d in DEVIATIONS),
-        *(_taken(d, paper, default, f"paper-with-{d.name}") for d in DEVIATIONS),
+        *(_with_options_of(d, default, paper, f"without-{d.name}") for d in DEVIATIONS),
+        *(_with_options_of(d, paper, default, f"paper-with-{d.name}") for d in DEVIATIONS),
     )
 
 
-def _taken(deviation: Deviation, recipe: Recipe, other: Recipe, name: str) -> Recipe:
-    """`recipe` with the options of the deviation as `other` has them."""
+def _with_options_of(deviation: Deviation, recipe: Recipe, other: Recipe, name: str) -> Recipe:
+    """Return `recipe` with the deviation's options taken from `other`."""
     return replace(recipe, name=name, **{option: getattr(other, option) for option in deviation.options})

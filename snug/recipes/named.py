@@ -1,15 +1,13 @@
-"""All named recipes, and which network each of them trains.
+"""Named recipes, and the recipe that each kind of network is trained by.
 
-`default` is what trains well on a CPU in minutes, `paper` is the paper's text but for its contact (below),
-the ablations are the default with one thing changed. No training depends on this list, but on its recipe
-alone: a line more here makes no finished network out of date.
+`default` trains well on a CPU in minutes, `paper` follows the paper's text except for its contact (see the
+comment below), the ablations are the default with one option changed.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from snug.recipes.deviations import with_and_without
 from snug.recipes.recipe import DEFAULT, TERMS, Recipe, RecipeError
 
 # Four things are not the text's: d(x) is taken to cached points of the skin, which walk with the cloth
@@ -100,50 +98,14 @@ ABLATIONS = (
 RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER, PBNS_SPRINGS, *ABLATIONS)}
 
 
-@dataclass(frozen=True)
-class Simulated:
-    """What is simulated for a training: the given motions, and mixed clips beside them.
-
-    mixed: frames of mixed clips for each given one, up to 20,000: the same clips for every training and seed,
-    see snug.training.motion_augmentation.shared_clips. swinging: they turn to and fro and stop, see
-    snug.training.swinging_clips. method: which method of the benchmark simulates.
-    """
-
-    mixed: int = 0
-    method: str = "simulation"
-    swinging: bool = False
-
-
-@dataclass(frozen=True)
-class Training:
-    """How a named model comes to be. kind: one of snug.networks.trained_model.KINDS. simulated: what it needs
-    trajectories of; None: of nothing.
-
-    steps_of: the training that has as many steps; empty: its own number. held_out: so many of the training
-    motions, the last, are not trained on, unless there are no more. converged: it goes on for several times
-    these steps, until the held-out motions get no better, and the weights that did best on them are kept.
-    """
-
-    kind: str
-    recipe: Recipe
-    simulated: Simulated | None = None
-    steps_of: str = ""
-    held_out: int = 0
-    converged: bool = False
-
-
-TRAININGS = {
-    "snug": Training("snug", DEFAULT),
-    "pbns": Training("pbns", DEFAULT),
-    "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    "supervised": Training("supervised", SUPERVISED, Simulated()),
-    "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
-    "tailornet": Training("tailornet", TAILORNET, Simulated()),
-    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
-    **{
-        f"snug-{recipe.name}": Training("snug", recipe)
-        for recipe in (PAPER, *ABLATIONS, *with_and_without(DEFAULT, PAPER))
-    },
+# The recipe that trains each kind of network (snug.training.kinds.KINDS) unless another is named.
+RECIPE_OF_KIND = {
+    "snug": DEFAULT,
+    "pbns": DEFAULT,
+    "supervised": SUPERVISED,
+    "santesteban2019": SANTESTEBAN2019,
+    "tailornet": TAILORNET,
+    "dynamic": DYNAMIC,
 }
 
 

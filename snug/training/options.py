@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from reference_sim.command.command_line import Parser
 from snug.garments.options import add_garment_options
 from snug.motion.options import add_motion_options
-from snug.recipes.named import RECIPES, TRAININGS
+from snug.recipes.named import RECIPES
 
 MODELS = ("snug", "pbns", "supervised", "santesteban2019", "tailornet")
 EXAMPLES = """examples:
@@ -100,9 +100,12 @@ def check(options: argparse.Namespace) -> None:
             raise ValueError(f"--{name.replace('_', '-')} {str(value)[:40]}: {wanted}")
     if options.dataset and options.motions:
         raise ValueError(f"--dataset {options.dataset}: has motions of its own; leave out --motions")
-    if TRAININGS[options.model].simulated and not options.dataset:
+    from snug.networks.trained_model import find_kind  # loads torch, which --help does without
+
+    simulated = not find_kind(options.model).physics
+    if simulated and not options.dataset:
         raise ValueError(f"--model {options.model}: is taught by simulations; add --dataset DIR")
-    if options.recipe and TRAININGS[options.model].simulated:
+    if options.recipe and simulated:
         raise ValueError(f"--recipe {options.recipe}: {options.model} has its own; leave out --recipe")
     if options.patience and not options.validation:
         raise ValueError(f"--patience {options.patience}: add --validation NAME, a motion to stop by")

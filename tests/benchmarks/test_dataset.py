@@ -22,6 +22,7 @@ from snug import train as train_command
 from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.tensor_file import TensorFileError
+from snug.recipes.named import RECIPE_OF_KIND
 from snug.training.run import Interrupted, Saving
 from snug.training.simulated_data import INDEX, MISSING, DataSet, DataSetError, settings_of
 from snug.training.train import train
@@ -315,8 +316,6 @@ def test_a_motion_of_other_length_is_refused(mine):
 
 def taught(built: Path, kind: str, *, stored: bool, steps: int = 3, **options):
     """A network of the data set, from the files or from memory."""
-    from snug.recipes.named import TRAININGS
-
     found = DataSet.read(built)
     trajectories: dict = found.targets()
     if not stored:
@@ -324,7 +323,7 @@ def taught(built: Path, kind: str, *, stored: bool, steps: int = 3, **options):
             line.name: Trajectory.load(built / line.trajectory).positions for line in found.sequences
         }
     return train(
-        kind, tube_dress(), found.motions(), steps=steps, seed=0, recipe=TRAININGS[kind].recipe,
+        kind, tube_dress(), found.motions(), steps=steps, seed=0, recipe=RECIPE_OF_KIND[kind],
         trajectories=trajectories, progress=False, every=1, **options,
     )  # fmt: skip
 

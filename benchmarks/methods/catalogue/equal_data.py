@@ -11,7 +11,8 @@ from dataclasses import replace
 
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.learned import cleaned, network
-from snug.recipes.named import TRAININGS, Simulated, Training
+from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.training import Simulated, Training
 
 # Mixed frames for each given one; between the ends for the curve of error against training frames.
 ENDS, CURVE = (0, 12), (0, 1, 3, 12)

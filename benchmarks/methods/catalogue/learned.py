@@ -12,7 +12,7 @@ from snug.recipes.named import ABLATIONS
 
 
 def network(name: str, label: str, description: str, **changes: Any) -> MethodEntry:
-    """The entry of a network that snug.recipes.named.TRAININGS knows under the same name."""
+    """The entry of a network that TRAININGS (benchmarks.methods.catalogue.trainings) knows under the same name."""
     fields: dict[str, Any] = {
         "name": name,
         "label": label,

@@ -63,5 +63,5 @@ class Network(Method):
 
 
 def make(*, models: Path, seed: int, kind: str, precision: str = "float32") -> Network:
-    """The network of that name, "untrained" or one of snug.recipes.named.TRAININGS, and seed."""
+    """The network of that name, "untrained" or one of benchmarks.methods.catalogue.trainings.TRAININGS, and seed."""
     return Network(model_path(models, kind, seed), precision)

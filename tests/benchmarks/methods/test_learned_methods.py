@@ -7,13 +7,14 @@ import torch
 
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.catalogue.learned import LEARNED
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import ABLATIONS, RECIPES, TRAININGS
+from snug.recipes.named import ABLATIONS, RECIPES
 from snug.recipes.recipe import TERMS
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 from tests.snug.training.dressing import swaying, tube_dress

@@ -16,6 +16,7 @@ import pytest
 import snug.training.train
 from benchmarks import provenance, run, speedup
 from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.metrics import find_metric
 from benchmarks.metrics.cost.microbenchmarks import METRICS, PROCESS_MEMORY
 from benchmarks.performance import convergence, garment, inference, left_out, sheet, training_step
@@ -37,7 +38,6 @@ from reports.run.rows import run_data
 from reports.tables.tables import make_tables
 from snug.motion.library import TEST, TRAIN
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import TRAININGS
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMOKE, QUICK = find_preset("smoke"), find_preset("quick")

@@ -25,8 +25,8 @@ from benchmarks.runner.schedule import Schedule
 from benchmarks.runner.task_inputs import declared
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.metric_task import measured
+from benchmarks.training import Training
 from reference_sim import Trajectory
-from snug.recipes.named import Training
 from snug.recipes.recipe import DEFAULT, RecipeError
 from tests.benchmarks.fingerprint.test_dependencies import forget
 from tests.benchmarks.plan.outside_files import (

@@ -11,6 +11,7 @@ import pytest
 from benchmarks import provenance
 from benchmarks.cell import Cell
 from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.make_plan import choose_garment
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.plan import Motions, Network, OwnGarment
@@ -18,9 +19,9 @@ from benchmarks.results.run_folder import RunFolder, digest_of_file
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks.metric_task import _training_poses
 from benchmarks.tasks.task import Context, Task
+from benchmarks.training import Simulated, Training
 from snug.garments.options import GarmentFile
 from snug.motion.library import make_motion
-from snug.recipes.named import TRAININGS, Simulated, Training
 from snug.recipes.recipe import DEFAULT, TERMS
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
 from tests.benchmarks.tasks.test_cell_tasks import plan_of

@@ -6,13 +6,13 @@ import dataclasses
 import time
 
 from benchmarks.assets.assets import Assets
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment
 from benchmarks.tasks.task import Context
 from benchmarks.tasks.training import TrainNetwork
-from snug.recipes.named import TRAININGS
 
 
 def small_scene(name: str, *, cells: int = 6, frames: int = 10) -> BuiltScene:

@@ -10,14 +10,15 @@ import pytest
 
 from benchmarks.cell import Cell
 from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks import ground_truth
 from benchmarks.tasks.ground_truth import SimulateClips, SimulateQuasiStatic
 from benchmarks.tasks.training import LONGEST, TrainNetwork
+from benchmarks.training import Simulated
 from reference_sim import Trajectory, simulate
 from reference_sim.files.array_file import read_arrays
-from snug.recipes.named import TRAININGS, Simulated
 from snug.recipes.recipe import DEFAULT
 from snug.training.motion_augmentation import FRAMES, mixed_for, shared_clips
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene, training

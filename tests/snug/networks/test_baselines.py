@@ -14,7 +14,7 @@ from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.tailornet import DROPOUT, FrequencyMixture, smoothed
 from snug.networks.trained_model import TrainedModel, make_network
-from snug.recipes.named import ABLATIONS, TRAININGS
+from snug.recipes.named import ABLATIONS, RECIPE_OF_KIND
 from snug.recipes.recipe import DEFAULT
 from snug.training.loss import PhysicsLoss
 from snug.training.pbns_material import SquaredContact, spring_terms
@@ -34,7 +34,7 @@ def puffed(motion):
 
 def taught(kind, steps, **changes):
     motion = swaying(24)
-    recipe = replace(TRAININGS[kind].recipe, **changes)
+    recipe = replace(RECIPE_OF_KIND[kind], **changes)
     model = train(
         kind, tube_dress(), [motion], steps=steps, seed=0, trajectories={motion.name: puffed(motion)},
         recipe=recipe, progress=False, every=10,
@@ -64,10 +64,10 @@ def test_same_seed_same_taught_weights_whatever_was_drawn_before(kind):
 
 
 def test_sizes_are_those_of_the_papers():
-    santesteban = make_network("santesteban2019", 151, 4, TRAININGS["santesteban2019"].recipe, seed=0)
+    santesteban = make_network("santesteban2019", 151, 4, RECIPE_OF_KIND["santesteban2019"], seed=0)
     fit, gru = 10 * 20 + 20 + 20 * 12 + 12, 3 * (1500 * (151 + 1500) + 2 * 1500)
     assert sum(p.numel() for p in santesteban.parameters()) == fit + gru + 1500 * 12 + 12
-    tailornet = make_network("tailornet", 151, 4, TRAININGS["tailornet"].recipe, seed=0)
+    tailornet = make_network("tailornet", 151, 4, RECIPE_OF_KIND["tailornet"], seed=0)
     inner = 1024 * 1024 + 1024 + 1024 * 12 + 12
     assert sum(p.numel() for p in tailornet.parameters()) == (151 + 1) * 1024 + (141 + 1) * 1024 + 2 * inner
 

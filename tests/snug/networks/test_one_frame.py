@@ -10,16 +10,15 @@ from snug.networks.one_frame import PRECISIONS, CompiledFrame, FramePlan, rounde
 from snug.networks.roll_out import predictions, roll_out, skinned_frames
 from snug.networks.tailornet import FrequencyMixture
 from snug.networks.trained_model import KINDS, TrainedModel, find_kind, make_network
-from snug.recipes.named import TRAININGS
+from snug.recipes.named import RECIPE_OF_KIND
 from tests.snug.training.dressing import swaying, tube_dress
 
-RECIPES = {training.kind: training.recipe for training in TRAININGS.values()}
 PINS = (3, 77)
 
 
 def random_model(kind: str) -> TrainedModel:
     """Nothing in it is zero or one: weights, biases, statistics of the inputs; two vertices are held."""
-    dressed, recipe = tube_dress(), RECIPES[kind]
+    dressed, recipe = tube_dress(), RECIPE_OF_KIND[kind]
     inputs = dressed.features(swaying(2), recipe, kind=find_kind(kind).features).shape[1]
     network = make_network(kind, inputs, dressed.vertices, recipe, seed=0, pins=PINS)
     generator = torch.Generator().manual_seed(1)

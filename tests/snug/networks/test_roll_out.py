@@ -9,7 +9,7 @@ import torch
 
 from snug.networks.roll_out import RollOutError, collected, frame_inputs, predictions, roll_out
 from snug.networks.trained_model import TrainedModel, find_kind, make_network
-from snug.recipes.named import PAPER, TRAININGS
+from snug.recipes.named import PAPER, RECIPE_OF_KIND
 from snug.recipes.recipe import DEFAULT
 from snug.training.train import untrained_model
 from tests.snug.training.dressing import swaying, tube_dress
@@ -82,11 +82,10 @@ def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_com
     assert seconds[1] > 0.03 > 3 * seconds[0]
 
 
-@pytest.mark.parametrize("kind", ["snug", "snug-dynamic", "pbns", "santesteban2019"])
+@pytest.mark.parametrize("kind", ["snug", "dynamic", "pbns", "santesteban2019"])
 def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind):
     dressed, motion = tube_dress(), swaying()
-    chosen = TRAININGS[kind]
-    model = untrained_model(chosen.kind, dressed, [motion], seed=0, recipe=chosen.recipe)
+    model = untrained_model(kind, dressed, [motion], seed=0, recipe=RECIPE_OF_KIND[kind])
     features = dressed.features(motion, model.recipe, kind=find_kind(model.kind).features)
     transforms, pelvis = dressed.transforms(motion.poses), dressed.pelvis(motion)
     make = frame_inputs(model, dressed, motion)

@@ -13,7 +13,7 @@ from snug.motion.motion import Motion, joint_speeds, turn_about_vertical
 from snug.networks.inputs import HISTORY, RATED, motion_history, motion_rates
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import DYNAMIC, TRAININGS
+from snug.recipes.named import DYNAMIC
 from snug.training.motion_augmentation import mixed_motions, shared_clips
 from snug.training.simulated_past import NEARNESS, SimulatedPast
 from snug.training.swinging_clips import BETWEEN, FASTEST, HELD, SPEEDS, swinging_motion
@@ -122,7 +122,6 @@ def test_training_brings_the_swing_into_the_file(tmp_path):
     motions = [swaying(30), swaying(26, name="other", degrees=15.0)]
     trajectories = {motion.name: thrown(motion, 0.05) for motion in motions}
     rows: list[dict[str, float]] = []
-    assert TRAININGS["snug-dynamic"].simulated
     model = train(
         "dynamic", tube_dress(), motions, steps=16, seed=1, recipe=SMALL, trajectories=trajectories,
         log=rows.append, progress=False, every=4,

@@ -1,14 +1,14 @@
-"""Deviations of the recipe: every option in which the recipes differ, as methods, and never a test motion."""
+"""Deviations of the recipe as methods: named, never chosen by test motions, equal in steps."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import fields
 
 import pytest
 
 from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.motion_roles import choose_motions
 from benchmarks.plan.options import EXAMPLES
 from benchmarks.plan.plan import Motions, PlanError
@@ -16,29 +16,11 @@ from benchmarks.plan.selection import Request, choose
 from benchmarks.presets import find_preset
 from snug.motion.library import TEST, VALIDATION
 from snug.recipes.deviations import DEVIATIONS
-from snug.recipes.named import PAPER, TRAININGS
-from snug.recipes.recipe import DEFAULT, Recipe
 
 NAMES = {
     *(f"snug-without-{deviation.name}" for deviation in DEVIATIONS),
     *(f"snug-paper-with-{deviation.name}" for deviation in DEVIATIONS),
 }
-
-
-def differing(a: Recipe, b: Recipe) -> set[str]:
-    names = (field.name for field in fields(Recipe))
-    return {name for name in names if name != "name" and getattr(a, name) != getattr(b, name)}
-
-
-def test_every_deviation_has_its_line_and_changes_nothing_else():
-    listed = [option for deviation in DEVIATIONS for option in deviation.options]
-    assert sorted(listed) == sorted(differing(DEFAULT, PAPER)) and len(NAMES) == 2 * len(DEVIATIONS)
-    for deviation in DEVIATIONS:
-        undone = TRAININGS[f"snug-without-{deviation.name}"].recipe
-        added = TRAININGS[f"snug-paper-with-{deviation.name}"].recipe
-        assert differing(undone, DEFAULT) == differing(added, PAPER) == set(deviation.options)
-        assert differing(undone, PAPER) == differing(DEFAULT, PAPER) - set(deviation.options)
-        assert f"snug-{undone.name}" in NAMES and f"snug-{added.name}" in NAMES
 
 
 def chosen(*methods, **changes):
@@ -50,6 +32,7 @@ def chosen(*methods, **changes):
 
 def test_a_deviation_is_a_method_for_whoever_names_it():
     for name in NAMES:
+        assert name == f"snug-{TRAININGS[name].recipe.name}"
         entry = find_method(name)
         assert entry.trained == name and entry.role == "ablation" and entry.seeded
         assert entry.base == ("snug-paper" if "paper" in name else "snug")

@@ -1,0 +1,26 @@
+"""Trainings of the project's networks, by the name of the network that a method declares as `trained`.
+
+No result depends on this list, but on the training of its own network alone: a further line makes no
+finished network out of date.
+"""
+
+from __future__ import annotations
+
+from benchmarks.training import Simulated, Training
+from snug.recipes.deviations import exchange_deviations
+from snug.recipes.named import ABLATIONS, DYNAMIC, PAPER, PBNS_SPRINGS, SANTESTEBAN2019, SUPERVISED, TAILORNET
+from snug.recipes.recipe import DEFAULT
+
+TRAININGS = {
+    "snug": Training("snug", DEFAULT),
+    "pbns": Training("pbns", DEFAULT),
+    "pbns-springs": Training("pbns", PBNS_SPRINGS),
+    "supervised": Training("supervised", SUPERVISED, Simulated()),
+    "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
+    "tailornet": Training("tailornet", TAILORNET, Simulated()),
+    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
+    **{
+        f"snug-{recipe.name}": Training("snug", recipe)
+        for recipe in (PAPER, *ABLATIONS, *exchange_deviations(DEFAULT, PAPER))
+    },
+}
