@@ -32,7 +32,6 @@ WHERE_NAMED = {
     "roll_out": "benchmarks.metrics.motion.long_roll_out",
     "mesh": "benchmarks.metrics.surface.mesh_size",
     "body_shape": "benchmarks.metrics.surface.body_shape",
-    "training": "benchmarks.metrics.cost.training",
 }  # measured only in scenes that name them
 MODULE_OF = MODULES | WHERE_NAMED
 

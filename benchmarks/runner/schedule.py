@@ -31,7 +31,6 @@ from benchmarks.tasks.metric_task import MeasureCell
 from benchmarks.tasks.microbenchmark import RunMicrobenchmark
 from benchmarks.tasks.task import Task
 from benchmarks.tasks.training import LONGEST, TrainNetwork
-from benchmarks.tasks.training_windows import SUITE, CompareWindows
 from benchmarks.training import Simulated
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
@@ -67,9 +66,6 @@ class Schedule:
         yield from (self.cell(cell) for cell in plan.cells if not cell.timed)
         yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and self._has_reference(s))
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
-        for network in dict.fromkeys(network_of(c) for c in plan.cells if SUITE in c.suites):
-            if network and network.garment == plan.motions.first_garment and network.training:
-                yield self.windows(network)
         yield from map(self.case, plan.cases)
         yield from map(self.microbenchmark, plan.microbenchmarks)
 
@@ -243,16 +239,6 @@ class Schedule:
             counterpart=counterpart, training=training, outside=plan.metrics,
             needs=(("cell", cell.name),), reads=reads, batch=scene.name,
             **of_scene | {"inputs": of_scene["inputs"] | inputs},
-        )  # fmt: skip
-
-    def windows(self, network: Network) -> CompareWindows:
-        training = self.network(network)
-        own = (cell.entry for cell in self.plan.cells if network_of(cell) == network)
-        return CompareWindows(
-            name=training.name, label=training.label, training=training,
-            entry=find_method(network.name) if network.name in TRAININGS else next(own),
-            inputs=training.inputs,
-            modules=(f"{TASKS}.training_windows", *training.modules), needs=(training.id,),
         )  # fmt: skip
 
     def case(self, case: Any) -> RunCase:

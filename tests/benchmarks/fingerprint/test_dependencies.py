@@ -155,7 +155,6 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
         "cell_task",
         "ground_truth",
         "training",
-        "training_windows",
         "metric_task",
         "case",
         "microbenchmark",

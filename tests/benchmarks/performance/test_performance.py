@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import snug.training.train
-from benchmarks import provenance, run, speedup
+from benchmarks import provenance, run
 from benchmarks.methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.metrics import find_metric
@@ -364,30 +364,3 @@ def test_the_curve_is_drawn_and_a_broken_one_is_one_line(tmp_path):
     assert picture.path.with_suffix(".png").stat().st_size > 5000
     curve.write_text("step,seconds\n10,1\n")
     assert convergence_curve(folder, problems) == [] and len(problems) == 1
-
-
-def test_speedup_gives_medians_of_both_codes_and_their_ratio(monkeypatch, tmp_path):
-    times = iter([4.0, 1.0, 8.0, 3.0, 6.0, 2.0])  # before, after, before, ...
-    asked = []
-
-    def measured(tree, words, folder):
-        asked.append((tree, words[-1]))
-        return next(times)
-
-    def values(run, method, metric):
-        return {"a": run, "b": 2 * run} if metric == "cost/frame" else {"a": 10 * run}
-
-    monkeypatch.setattr(speedup, "measured", measured)
-    monkeypatch.setattr(speedup, "_values", values)
-    what = speedup.Measurement("g", "x", ("--methods", "{methods}"), "old", "new", "cost/frame", "gap/energy")
-    (line,) = speedup.compared(what, tmp_path, tmp_path, 3, {})  # scene b has no gap
-    assert (line.scene, line.before, line.after, line.ratio) == ("a", 6.0, 2.0, 1 / 3)
-    assert (line.bought_before, line.bought_after, line.unit) == (60.0, 20.0, "gap/energy")
-    assert asked == [(tmp_path, "old"), (speedup.ROOT, "new")] * 3
-
-
-def test_speedup_refuses_rows_and_commits_that_are_not_there(capsys):
-    assert speedup.main(["HEAD", "--rows", "nothing"]) == 2
-    assert "nothing: choose from" in capsys.readouterr().err
-    assert speedup.main(["no-such-commit", "--rows", "size"]) == 2
-    assert "no-such-commit: no such commit here" in capsys.readouterr().err

@@ -11,8 +11,8 @@ from reference_sim.command.command_line import command
 
 COMMANDS = (
     "snug.check", "snug.train", "benchmarks.check", "benchmarks.dataset",
-    "benchmarks.export", "benchmarks.merge", "benchmarks.run", "benchmarks.scaling", "benchmarks.score",
-    "benchmarks.speedup", "reports.build", "reports.check", "reports.compare", "reports.export",
+    "benchmarks.export", "benchmarks.merge", "benchmarks.run", "benchmarks.score",
+    "reports.build", "reports.check", "reports.compare", "reports.export",
     "reports.film",
 )  # fmt: skip
 
