@@ -111,7 +111,7 @@ def test_only_what_trains_depends_on_the_accelerator(tmp_path, monkeypatch):
     there = dataclasses.replace(plan, device="cuda")
     own, other = ({task.id: task.inputs for task in tasks_of(p)} for p in (plan, there))
     assert own.keys() == other.keys()
-    assert {id[0] for id in own if own[id] != other[id]} == {"network", "windows"}
+    assert {id[0] for id in own if own[id] != other[id]} == {"network"}
 
 
 def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(tmp_path):
