@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.methods import find_method
 from benchmarks.plan.one_scene import plan_of_scene, words_of_scene
 from benchmarks.plan.options import add_scene_options
 from benchmarks.plan.plan import Plan, PlanError
@@ -17,7 +18,6 @@ from benchmarks.timing import one_thread
 from reference_sim.command.command_line import Parser, command
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
     from benchmarks.scene import BuiltScene
 
 PROGRAM = "benchmarks.export"
@@ -60,12 +60,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     demand_new(folder)
     plan = plan_of(options)
     try:
-        scene, assets = built(plan)
-        from benchmarks.export_files import write_scene
+        scene = built(plan)
+        from benchmarks.external.exported_scene import write_scene
 
         chosen = ["--scene", options.scene, *words_of_scene(options)]
         score = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
-        write_scene(folder, plan, scene, assets, score=score, reference=options.reference)
+        simulation = find_method("simulation").make(models=folder, seed=0) if options.reference else None
+        write_scene(
+            folder, plan.scenes[0], scene, preset=plan.preset.name, score=score, simulation=simulation
+        )
     except RuntimeError as error:  # a simulation that did not stay finite
         raise PlanError(str(error)) from error
     print(f"{scene.name}: {scene.frames} frames of {scene.cloth.vertex_count} vertices in {folder}")
@@ -80,12 +83,12 @@ def plan_of(options: argparse.Namespace) -> Plan:
     return replace(plan, cells=(replace(first, entry=replace(first.entry, trained=None)),))
 
 
-def built(plan: Plan) -> tuple[BuiltScene, Assets | None]:
-    """The scene of the plan, made. Raises ValueError where a garment or a motion cannot be."""
+def built(plan: Plan) -> BuiltScene:
+    """Build the scene of the plan. Raises ValueError where a garment or a motion cannot be."""
     from benchmarks.runner.whole_run import assets_of
 
     assets = assets_of(plan) if plan.garments else None
-    return plan.scenes[0].build(assets), assets
+    return plan.scenes[0].build(assets)
 
 
 if __name__ == "__main__":

@@ -16,8 +16,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results import frame_energies
-from benchmarks.results.run_folder import BEFORE_FRAMES, ResultsError, Row, RunFolder, digest_of_file
+from benchmarks.results.run_folder import BEFORE_FRAMES, ResultsError, Row, RunFolder
 from benchmarks.runner.cache import read_entry
 from reference_sim.command.command_line import Parser, command
 

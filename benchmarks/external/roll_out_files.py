@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.external.roll_out_option import RollOutError, digest_of
+from benchmarks.external.roll_out_option import RollOutError
+from benchmarks.fingerprint.digest import digest_of_files
 from reference_sim.files.mesh_files import MESH_SUFFIXES, read_mesh, read_sequence
 
 PACKED = 1032  # bytes that deflate packs into one at most
@@ -59,7 +60,7 @@ class StoredRollOut:
 
 def read_roll_out(path: str | Path) -> StoredRollOut:
     """Read a file, a folder or a pattern of files. Raises RollOutError, one line, for whatever is wrong."""
-    return _read(str(path), digest_of(str(path)))
+    return _read(str(path), digest_of_files(str(path)))
 
 
 @lru_cache(maxsize=1)  # a plan, its checks and a cell ask for the same file one after another

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import glob
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
@@ -98,15 +96,3 @@ _WORDS: dict[str, tuple[str, Callable[[str], Any]]] = {
     "match-vertices": ("match_vertices", lambda value: True),
     "ms": ("declared_ms", float),
 }
-
-
-def digest_of(path: str) -> str:
-    """Of all that is read: the file, those of a folder or of a pattern, and the mesh beside a point cache."""
-    from benchmarks.fingerprint.digest import digest
-    from benchmarks.results.run_folder import digest_of_file
-
-    given = Path(path)
-    files = sorted(given.iterdir()) if given.is_dir() else sorted(map(Path, glob.glob(path))) or [given]
-    if given.suffix.lower() in (".pc2", ".pc16"):
-        files.append(given.with_suffix(".obj"))
-    return digest([[file.name, digest_of_file(file)] for file in files if file.is_file()])

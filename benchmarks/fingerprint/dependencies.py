@@ -20,9 +20,8 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
-from benchmarks.fingerprint.digest import digest
+from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.registry import DeclarationError
-from benchmarks.results.run_folder import digest_of_file
 
 ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
 ROOT = Path(__file__).resolve().parents[2]

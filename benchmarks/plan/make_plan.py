@@ -12,18 +12,18 @@ from datetime import datetime
 from pathlib import Path
 
 from benchmarks.external.roll_out_option import parse as parse_roll_out
+from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.plan import plug_ins as outside
 from benchmarks.plan.motion_roles import choose_motions
 from benchmarks.plan.options import PROGRAM
-from benchmarks.plan.plan import Motions, OwnBody, OwnGarment, Plan, PlanError
+from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Motions, OwnBody, OwnGarment, Plan, PlanError
 from benchmarks.plan.selection import MEASURED, Request, choose, choose_suites, names_no_motion
 from benchmarks.presets import find_preset
 from benchmarks.provenance import usable_cores
-from benchmarks.results.run_folder import ResultsError, RunFolder, digest_of_file
+from benchmarks.results.run_folder import ResultsError, RunFolder
 from benchmarks.scenes import GARMENT_SCENES, all_scenes
-from benchmarks.tasks.task import DEFAULT_ONLY, STATES
 from snug.garments.options import demand_garment_file, make_garment_file
 from snug.motion.options import parse_motion_options
 

@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     from snug.motion.motion import Motion
 
 
+# Of a task in the folder of a run, and the states in which it is done again unless --only names others.
+STATES = ("finished", "failed", "stale", "missing")
+DEFAULT_ONLY = ("stale", "missing")
+
+
 class PlanError(ValueError):
     """A request that cannot be met; the message names the word and what there is instead."""
 
@@ -168,7 +173,7 @@ class Plan:
     device: str
     folder: Path
     command: str
-    only: frozenset[str] = frozenset(("stale", "missing"))
+    only: frozenset[str] = frozenset(DEFAULT_ONLY)
     fresh: bool = False
     workers: int = 1
     scheduler: str = ""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import hashlib
 import json
 import math
 import os
@@ -17,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.json_file import ResultsError, check_config, read_json
 
 FORMAT = 4  # of run.json, results.csv and the cache; written into run.json
@@ -162,12 +162,6 @@ def replacing(path: Path) -> AbstractContextManager[Path]:
     from reference_sim.files import atomic_files as whole_file
 
     return whole_file.replacing(path)
-
-
-def digest_of_file(path: Path) -> str:
-    """16 hexadecimal digits of a file's bytes. Raises OSError."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
 
 
 def model_path(models: Path, kind: str, seed: int) -> Path:

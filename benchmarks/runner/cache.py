@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.fingerprint.dependencies import software
-from benchmarks.fingerprint.digest import digest
+from benchmarks.fingerprint.digest import digest, digest_of_file
+from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.results.json_file import ResultsError, read_json
-from benchmarks.results.run_folder import FORMAT, RunFolder, digest_of_file, replacing
-from benchmarks.tasks.task import DEFAULT_ONLY, Outcome, Task, TaskId
+from benchmarks.results.run_folder import FORMAT, RunFolder, replacing
+from benchmarks.tasks.task import Outcome, Task, TaskId
 
 NOWHERE: Mapping[str, Any] = {}
 

@@ -21,10 +21,10 @@ from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 from benchmarks.assets.assets import Assets
-from benchmarks.fingerprint.digest import digest
+from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.process.errors import one_line
 from benchmarks.process.scheduler import connect
-from benchmarks.results.run_folder import RunFolder, digest_of_file, replacing
+from benchmarks.results.run_folder import RunFolder, replacing
 from benchmarks.runner import cluster_worker
 from benchmarks.runner.cache import damaged
 from benchmarks.runner.cluster_worker import ASSETS, PIECE, Gone, Unfit

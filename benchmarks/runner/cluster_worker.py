@@ -21,8 +21,9 @@ from typing import Any
 
 from benchmarks import provenance
 from benchmarks.fingerprint.dependencies import software
+from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.process.errors import one_line
-from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.local_executor import TaskProcess, begin_tasks
 from benchmarks.tasks.cell_task import CellTask
 from benchmarks.tasks.task import Context, Outcome, Task, failure

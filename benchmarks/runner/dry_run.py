@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 
-from benchmarks.plan.plan import Plan, runs
+from benchmarks.plan.plan import STATES, Plan, runs
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache, Found
 from benchmarks.runner.loop import LEFT_OUT, Runner
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.tasks.task import STATES, Outcome
+from benchmarks.tasks.task import Outcome
 
 
 def describe(plan: Plan) -> str:

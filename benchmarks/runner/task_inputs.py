@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import provenance
-from benchmarks.fingerprint.digest import digest
+from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.method import MethodEntry
 from benchmarks.plan.plan import Plan
-from benchmarks.results.run_folder import digest_of_file
 from benchmarks.scene import Scene
 from snug.recipes.recipe import TERMS
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.external.roll_out_option import MODULE
-from benchmarks.fingerprint.digest import digest
+from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.process.errors import one_line
 from benchmarks.results import frame_energies
-from benchmarks.results.run_folder import OF_TRAINING, Row, RunFolder, digest_of_file, with_provenance
+from benchmarks.results.run_folder import OF_TRAINING, Row, RunFolder, with_provenance
 from benchmarks.rows import described, rows_of
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.console import remarks, summary

@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.external.roll_out_files import StoredRollOut, read_roll_out
-from benchmarks.external.roll_out_option import RollOutError, RollOutOption, digest_of
+from benchmarks.external.roll_out_option import RollOutError, RollOutOption
+from benchmarks.fingerprint.digest import digest_of_files
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim import Cloth, Material, MeshError, Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
@@ -35,7 +36,7 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
         module=__name__,
         options={
             "path": option.path, "rest_mesh": rest_mesh, "units": stated.units, "up": stated.up,
-            "fps": stated.fps, "digests": (digest_of(option.path), digest_of(rest_mesh)),
+            "fps": stated.fps, "digests": (digest_of_files(option.path), digest_of_files(rest_mesh)),
         },
         obstacle=not gone,
     )  # fmt: skip

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from benchmarks.results.run_folder import Row, RunFolder
 
 TaskId = tuple[str, str]  # kind and name
-STATES = ("finished", "failed", "stale", "missing")  # of a task in the folder of a run
-DEFAULT_ONLY = ("stale", "missing")  # the states in which a task is done again unless --only names others
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from scipy.linalg import expm
 
 from benchmarks import export, run, score
 from benchmarks.cell import Cell
-from benchmarks.export_files import write_scene
+from benchmarks.external.exported_scene import write_scene
 from benchmarks.external.roll_out_option import RollOutOption, Stated
+from benchmarks.external.scene_files import write_obj
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.fingerprint.digest import digest
 from benchmarks.methods import find_method
@@ -22,11 +23,10 @@ from benchmarks.methods.outside.stored_roll_out import entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser
-from benchmarks.plan.plan import Motions, Plan, PlanError
+from benchmarks.plan.plan import PlanError
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
-from benchmarks.scene_files import write_obj
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
@@ -196,13 +196,9 @@ def home(tmp_path_factory):
     built = declared.build(assets)
     start = built.start_state
     scene = dataclasses.replace(built, settle=lambda: start)
-    cell = Cell(declared, find_method("simulation"), 0, ("garments",))
-    plan = Plan(
-        preset=SMOKE, suites=("garments",), cells=(cell,),
-        cases=(), motions=Motions(test=("sway",)), seeds=(0,), device="cpu", folder=Path(), command="",
-    )  # fmt: skip
     folder = tmp_path_factory.mktemp("home") / "scene"
-    write_scene(folder, plan, scene, assets, score="python -m benchmarks.score mine.npz", reference=False)
+    score_command = "python -m benchmarks.score mine.npz"
+    write_scene(folder, declared, scene, preset="smoke", score=score_command, simulation=None)
     return folder, scene
 
 

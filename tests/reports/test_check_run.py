@@ -10,7 +10,8 @@ import zlib
 
 import pytest
 
-from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.fingerprint.digest import digest_of_file
+from benchmarks.results.run_folder import RunFolder
 from reports import build, check
 from reports.check_numbers import CONTENT, printed, strangers
 from tests.reports.report_folder import declaration, row

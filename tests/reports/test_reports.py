@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.results.run_folder import COLUMNS, FORMAT, RunFolder, digest_of_file
+from benchmarks.fingerprint.digest import digest_of_file
+from benchmarks.results.run_folder import COLUMNS, FORMAT, RunFolder
 from reports import build
 from reports.document.document import document
 from reports.figures import training

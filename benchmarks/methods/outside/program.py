@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.external.roll_out_option import Stated
+from benchmarks.external.scene_files import write_for_program
 from benchmarks.method import MethodEntry
 from benchmarks.methods.outside.stored_roll_out import Stored
 from benchmarks.process.isolated_process import WorkerDied
 from benchmarks.registry import DeclarationError
 from benchmarks.scene import BuiltScene
-from benchmarks.scene_files import write_for_program
 from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays
 

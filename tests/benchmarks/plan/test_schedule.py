@@ -10,12 +10,13 @@ import pytest
 
 from benchmarks import provenance
 from benchmarks.cell import Cell
+from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.make_plan import choose_garment
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.plan import Motions, Network, OwnGarment
-from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks.metric_task import _training_poses
 from benchmarks.tasks.task import Context, Task

@@ -16,12 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.cluster import ClusterExecutor
 from benchmarks.runner.local_executor import Executor, LocalExecutor
 from benchmarks.runner.loop import Runner
-from benchmarks.tasks.task import DEFAULT_ONLY, Outcome, Task
+from benchmarks.tasks.task import Outcome, Task
 
 ROOT = Path(__file__).resolve().parents[3]
 PATH = str(ROOT)

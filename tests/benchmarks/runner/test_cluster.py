@@ -21,10 +21,10 @@ import pytest
 pytest.importorskip("distributed")
 
 from benchmarks import run
-from benchmarks.fingerprint.digest import digest
+from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.plan.make_plan import choose_scheduler
 from benchmarks.plan.plan import PlanError
-from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster as runner_side
 from benchmarks.runner import cluster_worker
 from benchmarks.runner import whole_run as execution

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.results.run_folder import RunFolder, digest_of_file
+from benchmarks.fingerprint.digest import digest_of_file
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.rows import rows_of
 from benchmarks.runner import local_executor as executor
 from benchmarks.runner.cache import Cache

@@ -8,40 +8,46 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.methods import find_method
-from benchmarks.scene_files import FileList, facts_of, write_cloth, write_motion, write_obstacle
+from benchmarks.external.scene_files import FileList, facts_of, write_cloth, write_motion, write_obstacle
 from reference_sim.files.atomic_files import new_folder
 from reference_sim.trajectory.point_cache import write_point_cache
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
-    from benchmarks.plan.plan import Plan
-    from benchmarks.scene import BuiltScene
+    from benchmarks.method import Method
+    from benchmarks.scene import BuiltScene, Scene
 
 
 def write_scene(
-    folder: Path, plan: Plan, scene: BuiltScene, assets: Assets | None, *, score: str, reference: bool
+    folder: Path, declared: Scene, scene: BuiltScene, *, preset: str, score: str, simulation: Method | None
 ) -> None:
-    """Write everything into a new folder. score: the command that judges.
+    """Write a scene, as declared and as built, into a new folder.
 
-    Raises ValueError where --reference is asked of a scene that nobody simulates, RuntimeError where the
-    garment does not settle.
+    Args:
+        folder: has to be new or empty.
+        declared: the entry of the scene.
+        scene: the same scene, built.
+        preset: the name of the preset whose sizes it has.
+        score: the command that scores a roll-out of it.
+        simulation: the method whose trajectory is written too; None: none.
+
+    Raises:
+        ValueError: where a simulation is asked for of a scene for networks alone.
+        RuntimeError: where the garment does not settle.
     """
-    declared = plan.scenes[0]
-    if reference and declared.networks_only:
+    if simulation is not None and declared.networks_only:
         raise ValueError(f"--reference: nobody simulates {declared.name}: it is for networks alone")
     with new_folder(folder) as part:
         files = [*write_cloth(part, scene), *write_obstacle(part, scene)]
         if scene.dressed is not None:
             files += write_motion(part, scene.dressed)
-        files += _reference(part, scene) if reference else []
-        facts = description(plan, scene)
+        files += _reference(part, scene, simulation) if simulation is not None else []
+        facts = _description(declared, scene, preset)
         (part / "scene.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
         (part / "README.txt").write_text(readme(scene, facts, files, score), encoding="utf-8")
 
 
-def _reference(part: Path, scene: BuiltScene) -> FileList:
-    method = find_method("simulation").make(models=part, seed=0)
+def _reference(part: Path, scene: BuiltScene, method: Method) -> FileList:
+    """Simulate the scene, and write the trajectory in three formats."""
     method.prepare(scene)
     trajectory = method.run()
     trajectory.save(part / "reference.vtkhdf")
@@ -55,12 +61,10 @@ def _reference(part: Path, scene: BuiltScene) -> FileList:
     ]
 
 
-def description(plan: Plan, scene: BuiltScene) -> dict[str, Any]:
+def _description(declared: Scene, scene: BuiltScene, preset: str) -> dict[str, Any]:
     """Return the content of scene.json."""
-    declared = plan.scenes[0]
-    content = {"description": declared.description, "preset": plan.preset.name}
-    content |= {"garment": declared.garment, "motion": declared.motion, "part": declared.part}
-    return facts_of(scene) | content
+    names = {"garment": declared.garment, "motion": declared.motion, "part": declared.part}
+    return facts_of(scene) | {"description": declared.description, "preset": preset} | names
 
 
 def readme(scene: BuiltScene, facts: dict[str, Any], files: FileList, score: str) -> str:
