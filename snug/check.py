@@ -55,10 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     files = [make_garment_file(path, options) for path in options.files]
     if options.picture and not options.picture.parent.is_dir():
         raise ValueError(f"--picture {options.picture}: no such folder")
-    from snug.body.parametric_body import Body
+    from snug.body.smpl_files import read_body
     from snug.garments.fit import DressForm
 
-    body = Body.from_file(options.body) if options.body else Body.load()
+    body = read_body(options.body)
     wearer = DressForm(body)
     return max(_check(file, body, wearer, options.picture) for file in files)
 

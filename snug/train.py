@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parse(arguments)
     import torch
 
-    from snug.body.parametric_body import Body
+    from snug.body.smpl_files import read_body
     from snug.garments.templates import TSHIRT, find_template
     from snug.training.device import find_device
     from snug.training.process_group import join_group, leave_group
@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for motion in [*motions, *held_out]:
             print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     try:
-        body = Body.from_file(options.body) if options.body else Body.load()
+        body = read_body(options.body)
         outs[0].parent.mkdir(parents=True, exist_ok=True)
         for template, out in zip(templates, outs):
             garment = (body, template)

@@ -72,11 +72,11 @@ def open_assets(
     are cut to the preset's length.
     """
     from benchmarks.assets.liveliest_part import clip
-    from snug.body.parametric_body import Body
+    from snug.body.smpl_files import read_body
     from snug.garments.reading import read_garment
     from snug.garments.templates import find_template
 
-    wearer = Body.from_file(body) if body else Body.load()
+    wearer = read_body(body)
     tailored = {
         name: read_garment(own, wearer)
         if own and name == own.name

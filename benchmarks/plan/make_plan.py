@@ -105,9 +105,9 @@ def choose_body(path: str | None) -> OwnBody | None:
     """An own body, once it has been read. Raises snug.body.skeleton.BodyError for a file that holds none."""
     if path is None:
         return None
-    from snug.body.parametric_body import Body
+    from snug.body.smpl_files import read_body
 
-    Body.from_file(path)
+    read_body(path)
     return OwnBody(Path(path), digest_of_file(Path(path)))
 
 
@@ -127,10 +127,10 @@ def choose_garment(options: argparse.Namespace) -> OwnGarment | None:
             f"--garment {file.path}: '{file.name}' cannot name its scenes: give the file another name, of "
             "letters, digits and '_'"
         )
-    from snug.body.parametric_body import Body
+    from snug.body.smpl_files import read_body
     from snug.garments.reading import read_garment
 
-    read_garment(file, Body.from_file(options.body) if options.body else Body.load())
+    read_garment(file, read_body(options.body))
     return OwnGarment(file, tuple(map(digest_of_file, file.files)))
 
 

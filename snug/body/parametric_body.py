@@ -1,4 +1,4 @@
-"""A parametric human: a template, shape directions, joints and skinning weights, in the layout of SMPL.
+"""Parametric human: template, shape directions, joints and skinning weights, in the layout of SMPL.
 
 Rest pose: T-pose, y up, facing +z, left arm along +x, metres. The baked body stands with its soles on y = 0
 and its pelvis above the origin, for every shape, so a motion's translation is zero where it stands.
@@ -18,19 +18,30 @@ from reference_sim.files.array_file import read_arrays
 from snug.body.skeleton import JOINT_NAMES, BodyError, joint_transforms, rotation_matrices
 
 BAKED = Path(__file__).resolve().parent.parent / "data" / "body.npz"
+SHAPES = 10  # shape coefficients kept when a file has more, and read by networks of pose and shape
 _CHUNK = 64  # frames skinned in one matrix product, to bound memory
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A skinned parametric body. All arrays are float64 (indices int64) and are not to be written to.
+    """Skinned parametric body. All arrays are float64 (indices int64) and are not to be written to.
 
-    template: (B, 3) [m]. shape_directions: (B, 3, S) [m], for one unit of each shape coefficient.
-    skinning_weights: (B, 24), rows sum to one. joint_template: (24, 3) [m]. joint_directions: (24, 3, S) [m].
-    faces: (F, 3), outward. parents: (24,), -1 for the root. joint_names: 24 names, the same for every body.
-    pose_directions: None, or (B, 3, 9 K) [m]: pose correctives, for one unit of each entry of R - I, row by
-    row, of the rotations R of joints 1 to K relative to their parents (SMPL, Loper et al. 2015, eq. 9).
-    arms_lowered: None, or (2,) [rad] by which the left and the right arm hang down in its file.
+    Attributes:
+        template: (B, 3) [m], vertices of the unposed body of mean shape.
+        shape_directions: (B, 3, S) [m], what one unit of each shape coefficient adds to the template.
+        skinning_weights: (B, 24), rows sum to one.
+        joint_template: (24, 3) [m], joints of the unposed body of mean shape.
+        joint_directions: (24, 3, S) [m], what one unit of each shape coefficient adds to them.
+        faces: (F, 3), wound outward.
+        parents: (24,), -1 for the root.
+        pose_directions: None, or (B, 3, 9 K) [m]: pose correctives, for one unit of each entry of R - I, row
+            by row, of the rotations R of joints 1 to K relative to their parents.
+        arms_lowered: None, or (2,) [rad] by which the left and the right arm hang down in the file.
+        joint_names: 24 names, the same for every body.
+
+    Source:
+        M. Loper et al., SMPL: a skinned multi-person linear model, ACM Transactions on Graphics 34 (2015),
+        equation 9 for the pose correctives.
     """
 
     template: NDArray[np.float64]
@@ -46,31 +57,38 @@ class Body:
 
     @staticmethod
     def load() -> "Body":
-        """The body that comes with this package."""
+        """Load the body that comes with this package.
+
+        >>> round(Body.load().height, 2)  # [m]
+        1.69
+        """
         arrays = {key: _widened(stored) for key, stored in read_arrays(BAKED).items()}
         # float32 in the file: make the rows sum to one again in float64.
         arrays["skinning_weights"] /= arrays["skinning_weights"].sum(axis=1, keepdims=True)
         return Body(**arrays)
 
-    @staticmethod
-    def from_file(path: str | Path) -> "Body":
-        """A user's body: .npz or .pkl, see snug.body.smpl_files. Raises BodyError."""
-        from snug.body.smpl_files import read_smpl
-
-        return Body(**read_smpl(Path(path)))
-
     @property
     def shape_count(self) -> int:
+        """Number S of shape coefficients."""
         return self.shape_directions.shape[-1]
 
     def shaped(self, betas: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Vertices (B, 3) [m] of the unposed body with these shape coefficients. Raises BodyError."""
+        """Return the vertices (B, 3) [m] of the unposed body of shape `betas` (S,), by default the mean.
+
+        Raises:
+            BodyError: another number of coefficients, or one that is not finite.
+
+        >>> body = Body.load()
+        >>> tall = body.shaped([1.0] + [0.0] * 9)
+        >>> bool(tall[:, 1].max() > body.template[:, 1].max())
+        True
+        """
         if betas is None:
             return self.template.copy()
         return self.template + self.shape_directions @ self._checked(betas)
 
     def joints(self, betas: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Joints (24, 3) [m] of the unposed body with these shape coefficients. Raises BodyError."""
+        """Return the joints (24, 3) [m] of the unposed body of shape `betas` (S,). Raises BodyError."""
         if betas is None:
             return self.joint_template.copy()
         return self.joint_template + self.joint_directions @ self._checked(betas)
@@ -78,16 +96,32 @@ class Body:
     def vertices(
         self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None
     ) -> NDArray[np.float64]:
-        """Posed vertices (T, B, 3) [m].
+        """Pose and skin the body.
 
-        poses: (T, 24, 3) [rad], axis-angle relative to the parent joint. translations: (T, 3) [m].
-        betas: (S,). Raises BodyError.
+        Args:
+            poses: (T, 24, 3) [rad], axis-angle relative to the parent joint.
+            translations: (T, 3) [m], added to the skinned vertices.
+            betas: (S,) shape coefficients, by default those of the mean shape.
+
+        Returns:
+            Posed vertices (T, B, 3) [m].
+
+        Raises:
+            BodyError: another shape of an argument, or a number that is not finite.
+
+        >>> import numpy as np
+        >>> shift = np.array([[0.0, 0.0, 1.0]])
+        >>> body = Body.load()
+        >>> moved = body.vertices(np.zeros((1, 24, 3)), shift)
+        >>> bool(np.allclose(moved[0], body.template + shift))
+        True
         """
         return self.poser(betas)(poses, translations)
 
     def poser(self, betas: ArrayLike | None = None) -> Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]:
-        """`vertices` of that shape for any poses and translations; what shape alone decides is computed here,
-        once: for whoever poses frame after frame. Raises BodyError.
+        """Return the function `vertices` of one shape, for callers that pose frame after frame.
+
+        All that depends on the shape alone is computed once, here. Raises BodyError.
         """
         from scipy.sparse import csr_array
 
@@ -112,7 +146,7 @@ class Body:
     def _corrected(
         self, shaped: NDArray[np.float64], poses: NDArray[np.float64], transforms: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Posed vertices (T, B, 3) [m] with pose correctives: those of a frame change what is skinned."""
+        """Return posed vertices (T, B, 3) [m] with the pose correctives of each frame."""
         assert self.pose_directions is not None
         count = self.pose_directions.shape[2]
         entries = (rotation_matrices(poses[:, 1 : 1 + count // 9]) - np.eye(3)).reshape(len(poses), -1)
@@ -127,7 +161,7 @@ class Body:
     def transforms(
         self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None
     ) -> NDArray[np.float64]:
-        """Rest-to-posed transform of each joint, (T, 24, 3, 4). Arguments and errors as for `vertices`."""
+        """Return the rest-to-posed transforms of the joints (T, 24, 3, 4). Arguments: see `vertices`."""
         poses, translations = np.asarray(poses, dtype=float), np.asarray(translations, dtype=float)
         joints = len(self.joint_template)
         if poses.ndim != 3 or poses.shape[1:] != (joints, 3) or translations.shape != (len(poses), 3):

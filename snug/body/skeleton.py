@@ -1,4 +1,4 @@
-"""The 24-joint tree in SMPL order, as numbers and forward kinematics only: no mesh, no torch.
+"""Skeleton of 24 joints in SMPL's order: numbers and forward kinematics, without mesh or torch.
 
 Motions need joint positions (feet on the floor, limb directions) but not the body's surface, so the rest
 joints here are the default body's, rounded to half a centimetre. Frames: y up, facing +z, left
@@ -46,11 +46,16 @@ LEG_LENGTH = float(np.linalg.norm(np.diff(REST_JOINTS[[1, 4, 7]], axis=0), axis=
 
 
 class BodyError(ValueError):
-    """A body file, or an argument for a body, that cannot be used; the message names what and the remedy."""
+    """A body file, or an argument for a body, that cannot be used; the message names problem and remedy."""
 
 
 def rotation_matrices(axis_angles: np.ndarray) -> np.ndarray:
-    """Rodrigues' formula. axis_angles: (..., 3) [rad] -> (..., 3, 3)."""
+    """Return the rotation matrices (..., 3, 3) of axis-angles (..., 3) [rad], by Rodrigues' formula.
+
+    >>> import numpy as np
+    >>> np.round(rotation_matrices(np.array([0.0, np.pi / 2, 0.0])) @ [1.0, 0.0, 0.0], 12) + 0.0
+    array([ 0.,  0., -1.])
+    """
     from scipy.spatial.transform import Rotation
 
     flat = np.asarray(axis_angles, dtype=float).reshape(-1, 3)
@@ -58,7 +63,12 @@ def rotation_matrices(axis_angles: np.ndarray) -> np.ndarray:
 
 
 def axis_angles(matrices: np.ndarray) -> np.ndarray:
-    """The rotation vectors, at most pi long, of rotation matrices. (..., 3, 3) -> (..., 3) [rad]."""
+    """Return the axis-angles (..., 3) [rad], at most pi long, of rotation matrices (..., 3, 3).
+
+    >>> import numpy as np
+    >>> np.round(axis_angles(rotation_matrices(np.array([0.1, 0.2, 0.3]))), 12)
+    array([0.1, 0.2, 0.3])
+    """
     from scipy.spatial.transform import Rotation
 
     flat = np.asarray(matrices, dtype=float).reshape(-1, 3, 3)
@@ -66,7 +76,7 @@ def axis_angles(matrices: np.ndarray) -> np.ndarray:
 
 
 def global_rotations(poses: np.ndarray, parents: Sequence[int] = PARENTS) -> np.ndarray:
-    """Rotation of every joint in the world. poses: (T, J, 3) [rad] -> (T, J, 3, 3)."""
+    """Return the world rotation of every joint (T, J, 3, 3) in poses (T, J, 3) [rad]."""
     rotations = rotation_matrices(poses)
     for joint, parent in enumerate(parents):
         if parent >= 0:
@@ -77,15 +87,30 @@ def global_rotations(poses: np.ndarray, parents: Sequence[int] = PARENTS) -> np.
 def joint_positions(
     poses: np.ndarray, translations: np.ndarray, rest_joints: np.ndarray = REST_JOINTS
 ) -> np.ndarray:
-    """Forward kinematics: (T, 24, 3) [rad], (T, 3) [m], rest (24, 3) [m] -> (T, 24, 3) [m]."""
+    """Compute where the joints are, by forward kinematics.
+
+    Args:
+        poses: (T, 24, 3) [rad], axis-angle relative to the parent joint.
+        translations: (T, 3) [m] of the root.
+        rest_joints: (24, 3) [m], by default those of the package's body, rounded.
+
+    Returns:
+        Joint positions (T, 24, 3) [m].
+
+    >>> import numpy as np
+    >>> joint_positions(np.zeros((1, 24, 3)), np.zeros((1, 3)))[0, JOINT["left_knee"]]
+    array([0.13, 0.51, 0.02])
+    """
     return _positions(global_rotations(poses), np.asarray(translations), rest_joints)
 
 
 def joint_transforms(
     poses: np.ndarray, translations: np.ndarray, rest_joints: np.ndarray, parents: Sequence[int]
 ) -> np.ndarray:
-    """Rest-to-posed transform of each joint, (T, J, 3, 4); see `snug.body.skinning.joint_transforms`, which is
-    the same in torch. poses (T, J, 3) [rad], translations (T, 3) [m], rest_joints (J, 3) [m].
+    """Return the rest-to-posed transform of each joint, (T, J, 3, 4).
+
+    poses: (T, J, 3) [rad]. translations: (T, 3) [m]. rest_joints: (J, 3) [m]. The same in torch is
+    `snug.body.skinning.joint_transforms`.
     """
     rotations = global_rotations(poses, parents)
     shifts = _positions(rotations, translations, rest_joints, parents)
@@ -94,23 +119,20 @@ def joint_transforms(
 
 
 def sole_points(poses: np.ndarray, translations: np.ndarray) -> np.ndarray:
-    """Heel, ball and toe tip of the left, then of the right foot. -> (T, 6, 3) [m]."""
+    """Return heel, ball and toe tip (T, 6, 3) [m] of the left, then of the right foot."""
     rotations = global_rotations(poses)
     positions = _positions(rotations, np.asarray(translations), REST_JOINTS)
     points = []
     for side, mirror in (("left", 1.0), ("right", -1.0)):
         for name, point in _SOLE:
             joint = JOINT[name.replace("left", side)]
-            arm = np.array(point) * [mirror, 1.0, 1.0] - REST_JOINTS[joint]
-            points.append(positions[:, joint] + rotations[:, joint] @ arm)
+            lever = np.array(point) * [mirror, 1.0, 1.0] - REST_JOINTS[joint]
+            points.append(positions[:, joint] + rotations[:, joint] @ lever)
     return np.stack(points, axis=1)
 
 
 def _positions(
-    rotations: np.ndarray,
-    translations: np.ndarray,
-    rest_joints: np.ndarray,
-    parents: Sequence[int] = PARENTS,
+    rotations: np.ndarray, translations: np.ndarray, rest_joints: np.ndarray, parents: Sequence[int] = PARENTS
 ) -> np.ndarray:
     positions = np.empty((*rotations.shape[:2], 3))
     for joint, parent in enumerate(parents):

@@ -13,14 +13,23 @@ from torch import Tensor
 def joint_transforms(
     rotations: Tensor, joints: Tensor, parents: Sequence[int], translations: Tensor
 ) -> Tensor:
-    """Rigid transforms that take points attached to each joint from the rest pose to the posed body.
+    """Compute the rigid transforms that take points of each joint from the rest pose to the posed body.
 
     With world rotation W_j = W_parent R_j and posed joint q_j = q_parent + W_parent (p_j - p_parent), the
     transform is x -> W_j (x - p_j) + q_j. The root is at q_0 = p_0 + translation.
 
-    rotations: (..., J, 3, 3), relative to the parent. joints: (..., J, 3) [m], rest positions.
-    parents: J indices, -1 for a root, every parent before its children. translations: (..., 3) [m].
-    Returns (..., J, 3, 4): rotation and translation side by side.
+    Args:
+        rotations: (..., J, 3, 3), relative to the parent joint.
+        joints: (..., J, 3) [m], rest positions.
+        parents: J indices, -1 for a root, every parent before its children.
+        translations: (..., 3) [m].
+
+    Returns:
+        (..., J, 3, 4): rotation and translation side by side.
+
+    >>> rest = torch.zeros(1, 3)
+    >>> joint_transforms(torch.eye(3)[None], rest, [-1], torch.tensor([0.0, 0.0, 1.0]))[0, :, 3]
+    tensor([0., 0., 1.])
     """
     world: list[Tensor] = []
     posed: list[Tensor] = []
@@ -41,10 +50,10 @@ def joint_transforms(
 def add_pose_correctives(
     points: Tensor, directions: Tensor, transforms: Tensor, parents: Sequence[int]
 ) -> Tensor:
-    """Points (..., P, 3) [m] of the rest pose with the pose correctives of these transforms (..., J, 3, 4).
+    """Add the pose correctives of transforms (..., J, 3, 4) to points (..., P, 3) [m] of the rest pose.
 
-    directions: (P, 3, 9 K) [m], see snug.body.parametric_body.Body; the rotations of joints 1 to K relative to their parents
-    are read back from the transforms.
+    directions: (P, 3, 9 K) [m], see snug.body.parametric_body.Body; the rotations of joints 1 to K relative
+    to their parents are read back from the transforms.
     """
     count = directions.shape[2] // 9
     world = transforms[..., :3]
@@ -55,21 +64,31 @@ def add_pose_correctives(
 
 
 def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-    """Linear blend skinning: x_i = sum_j w_ij T_j p_i.
+    """Pose points by linear blend skinning, x_i = sum_j w_ij T_j p_i.
 
-    points: (..., V, 3) [m] in the rest pose. weights: (V, J), rows sum to one. transforms: (..., J, 3, 4).
-    Returns (..., V, 3) [m].
+    Args:
+        points: (..., V, 3) [m] in the rest pose.
+        weights: (V, J), rows sum to one.
+        transforms: (..., J, 3, 4) of the joints, see `joint_transforms`.
+
+    Returns:
+        Posed points (..., V, 3) [m].
+
+    >>> lift = torch.cat([torch.eye(3), torch.tensor([[0.0], [1.0], [0.0]])], dim=1)[None]
+    >>> skin(torch.zeros(2, 3), torch.ones(2, 1), lift)
+    tensor([[0., 1., 0.],
+            [0., 1., 0.]])
     """
     blended = _blended(weights, transforms)
     return (blended[..., :3] @ points[..., None])[..., 0] + blended[..., 3]
 
 
 def unskin(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-    """The inverse of `skin`: the points (..., V, 3) [m] in the rest pose that it takes to `posed`."""
+    """Invert `skin`: return the points (..., V, 3) [m] of the rest pose that it takes to `posed`."""
     blended = _blended(weights, transforms)
     return torch.linalg.solve(blended[..., :3], (posed - blended[..., 3])[..., None])[..., 0]
 
 
 def _blended(weights: Tensor, transforms: Tensor) -> Tensor:
-    """The transform (..., V, 3, 4) of each vertex."""
+    """Return the blended transform (..., V, 3, 4) of each vertex."""
     return (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))

@@ -1,4 +1,4 @@
-"""Read a body of SMPL's family: .npz of plain arrays, or .pkl as the models are given out.
+"""Read a body of SMPL's family: .npz of plain arrays, or .pkl as the models are distributed.
 
 | here | in files | shape |
 | --- | --- | --- |
@@ -10,7 +10,7 @@
 | shapes, may lack | shapedirs, shape_directions | (B, 3, S) |
 | of joints without regressor | J_shapedirs, joint_directions | (J, 3, S) |
 | correctives, may lack | posedirs | (B, 3, 9 (J - 1)) |
-| own axes of bones, must be none | rest_pose | (J, 3) or (J, 4) |
+| axes of the bones, must be those of the world | rest_pose | (J, 3) or (J, 4) |
 
 J: 24 of SMPL, 52 of SMPL-H, 55 of SMPL-X. Of the latter two, fingers go into the hand, jaw and eyes into the
 head, in weights and skeleton; the hand's joint is the mean of its knuckles. A rest pose with lowered arms is
@@ -25,17 +25,17 @@ import scipy.sparse
 
 from reference_sim.files.array_file import ArrayFileError, read_arrays
 from reference_sim.geometry.topology import boundary_loops
+from snug.body.parametric_body import SHAPES, Body
 from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
 from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, BodyError
 from snug.body.t_pose import arm_angles, arm_rotations, turn_rest_pose
 
-SHAPES = 10  # coefficients kept when a file has more, and read by networks of pose and shape
 JOINTS = len(JOINT_NAMES)
 BODY_JOINTS = JOINT["left_hand"]  # these come first in SMPL, SMPL-H and SMPL-X alike
 FOLDED = {20: JOINT["left_hand"], 21: JOINT["right_hand"], 15: 15}  # what hangs on wrists and head
 MOST_VERTICES = 100_000
 LONGEST_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not
-T_POSE, A_POSE = np.radians(10.0), np.radians(60.0)  # how far arms may hang down
+T_POSE, A_POSE = np.radians(10.0), np.radians(60.0)  # angles up to which arms may hang down
 
 SYNONYMS = {
     "v_template": ("v_template", "vertices", "template"),
@@ -52,8 +52,23 @@ SYNONYMS = {
 REQUIRED = ("v_template", "f", "weights", "kintree_table")
 
 
-def read_smpl(path: Path) -> dict[str, Any]:
-    """The arrays of a `Body` in T pose, keyed by its field names. Raises BodyError: file, array, remedy."""
+def read_body(path: str | Path | None) -> Body:
+    """Read and check a user's body, and bring it to the T pose.
+
+    Args:
+        path: .npz or .pkl in SMPL's layout, see the table above; None for the body of the package.
+
+    Raises:
+        BodyError: file, array, remedy.
+
+    >>> read_body(None).shape_count
+    10
+    """
+    return Body.load() if path is None else Body(**_in_t_pose(Path(path), _rest_arrays(Path(path))))
+
+
+def _rest_arrays(path: Path) -> dict[str, Any]:
+    """Return the arrays of a `Body` in the pose of its file, by its field names. Raises BodyError."""
     stored = _stored_arrays(path)
     missing = [" or ".join(SYNONYMS[key]) for key in REQUIRED if key not in stored]
     if missing:
@@ -62,47 +77,48 @@ def read_smpl(path: Path) -> dict[str, Any]:
     count = len(template)
     if count > MOST_VERTICES:
         raise BodyError(f"{path}: v_template has {count} vertices; at most {MOST_VERTICES} are read")
-    weights, places, carried = _skeleton(path, stored, count)
+    weights, places, folded = _skeleton(path, stored, count)
     directions = np.zeros((count, 3, 0))
     if "shapedirs" in stored:
         directions = _float(path, stored, "shapedirs", (count, 3, None))[:, :, :SHAPES]
-    joints, joint_directions = _joints(path, stored, template, directions, len(carried))
+    joints, joint_directions = _joints(path, stored, template, directions, len(folded))
     rest = {
         "template": template,
         "shape_directions": directions,
-        "skinning_weights": weights @ carried,
+        "skinning_weights": weights @ folded,
         "joint_template": places @ joints,
         "joint_directions": np.einsum("ij,jas->ias", places, joint_directions),
         "faces": _faces(path, stored["f"], template),
         "parents": np.array(PARENTS),
-        "pose_directions": _correctives(path, stored, count, len(carried)),
+        "pose_directions": _correctives(path, stored, count, len(folded)),
     }
     _check_place(path, template, rest["joint_template"])
-    return _in_t_pose(path, rest)
+    return rest
 
 
 def _stored_arrays(path: Path) -> dict[str, Any]:
-    """The arrays that are there, by the first of their names."""
+    """Return the arrays of the file, by the first of their names. Raises BodyError."""
     names = [name for some in SYNONYMS.values() for name in some]
     try:
-        found = read_plain_pickle(path) if path.suffix in (".pkl", ".pickle") else read_arrays(path, names)
+        content = read_plain_pickle(path) if path.suffix in (".pkl", ".pickle") else read_arrays(path, names)
     except PlainPickleError as error:
         raise BodyError(str(error)) from error
     except ArrayFileError as error:
         raise BodyError(
             f"{error}; expected an .npz of plain arrays, as numpy.savez writes, or a .pkl"
         ) from error
-    if not isinstance(found, dict):
-        raise BodyError(f"{path}: holds a {type(found).__name__}; expected a dict of arrays")
-    kept = {key: next((n for n in some if n in found), "") for key, some in SYNONYMS.items()}
+    if not isinstance(content, dict):
+        raise BodyError(f"{path}: holds a {type(content).__name__}; expected a dict of arrays")
+    kept = {key: next((n for n in some if n in content), "") for key, some in SYNONYMS.items()}
     return {
-        key: found[name] if scipy.sparse.issparse(found[name]) else np.asarray(found[name])
+        key: content[name] if scipy.sparse.issparse(content[name]) else np.asarray(content[name])
         for key, name in kept.items()
         if name
     }
 
 
 def _float(path: Path, stored: dict[str, Any], key: str, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Return a stored array of that shape (None: any length) as float64. Raises BodyError."""
     array = stored[key]
     fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape))
     if not fits or array.dtype.kind not in "fiu" or 0 in array.shape:
@@ -117,7 +133,10 @@ def _float(path: Path, stored: dict[str, Any], key: str, shape: tuple[int | None
 
 
 def _skeleton(path: Path, stored: dict[str, Any], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights (B, J), rows summing to one, and how J joints become 24: places (24, J), weights (J, 24)."""
+    """Return weights (B, J), rows summing to one, and two matrices that make 24 joints of J.
+
+    The first, (24, J), averages positions of joints; the second, (J, 24), adds up weights.
+    """
     table = stored["kintree_table"]
     parents = table[0] if table.ndim == 2 else table
     wanted = "kintree_table (2, J) or parents (J,) of J = 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X) joints"
@@ -132,44 +151,44 @@ def _skeleton(path: Path, stored: dict[str, Any], count: int) -> tuple[np.ndarra
         raise BodyError(
             f"{path}: rest_pose gives bones axes of their own; give a body without, and its motion too"
         )
-    own = JOINTS if joints == JOINTS else BODY_JOINTS
-    wrong = [j for j in range(1, own) if parents[j] != PARENTS[j]]
+    kept = JOINTS if joints == JOINTS else BODY_JOINTS
+    wrong = [j for j in range(1, kept) if parents[j] != PARENTS[j]]
     if wrong:
-        found = f"joint {wrong[0]} hangs on {parents[wrong[0]]}, expected {PARENTS[wrong[0]]}"
-        raise BodyError(f"{path}: kintree_table is not SMPL's: the parent of each joint; {found}")
+        difference = f"joint {wrong[0]} hangs on {parents[wrong[0]]}, expected {PARENTS[wrong[0]]}"
+        raise BodyError(f"{path}: kintree_table is not SMPL's: the parent of each joint; {difference}")
     if joints == JOINTS:
         return weights / sums, np.eye(JOINTS), np.eye(JOINTS)
-    places, carried = np.zeros((JOINTS, joints)), np.zeros((joints, JOINTS))
-    places[:own, :own] = carried[:own, :own] = np.eye(own)
-    for joint in range(own, joints):
+    places, folded = np.zeros((JOINTS, joints)), np.zeros((joints, JOINTS))
+    places[:kept, :kept] = folded[:kept, :kept] = np.eye(kept)
+    for joint in range(kept, joints):
         parent = int(parents[joint])
-        if not (parent in FOLDED or own <= parent < joint):
+        if not (parent in FOLDED or kept <= parent < joint):
             raise BodyError(
                 f"{path}: kintree_table: joint {joint} hangs on {parent}; expected head, hand, finger"
             )
         if parent in FOLDED:
-            carried[joint, FOLDED[parent]] = 1.0
+            folded[joint, FOLDED[parent]] = 1.0
             places[FOLDED[parent], joint] = parent != FOLDED[parent]  # knuckles; the head stays where it is
         else:
-            carried[joint] = carried[parent]
+            folded[joint] = folded[parent]
     knuckles = places.sum(axis=1, keepdims=True)
     if knuckles.min() == 0:
         raise BodyError(f"{path}: kintree_table: a wrist without a finger")
-    return weights / sums, places / knuckles, carried
+    return weights / sums, places / knuckles, folded
 
 
 def _is_identity(turns: np.ndarray) -> bool:
-    """Whether rotation vectors (J, 3), or quaternions (J, 4), real number first or last, turn nothing."""
+    """Return whether axis-angles (J, 3), or quaternions (J, 4) with w first or last, turn nothing."""
     if turns.ndim != 2 or turns.shape[1] not in (3, 4) or turns.dtype.kind not in "fiu":
         return False
-    none = [np.zeros(3)] if turns.shape[1] == 3 else [np.eye(4)[0], np.eye(4)[3]]
-    return any(np.allclose(np.abs(turns), one, atol=1e-4) for one in none)
+    identities = [np.zeros(3)] if turns.shape[1] == 3 else [np.eye(4)[0], np.eye(4)[3]]
+    return any(np.allclose(np.abs(turns), one, atol=1e-4) for one in identities)
 
 
 def _joints(
     path: Path, stored: dict[str, Any], template: np.ndarray, directions: np.ndarray, joints: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (J, 3) and what a unit of each shape coefficient adds to them (J, 3, S)."""
+    """Return the joints (J, 3) and what a unit of each shape coefficient adds to them (J, 3, S)."""
     if "J_regressor" in stored:
         regressor = _float(path, stored, "J_regressor", (joints, len(template)))
         return regressor @ template, np.einsum("jv,vcs->jcs", regressor, directions)
@@ -177,24 +196,29 @@ def _joints(
         raise BodyError(
             f"{path}: no joints; expected the array J_regressor, or joints, with shapedirs also J_shapedirs"
         )
-    moved = np.zeros((joints, 3, 0))
+    joint_directions = np.zeros((joints, 3, 0))
     if directions.shape[2]:
-        moved = _float(path, stored, "J_shapedirs", (joints, 3, None))[:, :, :SHAPES]
-    if moved.shape[2] != directions.shape[2]:
-        raise BodyError(f"{path}: J_shapedirs has {moved.shape[2]} shapes, shapedirs {directions.shape[2]}")
-    return _float(path, stored, "J_template", (joints, 3)), moved
+        joint_directions = _float(path, stored, "J_shapedirs", (joints, 3, None))[:, :, :SHAPES]
+    if joint_directions.shape[2] != directions.shape[2]:
+        raise BodyError(
+            f"{path}: J_shapedirs has {joint_directions.shape[2]} shapes, shapedirs {directions.shape[2]}"
+        )
+    return _float(path, stored, "J_template", (joints, 3)), joint_directions
 
 
 def _correctives(path: Path, stored: dict[str, Any], count: int, joints: int) -> np.ndarray | None:
-    """Those of the joints that are kept; folded fingers, jaw and eyes stay straight and need none."""
+    """Return the pose correctives of the joints that are kept.
+
+    Folded fingers, jaw and eyes stay straight and need none.
+    """
     if "posedirs" not in stored:
         return None
-    own = JOINTS if joints == JOINTS else BODY_JOINTS
-    return _float(path, stored, "posedirs", (count, 3, 9 * (joints - 1)))[:, :, : 9 * (own - 1)].copy()
+    kept = JOINTS if joints == JOINTS else BODY_JOINTS
+    return _float(path, stored, "posedirs", (count, 3, 9 * (joints - 1)))[:, :, : 9 * (kept - 1)].copy()
 
 
 def _check_place(path: Path, template: np.ndarray, joints: np.ndarray) -> None:
-    """Refuse what is not a person in metres, y up, facing +z, at x = 0."""
+    """Raise BodyError unless this is a person in metres, y up, facing +z, at x = 0."""
     low, high = template.min(axis=0), template.max(axis=0)
     size = high - low
     if not 0.5 < size[1] < 3.0 or max(size) > 3.0:
@@ -202,11 +226,11 @@ def _check_place(path: Path, template: np.ndarray, joints: np.ndarray) -> None:
             f"{path}: v_template is {size[1]:.3g} high along y, {size[0]:.3g} wide and {size[2]:.3g} deep; "
             "expected a standing body in metres, y up"
         )
-    out = np.flatnonzero((joints < low - 0.02).any(axis=1) | (joints > high + 0.02).any(axis=1))
-    if len(out):
-        place = ", ".join(f"{x:.3g}" for x in joints[out[0]])
+    outside = np.flatnonzero((joints < low - 0.02).any(axis=1) | (joints > high + 0.02).any(axis=1))
+    if len(outside):
+        place = ", ".join(f"{x:.3g}" for x in joints[outside[0]])
         raise BodyError(
-            f"{path}: joint {JOINT_NAMES[out[0]]} at ({place}) is outside of the body; "
+            f"{path}: joint {JOINT_NAMES[outside[0]]} at ({place}) is outside of the body; "
             "give joints in metres and in SMPL's order"
         )
     at = {name: joints[JOINT[name]] for name in JOINT}
@@ -219,6 +243,7 @@ def _check_place(path: Path, template: np.ndarray, joints: np.ndarray) -> None:
 
 
 def _in_t_pose(path: Path, rest: dict[str, Any]) -> dict[str, Any]:
+    """Return the arrays of `_rest_arrays` with horizontal arms. Raises BodyError."""
     lowered = arm_angles(rest["joint_template"])
     if np.abs(lowered).max() <= T_POSE:
         return rest
@@ -245,7 +270,7 @@ def _in_t_pose(path: Path, rest: dict[str, Any]) -> dict[str, Any]:
 
 
 def _faces(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
-    """Triangles (F, 3) of a closed surface, outward."""
+    """Return the triangles (F, 3) of a closed surface, wound outward. Raises BodyError."""
     if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu" or faces.size == 0:
         raise BodyError(
             f"{path}: f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)"
@@ -258,15 +283,15 @@ def _faces(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     if len(np.unique(edges, axis=0)) != len(edges) or (edges[:, 0] == edges[:, 1]).any():
         raise BodyError(f"{path}: f is not a closed surface with one winding; inside and outside need one")
-    faces = _filled(path, faces, template)
+    faces = _fill_holes(path, faces, template)
     a, b, c = (template[faces[:, k]] for k in range(3))
     if np.einsum("ij,ij->", a, np.cross(b, c)) < 0:
         raise BodyError(f"{path}: f winds inwards; reverse the order of each triangle's vertices")
     return faces
 
 
-def _filled(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
-    """Small holes, as the eyes of SMPL-X, closed by fans of triangles."""
+def _fill_holes(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
+    """Return the faces with small holes, as the eyes of SMPL-X, closed by fans of triangles."""
     try:
         loops = boundary_loops(faces)
     except ValueError as error:

@@ -12,13 +12,13 @@ SIDES = (("left", 1.0), ("right", -1.0))
 
 
 def arm_angles(joints: Array) -> Array:
-    """Angle (2,) [rad] by which the left and the right arm, shoulder to wrist, hang down; joints (24, 3)."""
+    """Return the angles (2,) [rad] by which the left and right arm of joints (24, 3) [m] hang down."""
     arms = [joints[JOINT[f"{side}_wrist"]] - joints[JOINT[f"{side}_shoulder"]] for side, _ in SIDES]
     return np.array([np.arctan2(-arm[1], sign * arm[0]) for arm, (_, sign) in zip(arms, SIDES, strict=True)])
 
 
 def arm_rotations(angles: Array) -> Array:
-    """World rotation of each joint (24, 3, 3) that lifts each arm, as one piece, by angles (2,) [rad]."""
+    """Return the world rotations (24, 3, 3) that lift each arm, as one piece, by angles (2,) [rad]."""
     turns = np.broadcast_to(np.eye(3), (len(JOINT), 3, 3)).copy()
     for (side, sign), angle in zip(SIDES, angles, strict=True):
         c, s = np.cos(angle), sign * np.sin(angle)
@@ -27,12 +27,20 @@ def arm_rotations(angles: Array) -> Array:
 
 
 def turn_rest_pose(points: Array, joints: Array, weights: Array, turns: Array) -> tuple[Array, Array]:
-    """Vertices (B, 3, K) and joints (24, 3, K) of a body whose joints turn by (24, 3, 3) in the world.
+    """Turn the joints of an unposed body in the world, and its vertices with them.
 
     The new rest pose is the one that linear blend skinning takes back to the old one exactly: each vertex is
     moved by the inverse of the blended transform. Blending forwards would lose volume at the shoulder here,
-    and once more whenever the arm comes down. All is linear in points and joints together, so each of the K
-    columns may be a body or a shape direction.
+    and once more whenever the arm comes down. All is linear in points and joints together.
+
+    Args:
+        points: (B, 3, K) [m], K bodies or shape directions.
+        joints: (24, 3, K) [m] of the same.
+        weights: (B, 24) of skinning.
+        turns: (24, 3, 3), world rotation of each joint.
+
+    Returns:
+        Turned vertices (B, 3, K) and joints (24, 3, K) [m].
     """
     moved = joints.copy()
     for joint, parent in enumerate(PARENTS):

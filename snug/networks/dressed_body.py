@@ -14,9 +14,9 @@ import torch
 from torch import Tensor
 
 from reference_sim.material import Material
+from snug.body.parametric_body import SHAPES
 from snug.body.skeleton import rotation_matrices
 from snug.body.skinning import skin
-from snug.body.smpl_files import SHAPES
 from snug.networks.inputs import HISTORY, motion_history
 from snug.recipes.recipe import Recipe
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, cast
 import torch
 from torch import Tensor, nn
 
-from snug.body.smpl_files import SHAPES
+from snug.body.parametric_body import SHAPES
 from snug.kernels.gru import run_gru, run_linear
 from snug.networks.regressor import Regressor
 

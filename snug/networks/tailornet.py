@@ -21,8 +21,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from snug.body.parametric_body import SHAPES
 from snug.body.skinning import unskin
-from snug.body.smpl_files import SHAPES
 from snug.networks.regressor import Regressor
 from snug.training.vertex_targets import CM2_PER_M2, VertexTargets
 

@@ -37,6 +37,7 @@ from reference_sim.trajectory.point_cache import read_point_cache, write_point_c
 from reference_sim.trajectory.resume import recover
 from snug.body.parametric_body import Body
 from snug.body.skeleton import BodyError
+from snug.body.smpl_files import read_body
 from snug.motion.files import load_motions
 from snug.motion.motion import MotionError
 from snug.networks.tensor_file import read_tensors, write_tensors
@@ -280,9 +281,9 @@ MESH = (MeshError,)
 READERS: tuple[Reader, ...] = (
     Reader("array", ".npy", lambda: arrays_npy(), read_array, (ArrayFileError,), bytes_of),
     Reader("arrays", ".npz", arrays(a=CORNERS, b=FACES), read_arrays, (ArrayFileError,), bytes_of),
-    Reader("body", ".npz", arrays(**smpl_arrays()), Body.from_file, (BodyError,), bytes_of),
+    Reader("body", ".npz", arrays(**smpl_arrays()), read_body, (BodyError,), bytes_of),
     Reader("AMASS", ".npz", arrays(**amass_arrays()), read_clip, (MotionError,), bytes_of),
-    Reader("body pickle", ".pkl", pickled(smpl_arrays), Body.from_file, (BodyError,), bytes_of),
+    Reader("body pickle", ".pkl", pickled(smpl_arrays), read_body, (BodyError,), bytes_of),
     Reader("motion pickle", ".pkl", pickled(amass_arrays), read_clip, (MotionError,), bytes_of),
     Reader("BVH", ".bvh", lambda: bvh_text(), read_clip, (MotionError,), bytes_of),
     Reader("roll-out", ".npz", arrays(**roll_out()), read_roll_out, (RollOutError,), bytes_of),

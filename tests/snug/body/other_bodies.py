@@ -15,6 +15,7 @@ from benchmarks.scenes import of_garment
 from reference_sim import Trajectory, simulate
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT, PARENTS
+from snug.body.smpl_files import read_body
 from snug.garments.garment import Garment
 
 SMPL_FACES = 13776  # 6890 vertices
@@ -129,7 +130,7 @@ def read_again(arrays: dict[str, np.ndarray]) -> Body:
     """As a user's file gives it."""
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder) / "body.npz", **arrays)
-        return Body.from_file(Path(folder) / "body.npz")
+        return read_body(Path(folder) / "body.npz")
 
 
 @functools.cache
