@@ -9,7 +9,7 @@ from reference_sim.cloth import Cloth, MeshError
 from reference_sim.material import GRAVITY, Material
 from reference_sim.minimise import Result, minimise
 from reference_sim.potential import Potential
-from reference_sim.simulator import simulate
+from reference_sim.time_loop import simulate
 from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
 from reference_sim.trajectory.writer import TrajectoryWriter
 

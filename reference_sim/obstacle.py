@@ -14,9 +14,9 @@ import numpy as np
 
 from reference_sim.cloth import MeshError
 from reference_sim.contact.closest_point import Closest, FaceTree
+from reference_sim.fingerprint import fingerprint
 from reference_sim.geometry.closed_mesh import check_closed
 from reference_sim.geometry.surface import carry, plane_normals, vertex_normals
-from reference_sim.trajectory.resume import fingerprint
 
 DEFAULT_REGION = 0.20  # [m]
 

@@ -12,7 +12,7 @@ from benchmarks.performance.microbenchmark import Settings
 from benchmarks.process.memory import peak_memory
 from reference_sim import Cloth, Material, Result
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from reference_sim.stepper import State, Stepper
+from reference_sim.time_step import State, TimeStepper
 
 FRAMES = 30
 NEWTON = {"method": "newton"}
@@ -37,13 +37,13 @@ def fall(cloth: Cloth, frames: int, **options: Any) -> list[tuple[Result, float]
     result and seconds of each. Raises ValueError where it diverges.
     """
     terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
-    loop = Stepper(cloth, terms, DT, 1, None, None, False, 0, options)
+    stepper = TimeStepper(cloth, terms, dt=DT, options=options)
     x = cloth.rest_positions + np.random.default_rng(0).normal(0, NOISE, cloth.rest_positions.shape)
     x[cloth.pins] = cloth.rest_positions[cloth.pins]
     state, steps = State(x, np.zeros_like(x)), []
     for frame in range(1, frames + 1):
         clock = time.perf_counter()
-        after, (result,) = loop.advance(frame, state, None)
+        after, (result,) = stepper.advance(frame, state, None)
         steps.append((result, time.perf_counter() - clock))
         if after is None:
             raise ValueError(f"the sheet diverged at frame {frame}: {result.reason}")

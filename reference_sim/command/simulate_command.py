@@ -65,7 +65,7 @@ def _run(options: Namespace) -> int:
     if own and abs(dt - own) > 1e-6 * own:
         _say(f"note: {options.obstacle} has {own:.4g} s between frames, and --dt is {dt:.4g}")
     from reference_sim.command.summary import predicted_stretch, summary
-    from reference_sim.simulator import simulate
+    from reference_sim.time_loop import simulate
 
     stretch, note = predicted_stretch(cloth)
     if note:

@@ -17,10 +17,10 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
+from reference_sim.fingerprint import fingerprint
 from reference_sim.kernels.block_indices import BlockPlaces
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import LANES, add_blocks, arctan2
-from reference_sim.trajectory.resume import fingerprint
 
 if TYPE_CHECKING:
     from torch import Tensor

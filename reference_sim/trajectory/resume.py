@@ -7,7 +7,6 @@ bits as a run that was never interrupted.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
@@ -44,16 +43,6 @@ class PartialRun:
     def complete(self, frames: int) -> bool:
         """Whether nothing is left to do for a run of `frames` frames."""
         return self.ended and (self.trajectory.frames == frames or self.trajectory.status == "diverged")
-
-
-def fingerprint(*arrays: np.ndarray | None) -> str:
-    """A short hash of shapes, types and contents: equal for equal arrays only."""
-    digest = hashlib.blake2b(digest_size=12)
-    for array in arrays:
-        if array is not None:
-            digest.update(f"{array.shape}{array.dtype.str}".encode())
-            digest.update(np.ascontiguousarray(array).data)
-    return digest.hexdigest()
 
 
 def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> PartialRun | None:

@@ -16,7 +16,7 @@ class Fault:
     fast: tuple[str, ...] = ()  # checks that notice it without compiling anything anew
 
 
-MATERIAL, CLOTH, STEPPER = (f"reference_sim/{name}.py" for name in ("material", "cloth", "stepper"))
+MATERIAL, CLOTH, TIME_STEP = (f"reference_sim/{name}.py" for name in ("material", "cloth", "time_step"))
 STVK, SPRING, BARRIER, HINGE = (
     f"reference_sim/energies/{name}.py"
     for name in ("stretch_stvk", "stretch_spring", "area_barrier", "bend_hinge")
@@ -176,7 +176,7 @@ FAULTS = (
     ),
     Fault(
         "pins jump in the first sub-step",
-        STEPPER,
+        TIME_STEP,
         "handles = (1 - share) * handles + share * pins",
         "handles = pins",
         fast=("moving_pins_in_substeps",),
@@ -188,10 +188,10 @@ FAULTS = (
         "fine._substeps = self._substeps",
         fast=("friction_belt_in_substeps",),
     ),
-    Fault("velocity over the square of dt", STEPPER, "(x - before) / self.dt", "(x - before) / self.dt**2"),
+    Fault("velocity over the square of dt", TIME_STEP, "(x - before) / self.dt", "(x - before) / self.dt**2"),
     Fault(
         "sub-steps of a whole frame",
-        STEPPER,
+        TIME_STEP,
         "self.frame_dt, self.dt = dt, dt / substeps",
         "self.frame_dt, self.dt = dt, dt",
     ),

@@ -33,7 +33,7 @@ ALLOWED = {
     ),
 }
 # The referee's solvers are not for the contestants.
-FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate")}
+FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate", "reference_sim.time_loop")}
 # A run ends by making the report of the run that it wrote.
 EXCEPTIONS = {("benchmarks/runner/whole_run.py", "reports.build.build_report")}
 # Headline geometry must not share an error with the physics.

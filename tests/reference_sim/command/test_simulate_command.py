@@ -374,7 +374,7 @@ def test_interrupted_by_hand(folder, capsys, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("reference_sim.simulator.simulate", interrupt)
+    monkeypatch.setattr("reference_sim.time_loop.simulate", interrupt)
     assert main(["sheet.obj", "-o", "out.vtkhdf"]) == 130
     assert "--resume goes on from out.vtkhdf" in capsys.readouterr().err
 

@@ -1,9 +1,10 @@
-"""Backward Euler as a sequence of minimisations.
+"""The loop over frames: backward Euler as a sequence of minimisations.
 
     x_{t+1} = argmin  1/(2 dt^2) (x - x_hat)^T M (x - x_hat) + Phi(x),   x_hat = x_t + dt v_t
 
 (SNUG, eq. 4; Martin et al. 2011; Gast et al. 2015). The velocity of the next step is (x_{t+1} - x_t) / dt.
 With sub-steps a stored frame is n such steps of dt / n, pins and obstacle moving linearly in between.
+time_step.py takes one frame; here frames are counted, timed, recorded and resumed.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
+from reference_sim.fingerprint import fingerprint
 from reference_sim.minimise import Result
 from reference_sim.progress import progress_bar
-from reference_sim.stepper import State, Stepper
+from reference_sim.time_step import State, TimeStepper
 from reference_sim.trajectory.recorder import Recorder
-from reference_sim.trajectory.resume import fingerprint, recover
+from reference_sim.trajectory.resume import recover
 from reference_sim.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -87,6 +89,19 @@ def simulate(
         ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, a step of no size, a
             tolerance that is no number above 0, refreeze with resume.
         TrajectoryError: `path` cannot be resumed: unreadable, or made by another run.
+
+    Example: a triangle that one corner holds falls by g dt^2 in the first step.
+
+        >>> import numpy as np
+        >>> from reference_sim import Cloth, simulate
+        >>> from reference_sim.energies import Gravity
+        >>> triangle = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1]])
+        >>> cloth = Cloth(triangle, np.array([[0, 2, 1]]), pins=[0])
+        >>> fall = simulate(cloth, [Gravity(cloth)], dt=0.01, frames=3)
+        >>> fall.status, fall.positions.shape
+        ('converged', (3, 3, 3))
+        >>> fall.positions[:, 1, 1].round(6).tolist()
+        [0.0, -0.000981, -0.002943]
     """
     for name, count in (("frames", frames), ("substeps", substeps)):
         if count < 1:
@@ -97,22 +112,32 @@ def simulate(
         raise ValueError("simulate: a run with refreeze cannot be resumed: start it again without resume")
     x = _checked(start, cloth.rest_positions, "start")
     v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
-    loop = Stepper(cloth, energies, dt, substeps, obstacle, guess, quasi_static, refreeze, options)
-    provenance = loop.provenance() | {"start": fingerprint(x, v)}
+    stepper = TimeStepper(
+        cloth,
+        energies,
+        dt=dt,
+        substeps=substeps,
+        obstacle=obstacle,
+        guess=guess,
+        quasi_static=quasi_static,
+        refreeze=refreeze,
+        options=options,
+    )
+    provenance = stepper.provenance() | {"start": fingerprint(x, v)}
     earlier = recover(path, provenance, frames=frames) if resume and path else None
     if earlier and earlier.complete(frames):
         return earlier.trajectory
     if earlier is None:
-        loop.check_start(x, v)
-    state = State(x, v) if earlier is None else loop.resumed(earlier, v, pin_positions)
+        stepper.check_start(x, v)
+    state = State(x, v) if earlier is None else stepper.resumed(earlier, v, pin_positions)
     with Recorder(cloth, provenance, path) as record:
         if earlier is None:
-            record.start(x, loop.first_fields())
+            record.start(x, _fields_of_start(stepper.potential.energies))
         else:
             record.replay(earlier)
-        for frame in _bar(range(record.frames, frames), progress):
+        for frame in _with_bar(range(record.frames, frames), progress):
             clock = time.perf_counter()
-            after, results = loop.advance(frame, state, pin_positions and pin_positions(frame))
+            after, results = stepper.advance(frame, state, pin_positions and pin_positions(frame))
             seconds = time.perf_counter() - clock
             record.note(frame, results)
             if after is None:
@@ -120,6 +145,16 @@ def simulate(
             state = after
             record.add(state.x, frame * dt, seconds, _fields(results), state.before)
     return record.trajectory()
+
+
+def _fields_of_start(energies: Sequence[Energy]) -> dict[str, float]:
+    """Return the fields of frame 0, which is given and was not minimised."""
+    counts = {"iterations": 0.0, "factorisations": 0.0, "gradient_norm": float("nan")}
+    return (
+        counts
+        | {"converged": 1.0, "relaxed": 0.0}
+        | {f"energy/{energy.name}": float("nan") for energy in energies}
+    )
 
 
 def _fields(results: Sequence[Result]) -> dict[str, float]:
@@ -141,7 +176,7 @@ def _checked(value: np.ndarray | None, default: np.ndarray, name: str) -> np.nda
     return value
 
 
-def _bar(frames: range, label: str | None) -> Iterator[int] | range:
+def _with_bar(frames: range, label: str | None) -> Iterator[int] | range:
     if label is None:
         return frames
     return progress_bar(frames, desc=label, unit="frame", initial=frames.start, total=frames.stop)

@@ -1,4 +1,4 @@
-"""Backward-Euler steps: the first guess, the way there, and the state that one step leaves to the next."""
+"""One frame of backward Euler: first guess, frozen terms, minimisation, and the state left to the next."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
+from reference_sim.fingerprint import fingerprint
 from reference_sim.minimise import Minimiser, Result, make_minimiser
 from reference_sim.potential import Potential
-from reference_sim.trajectory.resume import PartialRun, fingerprint
+from reference_sim.trajectory.resume import PartialRun
 from reference_sim.trajectory.trajectory import TrajectoryError
 
 if TYPE_CHECKING:
@@ -27,9 +28,12 @@ PART = 0.8  # of the way to the next touch: closer, a barrier grows stiff
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Between two frames: positions x (V, 3) [m] and velocity v (V, 3) [m/s].
+    """Positions and velocity between two frames.
 
-    before: both (2, V, 3) one step earlier, where a resumed run needs them stored.
+    Attributes:
+        x: (V, 3) [m].
+        v: (V, 3) [m/s].
+        before: (2, V, 3) both one step earlier, where a resumed run needs them stored.
     """
 
     x: np.ndarray
@@ -37,22 +41,38 @@ class State:
     before: np.ndarray | None = None
 
 
-class Stepper:
-    """What stays the same from frame to frame: the potential, its minimiser, the rule for a first guess."""
+class TimeStepper:
+    """Backward Euler from frame to frame: the potential, its minimiser, the rule for a first guess.
+
+    Args:
+        cloth: the rest state.
+        energies: the terms of Phi; inertia is added.
+        dt: time between frames [s].
+        substeps: steps per frame.
+        obstacle: the moving body, one mesh per frame.
+        guess: one of GUESSES, see `simulate`.
+        quasi_static: whether the velocity is forgotten at every frame.
+        refreeze: times that what a step freezes is searched again at its end, and the step solved again.
+        options: of the minimiser.
+
+    Raises:
+        ValueError: unknown guess, or a negative refreeze.
+    """
 
     def __init__(
         self,
         cloth: Cloth,
         energies: Sequence[Energy],
+        *,
         dt: float,
-        substeps: int,
-        obstacle: Obstacle | None,
-        guess: str | None,
-        quasi_static: bool,
-        refreeze: int,
+        substeps: int = 1,
+        obstacle: Obstacle | None = None,
+        guess: str | None = None,
+        quasi_static: bool = False,
+        refreeze: int = 0,
         options: dict[str, Any],
     ) -> None:
-        from reference_sim.energies.inertia import Inertia
+        from reference_sim.energies.inertia import Inertia  # not loaded for a static problem
 
         if guess is None:
             guess = "extrapolated" if obstacle is None else "body_transported"
@@ -73,7 +93,7 @@ class Stepper:
         self.minimiser = make_minimiser(self.potential, **self.options)
 
     def check_start(self, x: np.ndarray, v: np.ndarray) -> None:
-        """Raises ValueError where x (V, 3) at frame 0 is impossible for a term that nothing may pass."""
+        """Raise ValueError where x (V, 3) [m] at frame 0 is impossible for a term that nothing may pass."""
         if self.potential.impassable:
             self.prepare(1, x, v, x[self.cloth.pins])
             self.potential.set_progress(0.0)
@@ -81,7 +101,11 @@ class Stepper:
                 raise ValueError(f"simulate: the start is not free of intersections: {infeasibility}")
 
     def advance(self, frame: int, state: State, pins: np.ndarray | None) -> tuple[State | None, list[Result]]:
-        """The sub-steps to `frame`, pins (P, 3) [m] at its end; the state is None if one of them diverged."""
+        """Take the sub-steps to `frame`, with pins (P, 3) [m] at its end.
+
+        Returns:
+            The state at the frame, None if a sub-step diverged, and the result of each minimisation.
+        """
         x, v, results = state.x, state.v, []
         for j in range(1, self.substeps + 1):
             share = j / self.substeps
@@ -104,11 +128,14 @@ class Stepper:
         return State(x, v, before if self.substeps > 1 else None), results
 
     def velocity(self, x: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """What a step from `before` to x (V, 3) leaves behind [m/s]."""
+        """Return the velocity (V, 3) [m/s] that a step from `before` to x (V, 3) [m] ends with."""
         return np.zeros_like(x) if self.quasi_static else (x - before) / self.dt
 
     def prepare(self, step: int, x: np.ndarray, v: np.ndarray, handles: np.ndarray) -> np.ndarray:
-        """Freeze every term for the step from x with velocity v (V, 3); returns its first guess (V, 3)."""
+        """Freeze every term for the step from x with velocity v (V, 3); return its first guess (V, 3) [m].
+
+        handles: (P, 3) [m] where the pins are at the end of the step.
+        """
         if self.guess == "body_transported":
             assert self.obstacle is not None
             first = self.obstacle.transported(x, step, self.cloth.rest_positions)
@@ -125,7 +152,11 @@ class Stepper:
     def resumed(
         self, earlier: PartialRun, v0: np.ndarray, pin_positions: Callable[[int], np.ndarray] | None
     ) -> State:
-        """The state at the last frame of an earlier run that began with velocity v0 (V, 3)."""
+        """Return the state at the last frame of an earlier run that began with velocity v0 (V, 3).
+
+        Raises:
+            TrajectoryError: the pins are elsewhere, or what the next step needs is not in the file.
+        """
         positions, before = earlier.trajectory.positions, earlier.before
         last = len(positions) - 1
         x = positions[last]
@@ -174,7 +205,7 @@ class Stepper:
                     x, progress = x + part * (goal - x), progress + part * (1 - progress)
                 shares.append(share)
             potential.set_progress(progress)
-            x = self.rough.minimise(x).positions
+            x = self.rough_minimiser.minimise(x).positions
             goal = x + (1 - progress) * motion
             goal[pins] = guess[pins]
             reached.append(progress)
@@ -187,24 +218,13 @@ class Stepper:
         return replace(result, status="stalled", reason=reason)
 
     @cached_property
-    def rough(self) -> Minimiser:
-        """What gains distance half-way: a few iterations."""
+    def rough_minimiser(self) -> Minimiser:
+        """Minimiser of few iterations, which gains distance half-way."""
         options: dict[str, Any] = self.options | {"max_iterations": 8, "tolerance": 1e-2}
         return make_minimiser(self.potential, **options)
 
-    def first_fields(self) -> dict[str, float]:
-        """The fields of frame 0, which is given."""
-        names = [energy.name for energy in self.potential.energies]
-        fields = dict.fromkeys([f"energy/{name}" for name in names], float("nan"))
-        return {
-            "iterations": 0.0,
-            "factorisations": 0.0,
-            "gradient_norm": float("nan"),
-            "converged": 1.0,
-            "relaxed": 0.0,
-        } | fields
-
     def provenance(self) -> dict[str, Any]:
+        """Return JSON values of everything that decides the result: a resumed run must have the same."""
         cloth, obstacle = self.cloth, self.obstacle
         return {
             "method": "backward Euler",
