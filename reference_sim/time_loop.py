@@ -19,7 +19,7 @@ import numpy as np
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
 from reference_sim.fingerprint import fingerprint
-from reference_sim.minimise import Result
+from reference_sim.minimise.result import Result
 from reference_sim.progress import progress_bar
 from reference_sim.time_step import State, TimeStepper
 from reference_sim.trajectory.recorder import Recorder

@@ -12,7 +12,8 @@ import numpy as np
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.fingerprint import fingerprint
-from reference_sim.minimise import Minimiser, Result, make_minimiser
+from reference_sim.minimise.methods import Minimiser, make_minimiser
+from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 from reference_sim.trajectory.resume import PartialRun
 from reference_sim.trajectory.trajectory import TrajectoryError

@@ -17,7 +17,7 @@ from benchmarks.meshes import square_sheet
 from benchmarks.performance.microbenchmark import Settings
 from reference_sim import Cloth, Material, Potential, simulate
 from reference_sim.energies import Energy, Gravity, StretchStVK
-from reference_sim.minimise import minimise
+from reference_sim.minimise.methods import minimise
 
 CELLS, FRAMES = 14, 20
 STATIC = 1e6  # [s]: inertia of such a step is below round-off

@@ -1,14 +1,12 @@
-"""What Newton's method asks before it says converged, and the way out of a saddle."""
+"""The test of a minimum by its curvature, before Newton's method says converged, and the way off a saddle."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
 from reference_sim.minimise.factorised import FactorisedDescent
 from reference_sim.minimise.lbfgs_history import dot
-from reference_sim.minimise.result import Result
+from reference_sim.minimise.result import Stop
 
 POWER = 8  # inverse iterations for the direction of most negative curvature
 FIRST_ESCAPE = 100  # of the step tolerance: first length of the step along it
@@ -17,11 +15,17 @@ LAST_SHIFT = 1e12  # in units of M/dt^2
 
 def convergence_check(
     run: FactorisedDescent, data: np.ndarray, *, tolerance: float, step_tolerance: float
-) -> Result | None:
-    """Converged, stuck on a saddle, or None: go on. The gradient of `run` is small; data: its true Hessian.
+) -> Stop | None:
+    """Return "converged", "stalled" on a saddle, or None to go on, where the gradient of `run` is small.
 
-    What is left to ask is whether that is positive definite (up to round-off, so that rigid motions of an
-    unpinned cloth do not count) and its step below step_tolerance [m].
+    Asks whether the true Hessian is positive definite (up to round-off, so that rigid motions of an unpinned
+    cloth do not count) and its step small. Off a saddle it takes a step, which is an iteration.
+
+    Args:
+        run: the minimisation.
+        data: (nnz,) values of its true Hessian.
+        tolerance: relative residual [1]; above it, round-off excuses the residual.
+        step_tolerance: largest Newton step [m] that counts as none.
     """
     residual = run.gradient_norm()
     relaxed = residual > tolerance
@@ -37,22 +41,20 @@ def convergence_check(
             if not small and run.factorise(data, 0.0):
                 return None
             # Without curvature no step can be told from another.
-            found = f"Newton step {step:.1e} m" if small else "a direction without curvature"
-            why = f"{why}, {found}{run.hessian.evidence}"
-            if not run.hessian.settled:
-                return run.result("stalled", why)
-            return replace(run.result("converged", why), relaxed=relaxed)
+            evidence = f"Newton step {step:.1e} m" if small else "a direction without curvature"
+            why = f"{why}, {evidence}{run.hessian.evidence}"
+            return Stop("converged", why, relaxed) if run.hessian.settled else Stop("stalled", why)
     if escape_saddle(run, data, FIRST_ESCAPE * step_tolerance):
         run.iterations += 1
         run.show()
         return None
-    return run.result("stalled", "a saddle: negative curvature, and no step along it lowers the energy")
+    return Stop("stalled", "a saddle: negative curvature, and no step along it lowers the energy")
 
 
 def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bool:
     """Step along a direction of negative curvature: the one that was met, or else the most negative one.
 
-    length: of the first step tried [m].
+    length: of the first step tried [m]. Returns whether the energy fell.
     """
     met = run.hessian.downward
     v = most_negative(run, data) if met is None else met / np.abs(met).max()
@@ -72,7 +74,10 @@ def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bo
 
 
 def most_negative(run: FactorisedDescent, data: np.ndarray) -> np.ndarray | None:
-    """The direction (3n,) of most negative curvature, by inverse iteration; None if no shift outdoes it."""
+    """Return the direction (3n,) of most negative curvature by inverse iteration.
+
+    None if no shift outdoes it.
+    """
     shift = 1.0
     while not run.factorise(data, shift):
         shift *= 4

@@ -1,4 +1,4 @@
-"""What every minimisation keeps while it goes down: where it is, what it counted, and how it reports."""
+"""State of a minimisation: the point reached, counts, clock, line search and report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from reference_sim.material import GRAVITY
 from reference_sim.minimise.lbfgs_history import LBFGSHistory, dot
-from reference_sim.minimise.result import Result
+from reference_sim.minimise.result import Result, Stop
 from reference_sim.potential import Potential
 
 SUFFICIENT_DECREASE = 1e-4
@@ -55,16 +55,16 @@ class Descent:
 
     @property
     def finite(self) -> bool:
-        """Whether value and gradient are numbers."""
+        """True if value and gradient are numbers."""
         return bool(np.isfinite(self.value) and np.isfinite(self.g).all())
 
     def show(self) -> None:
-        """Let the observer see the point kept last."""
+        """Show the observer the point kept last."""
         if self.observe is not None:
             self.observe(self.x.copy())
 
     def evaluate(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Value [J] and gradient over the free vertices, flat (3n,) [N], at x (V, 3)."""
+        """Return the value [J] and the gradient over the free vertices, flat (3n,) [N], at x (V, 3) [m]."""
         start = time.perf_counter()
         with np.errstate(all="ignore"):  # a trial point far off is refused by its value, not by a warning
             value, gradient = self.potential.value_and_gradient(x)
@@ -72,7 +72,7 @@ class Descent:
         return value, gradient[self.free].ravel()
 
     def spread(self, p: np.ndarray) -> np.ndarray:
-        """A flat direction of the free vertices as (V, 3); pinned vertices stay."""
+        """Return a flat direction (3n,) of the free vertices as (V, 3); pinned vertices stay."""
         step = np.zeros_like(self.x)
         step[self.free] = p.reshape(-1, 3)
         return step
@@ -80,8 +80,13 @@ class Descent:
     def line_search(self, p: np.ndarray, slope: float, allowed: float | None = None) -> float:
         """Halve the step along p (3n,) until the energy falls enough, and go there.
 
-        allowed: share of p that no term forbids, where it is known already. Returns the share of p that was
-        taken, 0 if none would do.
+        Args:
+            p: (3n,) [m].
+            slope: of the energy along p [J].
+            allowed: share of p that no term forbids, where it is known already.
+
+        Returns:
+            The share of p that was taken, 0 if none would do.
         """
         step = self.spread(p)
         alpha = self.potential.largest_step(self.x, step) if allowed is None else allowed
@@ -98,7 +103,11 @@ class Descent:
         return 0.0
 
     def quasi_newton_step(self, history: LBFGSHistory, solve: Callable[[np.ndarray], np.ndarray]) -> bool:
-        """One step of L-BFGS, added to the history; a direction that fails is tried again without history."""
+        """Take one step of L-BFGS and add it to the history; return whether there was one.
+
+        A direction that fails is tried again without history. solve: applies the first guess of the inverse
+        Hessian to (3n,).
+        """
         while True:
             p, g = history.direction(self.g, solve), self.g
             slope = dot(g, p)
@@ -110,18 +119,20 @@ class Descent:
             history.clear()
 
     def gradient_norm(self) -> float:
-        """Relative residual [1]; see `Result.gradient_norm`."""
+        """Return the relative residual [1]; see `Result.gradient_norm`."""
         return float(np.abs(self.g).max(initial=0.0)) / self.weight
 
     def late(self, timeout: float) -> bool:
+        """Return whether more than `timeout` seconds have passed since the start."""
         return time.perf_counter() - self.started > timeout
 
-    def result(self, status: str, reason: str) -> Result:
-        """The Result at the point kept last."""
+    def result(self, stop: Stop) -> Result:
+        """Return the Result at the point kept last."""
         return Result(
             positions=self.x,
-            status=status,
-            reason=reason,
+            status=stop.status,
+            reason=stop.reason,
+            relaxed=stop.relaxed,
             iterations=self.iterations,
             factorisations=self.factorisations,
             gradient_norm=self.gradient_norm(),
@@ -132,19 +143,19 @@ class Descent:
 
 
 def mean_weight(potential: Potential) -> float:
-    """Mean weight of a vertex of the potential's cloth [N]; a gradient over it is a relative residual."""
+    """Return the mean weight of a vertex of the cloth [N]; a gradient over it is a relative residual."""
     return float(potential.cloth.masses.mean() * GRAVITY)
 
 
 def sufficient_decrease(before: float, after: float, slope: float) -> bool:
-    """Whether the energy fell enough on a step whose linear prediction is `slope` (Armijo)."""
+    """Return whether the energy [J] fell enough on a step whose linear prediction is `slope` (Armijo)."""
     return after <= before + SUFFICIENT_DECREASE * slope
 
 
 def approximate_wolfe(before: float, after: float, slope: float, end_slope: float) -> bool:
-    """Whether, within round-off of the energy, the slopes at both ends say that it fell.
+    """Return whether, within round-off of the energy, the slopes at both ends of a step say that it fell.
 
-    Hager and Zhang 2005, approximate Wolfe conditions.
+    Source: Hager and Zhang 2005, approximate Wolfe conditions.
     """
     noise = 1e-13 * abs(before)
     flat = after <= before + noise and -slope < 100 * noise

@@ -23,8 +23,9 @@ import numpy as np
 from reference_sim.energies.term_kinds import has_kernels
 from reference_sim.minimise.descent import Descent, Observer
 from reference_sim.minimise.lbfgs_history import LBFGSHistory
+from reference_sim.minimise.loop import NOT_FINITE, iterate
 from reference_sim.minimise.newton import Newton
-from reference_sim.minimise.result import Result, check_tolerance
+from reference_sim.minimise.result import Result, Stop, check_tolerance
 from reference_sim.minimise.scalar_preconditioner import ScalarPreconditioner
 from reference_sim.potential import Potential
 
@@ -36,9 +37,10 @@ LARGEST_COMPILED = 10_000  # vertices: from about here on a package's factorisat
 
 
 class LBFGS:
-    """A minimiser bound to one potential.
+    """Preconditioned L-BFGS for one potential, finished by Newton's method.
 
     Args:
+        potential: the sum of energies.
         tolerance: as in Newton.
         max_iterations: iterations, of Newton's too, before giving up with status max_iterations.
         memory: number of remembered steps; 0 is preconditioned gradient descent.
@@ -51,7 +53,8 @@ class LBFGS:
             compiled part with the last.
 
     Raises:
-        ValueError: no term of the potential has a scalar stiffness.
+        ValueError: no term of the potential has a scalar stiffness, or a tolerance that is no finite number
+            above 0.
     """
 
     def __init__(
@@ -89,24 +92,43 @@ class LBFGS:
 
     @cached_property
     def preconditioner(self) -> ScalarPreconditioner:
+        """Scalar stiffness of the potential, analysed when first needed."""
         return ScalarPreconditioner(self.potential)
 
     def minimise(self, x0: np.ndarray) -> Result:
-        """Run from x0 (V, 3) [m]."""
+        """Minimise from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
         if self._newton is not None and self._compiled is not None:
             first = self._in_float32(self._compiled, x0)
             if first is not None:
                 if self.observe is not None:
                     self.observe(x0.copy())
                 return self._newton.minimise(first.x, after=first)
-        run = _Run(self, x0)
-        status, reason = run.to_the_end()
-        if self._newton is None or status in ("diverged", "timeout"):
-            return run.result(status, reason)
+        run = LBFGSRun(self, x0)
+        stop = iterate(self, run)
+        if self._newton is None or stop.status in ("diverged", "timeout"):
+            return run.result(stop)
         return self._newton.minimise(run.x, after=run)
 
+    def init(self, run: LBFGSRun) -> Stop | None:
+        """Factorise the preconditioner at the start, once for all steps."""
+        if not run.finite:
+            return NOT_FINITE
+        return None if run.factorise() else Stop("stalled", "the preconditioner is not positive definite")
+
+    def terminate(self, run: LBFGSRun) -> Stop | None:
+        """Stop where Newton's method is to take over; nothing but a look at the curvature says converged."""
+        if run.gradient_norm() > self.switch:
+            return None
+        return Stop("max_iterations", "gradient within tolerance; curvature not checked")
+
+    def step(self, run: LBFGSRun) -> Stop | None:
+        """Take one quasi-Newton step by line search."""
+        if run.quasi_newton_step(run.history, run.solve):
+            return None
+        return Stop("stalled", "no step along the quasi-Newton direction lowers the energy")
+
     def _in_float32(self, compiled: CompiledLBFGS, x0: np.ndarray) -> Descent | None:
-        """Where the compiled part ends.
+        """Return the state where the compiled part ends.
 
         None if that is not below x0 (V, 3), if x0 has no energy, or if nothing is left to Newton, where the
         rounding of float32 would stay in the answer.
@@ -133,43 +155,28 @@ def _compiled(potential: Potential, max_iterations: int, switch: float) -> Compi
     return CompiledLBFGS(potential, max_iterations=max_iterations, tolerance=switch)
 
 
-class _Run(Descent):
-    """State of one minimisation by L-BFGS."""
+class LBFGSRun(Descent):
+    """State of one minimisation by L-BFGS: its history, and the preconditioner factorised at the start."""
 
-    def __init__(self, owner: LBFGS, x: np.ndarray) -> None:
-        super().__init__(owner.potential, x, observe=owner.observe)
-        self.o = owner
-        self.history = LBFGSHistory(owner.memory)
+    def __init__(self, solver: LBFGS, x: np.ndarray) -> None:
+        super().__init__(solver.potential, x, observe=solver.observe)
+        self.preconditioner = solver.preconditioner
+        self.history = LBFGSHistory(solver.memory)
 
-    def to_the_end(self) -> tuple[str, str]:
-        if not self.finite:
-            return "diverged", "energy or gradient is not finite at the starting point"
-        if not self.precondition():
-            return "stalled", "the preconditioner is not positive definite"
-        self.show()
-        while self.gradient_norm() > self.o.switch:
-            if self.iterations >= self.o.max_iterations:
-                return "max_iterations", f"gave up after {self.iterations} iterations"
-            if self.late(self.o.timeout):
-                return "timeout", f"gave up after {self.o.timeout:g} s"
-            if not self.quasi_newton_step(self.history, self.solve):
-                return "stalled", "no step along the quasi-Newton direction lowers the energy"
-            self.iterations += 1
-            self.show()
-        return "max_iterations", "gradient within tolerance; curvature not checked"
-
-    def precondition(self) -> bool:
+    def factorise(self) -> bool:
+        """Factorise the preconditioner here; return whether it is positive definite."""
         start = time.perf_counter()
-        data = self.o.preconditioner.assemble(self.x)
+        data = self.preconditioner.assemble(self.x)
         middle = time.perf_counter()
-        done = self.o.preconditioner.factorise(data)
+        done = self.preconditioner.factorise(data)
         self.factorisations += 1
         self.seconds["assemble"] += middle - start
         self.seconds["factorise"] += time.perf_counter() - middle
         return done
 
     def solve(self, q: np.ndarray) -> np.ndarray:
+        """Return the inverse of the preconditioner times q (3n,)."""
         start = time.perf_counter()
-        p = self.o.preconditioner.solve(q)
+        p = self.preconditioner.solve(q)
         self.seconds["solve"] += time.perf_counter() - start
         return p

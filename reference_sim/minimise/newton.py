@@ -29,7 +29,8 @@ from reference_sim.minimise.descent import Descent, Observer, approximate_wolfe,
 from reference_sim.minimise.factorised import FactorisedDescent, FactorisedHessian
 from reference_sim.minimise.iterative import LARGEST_FACTORISED, IterativeHessian
 from reference_sim.minimise.lbfgs_history import LBFGSHistory, dot
-from reference_sim.minimise.result import Result, check_tolerance
+from reference_sim.minimise.loop import NOT_FINITE, iterate
+from reference_sim.minimise.result import Result, Stop, check_tolerance
 from reference_sim.potential import Potential
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
@@ -44,9 +45,10 @@ WINDOW, RATE = 8, 0.5  # it is given up where so many steps do not bring the gra
 
 
 class Newton:
-    """A minimiser bound to one potential: its symbolic analysis is done once and serves every step.
+    """Newton's method for one potential: its symbolic analysis is done once and serves every step.
 
     Args:
+        potential: the sum of energies.
         tolerance: largest relative residual at the end, see `Result.gradient_norm`.
         max_iterations: iterations before giving up with status max_iterations; every direction solved for is
             one, also one that is taken back.
@@ -56,6 +58,9 @@ class Newton:
         start_projected: whether the first iterations take all negative curvature out: one Hessian is then
             assembled where the search for the least projection assembles five.
         observe: called with every point (V, 3) [m] that was kept, the start included.
+
+    Raises:
+        ValueError: a tolerance that is no finite number above 0.
     """
 
     def __init__(
@@ -80,105 +85,117 @@ class Newton:
         self.step_tolerance = STEP_TOLERANCE * float(potential.cloth.edge_lengths.mean())
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:
-        """Run from x0 (V, 3) [m]; counts and clock go on from those of `after`."""
-        result = Run(self, x0, after).to_the_end()
+        """Minimise from x0 (V, 3) [m]; counts and clock go on from those of `after`."""
+        run = NewtonRun(self, x0, after)
+        try:
+            result = run.result(iterate(self, run))
+        finally:
+            self.potential.forget()
         wrong = self.potential.infeasibility(result.positions)
         return replace(result, status="diverged", reason=wrong) if wrong else result
 
+    def init(self, run: NewtonRun) -> Stop | None:
+        """Ask no more of the start than an energy."""
+        return None if run.finite else NOT_FINITE
 
-class Run(FactorisedDescent):
-    """State of one minimisation by Newton's method."""
+    def terminate(self, run: NewtonRun) -> Stop | None:
+        """Let the true Hessian decide where the gradient is small; otherwise assemble the next step's."""
+        spent = run.iterations >= self.max_iterations
+        if run.factorisation_serves() and not spent:
+            return None
+        run.residuals = []
+        small = run.gradient_norm() <= self.tolerance
+        # Round-off excuses no more than this (`target`): no Hessian is needed to say so.
+        if spent and run.gradient_norm() > max(self.tolerance, ROUND_OFF):
+            return None
+        if small:
+            self.potential.forget()
+        projection = run.first_projection()
+        run.data = run.assemble(CONVEXITY[0 if small else projection])
+        if not np.isfinite(run.data).all():
+            return Stop("diverged", "the Hessian is not finite")
+        run.target = self.target(run)
+        if run.gradient_norm() > run.target:
+            return None
+        self.potential.forget()
+        data = run.data if small else run.assemble(0.0)
+        stop = convergence_check(run, data, tolerance=self.tolerance, step_tolerance=self.step_tolerance)
+        if stop is None:
+            run.predicting, run.data = False, run.assemble(CONVEXITY[projection])
+        return stop
+
+    def target(self, run: NewtonRun) -> float:
+        """Return the tolerance, but never below what round-off of the positions does to the gradient."""
+        stiffest = self.hessian.stiffest(run.data)
+        round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(run.x).max(initial=0.0))
+        return max(self.tolerance, min(round_off / run.weight, ROUND_OFF))
+
+    def step(self, run: NewtonRun) -> Stop | None:
+        """Go on with the last factorisation while it serves, else with the Hessian that was assembled."""
+        if run.residuals:
+            if run.quasi_newton_step(run.history, run.precondition):
+                run.quasi_newton_steps += 1
+                run.residuals.append(run.gradient_norm())
+                return None
+            run.residuals = []
+            if stop := self.terminate(run):  # with a Hessian of this point
+                return stop
+        x, g, predicted, projection = run.x, run.g, run.predicting, run.first_projection()
+        if not (run.full_steps(run.data, projection) or run.line_search_step(projection, predicted)):
+            return Stop("stalled", "no convexified Newton direction lowers the energy")
+        if self.reuse and run.factorised and not run.predicting:
+            run.history.clear()
+            run.history.add((run.x - x)[run.free].ravel(), run.g - g)
+            run.residuals = [run.gradient_norm()]
+        return None
+
+
+class NewtonRun(FactorisedDescent):
+    """State of one minimisation by Newton's method.
+
+    Attributes:
+        data: (nnz,) values of the Hessian for the next step.
+        target: relative residual that counts as converged at the last Hessian.
+        projection_level: index into CONVEXITY at the last step.
+        raised: whether that step needed a higher one than it began with.
+        predicting: whether the Hessian takes stresses that the last step predicted.
+        watchdog_steps: of the next watchdog: less after one that came to nothing.
+        residuals: relative residuals since the last factorisation, while that is used again; else none.
+    """
 
     def __init__(self, newton: Newton, x: np.ndarray, after: Descent | None) -> None:
         super().__init__(newton.potential, x, newton.hessian, after=after, observe=newton.observe)
-        self.n = newton
+        self.max_iterations, self.timeout = newton.max_iterations, newton.timeout
+        self.data, self.target = np.empty(0), newton.tolerance
         self.quasi_newton_steps = self.iterations
         self.history = LBFGSHistory(MEMORY)
-        self.projection_level = newton.first_level  # index into CONVEXITY at the last step
-        self.raised = newton.first_level > 0  # whether the last step needed a higher one than it began with
-        self.predicting = False  # whether the Hessian takes stresses that the last step predicted
-        self.watchdog_steps = WATCHDOG_STEPS  # of the next watchdog: less after one that came to nothing
+        self.residuals: list[float] = []
+        self.projection_level, self.raised = newton.first_level, newton.first_level > 0
+        self.predicting, self.watchdog_steps = False, WATCHDOG_STEPS
 
-    def to_the_end(self) -> Result:
-        if not self.finite:
-            return self.result("diverged", "energy or gradient is not finite at the starting point")
-        try:
-            return self.iterate()
-        finally:
-            self.potential.forget()
+    def first_projection(self) -> int:
+        """Return the level to begin with: wrinkled cloth stays near that of the last step for a while."""
+        return self.projection_level if self.raised else max(self.projection_level - 1, 0)
 
-    def iterate(self) -> Result:
-        self.show()
-        while True:
-            # Wrinkled cloth stays wrinkled for a while: start near the level that the last step needed.
-            projection = self.projection_level if self.raised else max(self.projection_level - 1, 0)
-            small = self.gradient_norm() <= self.n.tolerance
-            spent = self.iterations >= self.n.max_iterations
-            # Round-off excuses no more than this (`target`): no Hessian is needed to say so.
-            if spent and self.gradient_norm() > max(self.n.tolerance, ROUND_OFF):
-                return self.given_up()
-            if small:  # then the true Hessian decides
-                self.potential.forget()
-            data = self.assemble(CONVEXITY[0 if small else projection])
-            if not np.isfinite(data).all():
-                return self.result("diverged", "the Hessian is not finite")
-            tolerance = self.target(data)
-            if self.gradient_norm() <= tolerance:
-                self.potential.forget()
-                found = convergence_check(
-                    self,
-                    data if small else self.assemble(0.0),
-                    tolerance=self.n.tolerance,
-                    step_tolerance=self.n.step_tolerance,
-                )
-                if found is not None:
-                    return found
-                self.predicting, data = False, self.assemble(CONVEXITY[projection])
-            elif self.late(self.n.timeout):
-                return self.result("timeout", f"gave up after {self.n.timeout:g} s")
-            if spent:
-                return self.given_up()
-            x, g, predicted = self.x, self.g, self.predicting
-            if not (self.full_steps(data, projection) or self.line_search_step(projection, predicted)):
-                return self.result("stalled", "no convexified Newton direction lowers the energy")
-            self.iterations += 1
-            self.show()
-            if self.n.reuse and self.factorised and not self.predicting:
-                self.history.clear()
-                self.history.add((self.x - x)[self.free].ravel(), self.g - g)
-                self.reuse_factorisation(tolerance)
-
-    def given_up(self) -> Result:
-        return self.result("max_iterations", f"gave up after {self.iterations} iterations")
-
-    def reuse_factorisation(self, tolerance: float) -> None:
-        """Quasi-Newton steps on the last factorisation, until a new one would serve better."""
-        norms = [self.gradient_norm()]
-        while norms[-1] > tolerance and self.iterations < self.n.max_iterations:
-            if self.late(self.n.timeout) or not self.quasi_newton_step(self.history, self.precondition):
-                return
-            self.iterations += 1
-            self.quasi_newton_steps += 1
-            self.show()
-            norms.append(self.gradient_norm())
-            if len(norms) > WINDOW and norms[-1] > RATE * min(norms[:-WINDOW]):
-                return
-
-    def target(self, data: np.ndarray) -> float:
-        """The tolerance, but never below what round-off of the positions does to the gradient."""
-        stiffest = self.hessian.stiffest(data)
-        round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(self.x).max(initial=0.0))
-        return max(self.n.tolerance, min(round_off / self.weight, ROUND_OFF))
+    def factorisation_serves(self) -> bool:
+        """Return whether the last factorisation is used again, and better than a new one would be."""
+        norms = self.residuals
+        if not norms or norms[-1] <= self.target:
+            return False
+        return len(norms) <= WINDOW or norms[-1] <= RATE * min(norms[:-WINDOW])
 
     def full_steps(self, data: np.ndarray, projection: int) -> bool:
-        """Full steps until one ends below the start; if none does, back to it, and a part of the first."""
+        """Take full steps until one ends below the start; if none does, go back and take a part of the first.
+
+        Returns whether there was a step.
+        """
         start, value, g = self.x, self.value, self.g
         first, predicted, first_allowed = projection, self.predicting, 1.0
         p, projection = first_p, first_projection = self.direction(data, projection)
         slope = dot(g, p)
         # Every direction is an iteration, also one that is taken back: the loop counts the first.
         watchdog = self.iterations - self.quasi_newton_steps >= WATCHDOG_AFTER
-        most = min(self.watchdog_steps, self.n.max_iterations - self.iterations - 1) if watchdog else 0
+        most = min(self.watchdog_steps, self.max_iterations - self.iterations - 1) if watchdog else 0
         for k in range(most + 1 if slope < 0 else 0):  # none if it is nan
             step = self.spread(p)
             if not np.isfinite(p).all():
@@ -200,7 +217,7 @@ class Run(FactorisedDescent):
                 self.projection_level, self.raised = projection, projection > first
                 self.watchdog_steps = WATCHDOG_STEPS
                 return True
-            if k == most or self.late(self.n.timeout):
+            if k == most or self.late(self.timeout):
                 break
             p, projection = self.direction(self.assemble(CONVEXITY[projection]), projection)
             self.iterations += 1
@@ -212,7 +229,10 @@ class Run(FactorisedDescent):
         return not predicted and slope < 0 and self.line_search(first_p, slope, first_allowed) > 0
 
     def direction(self, data: np.ndarray, projection: int) -> tuple[np.ndarray, int]:
-        """-H^-1 g with the first projection, then shift, that makes H positive definite; its level."""
+        """Return -H^-1 g (3n,) with the first projection, then shift, that makes H positive definite.
+
+        data: (nnz,) the Hessian at level `projection`. The level that was taken comes second.
+        """
         shift = 0.0
         # A singular Hessian, as of cloth that may move rigidly, needs no projection. Inertia excludes it.
         while not self.factorise(
@@ -229,9 +249,10 @@ class Run(FactorisedDescent):
         return p, projection
 
     def line_search_step(self, projection: int, predicted: bool) -> bool:
-        """One step by line search, at rising projection levels, then with rising shifts, until there is one.
+        """Take a step by line search, at rising projection levels, then with rising shifts.
 
-        The level of the first full step was tried already, unless with predicted stresses.
+        The level of the first full step was tried already, unless with predicted stresses. Returns whether
+        there was a step.
         """
         first, shift = projection, 0.0
         projection = projection if predicted else self.projection_level + 1

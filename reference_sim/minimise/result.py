@@ -1,4 +1,4 @@
-"""What a minimiser returns: where it got to, and how far that is from a minimum."""
+"""Result of a minimisation: the point reached, and how far that is from a minimum."""
 
 from __future__ import annotations
 
@@ -7,6 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 STATUSES = ("converged", "stalled", "max_iterations", "diverged", "timeout")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why a minimisation ended; see `Result` for the values."""
+
+    status: str
+    reason: str
+    relaxed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +50,6 @@ class Result:
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Raises ValueError for a tolerance that is no finite number above zero."""
+    """Raise ValueError for a tolerance that is no finite number above zero."""
     if not 0.0 < tolerance < float("inf"):
         raise ValueError(f"tolerance = {tolerance}: give a finite number above 0, in mean vertex weights")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.minimise import Result
+from reference_sim.minimise.result import Result
 from reference_sim.trajectory.resume import PartialRun
 from reference_sim.trajectory.trajectory import Trajectory
 from reference_sim.trajectory.writer import TrajectoryWriter

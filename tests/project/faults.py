@@ -246,15 +246,15 @@ FAULTS = (
     Fault(
         "convergence ignores the gradient",
         NEWTON,
-        "if self.gradient_norm() <= tolerance:",
-        "if True:",
+        "if run.gradient_norm() > run.target:",
+        "if False:",
     ),
     Fault("convergence ignores the step", CHECK, "small = step <= step_tolerance or", "small = True or"),
     Fault(
         "tolerance a hundred thousand times too loose",
         NEWTON,
-        "return max(self.n.tolerance, min(",
-        "return max(1e5 * self.n.tolerance, min(",
+        "return max(self.tolerance, min(",
+        "return max(1e5 * self.tolerance, min(",
     ),
     Fault(
         "gradient of one vertex only",

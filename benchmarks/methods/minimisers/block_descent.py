@@ -15,18 +15,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, swept, weights
+from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, weights
 from benchmarks.methods.minimisers.kernels import sweep_vertices
-from reference_sim import Potential
+from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
 from reference_sim.energies.term_kinds import terms_of
-from reference_sim.minimise import Result
-from reference_sim.minimise.descent import Descent
+from reference_sim.minimise.result import Stop
+from reference_sim.potential import Potential
 
 
-class VertexBlockDescent:
-    """A minimiser bound to one potential.
+class VertexBlockDescent(SweepSolver):
+    """Vertex block descent for one potential.
 
     Args:
+        potential: the sum of energies.
         max_iterations: sweeps over all free vertices.
 
     Raises:
@@ -34,7 +35,7 @@ class VertexBlockDescent:
     """
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
-        self.potential, self.max_iterations = potential, max_iterations
+        super().__init__(potential, max_iterations=max_iterations)
         self._terms = terms = terms_of(potential, "vertex block descent")
         self._free = np.flatnonzero(potential.cloth.free)
         self._membrane, self._hinges = membrane(terms.strain), hinges(terms.bending)
@@ -46,22 +47,27 @@ class VertexBlockDescent:
             *incidence(touching[0], sample_weights > 0.0, vertices),
         )
 
-    def minimise(self, x0: np.ndarray) -> Result:
-        """Run from x0 (V, 3) [m]. The status is "max_iterations" or, where it runs away, "diverged"."""
-        run, terms = Descent(self.potential, x0), self._terms
+    def init(self, run: SweepRun) -> Stop | None:
+        """Begin at the guess."""
+        terms = self._terms
         inertia = terms.inertia.masses / terms.inertia.dt**2, terms.inertia.x_hat, weights(terms)
-        touching = contacts(terms.contact)
+        run.frozen = inertia, contacts(terms.contact)
+        run.swept = run.x.copy()
+        return None
 
-        def sweep(x: np.ndarray) -> None:
-            sweep_vertices(x, self._free, inertia, self._membrane, self._hinges, touching, self._around)
-
-        return swept(run, run.x.copy(), x0, self.max_iterations, sweep)
+    def step(self, run: SweepRun) -> Stop | None:
+        """Move every free vertex once."""
+        inertia, touching = run.frozen
+        sweep_vertices(run.swept, self._free, inertia, self._membrane, self._hinges, touching, self._around)
+        return None
 
 
 def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
-    """Elements around each vertex: corner c of element e is e * k + c, for the corners marked used (N, k).
+    """Find the elements around each vertex among stencils (N, k), by the corners marked used (N, k).
 
-    Returns first (V + 1,) and corners (M,): those of vertex v are corners[first[v] : first[v + 1]].
+    Returns:
+        first (V + 1,) and corners (M,): corner c of element e is e * k + c, and those of vertex v are
+        corners[first[v] : first[v + 1]].
     """
     corners = np.flatnonzero(used)
     owner = stencils.ravel()[corners]

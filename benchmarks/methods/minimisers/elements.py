@@ -1,8 +1,7 @@
-"""The terms of a potential as arrays for sweeps over its elements, and the loop of sweeps."""
+"""Terms of a potential as arrays for sweeps over its elements."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +9,6 @@ import numpy as np
 if TYPE_CHECKING:
     from reference_sim.energies import BendHinge, ContactPenalty, StretchStVK
     from reference_sim.energies.term_kinds import Terms
-    from reference_sim.minimise import Result
-    from reference_sim.minimise.descent import Descent
-
-
-FAR = 100.0  # [m] from the guess: nowhere
 
 
 def membrane(term: StretchStVK | None) -> tuple:
@@ -47,22 +41,3 @@ def weights(terms: Terms) -> np.ndarray:
 
 def _whole(stencils: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(stencils, dtype=np.int64)
-
-
-def runaway(x: np.ndarray, x0: np.ndarray) -> bool:
-    """Whether a vertex is nowhere, or FAR from where it began."""
-    return not (np.isfinite(x).all() and np.abs(x - x0).max(initial=0.0) < FAR)
-
-
-def swept(
-    run: Descent, x: np.ndarray, x0: np.ndarray, most: int, sweep: Callable[[np.ndarray], object]
-) -> Result:
-    """Sweep x (V, 3) [m] in place so many times; "diverged" where that runs away from x0."""
-    while run.iterations < most:
-        sweep(x)
-        run.iterations += 1
-        if runaway(x, x0):
-            return run.result("diverged", f"sweep {run.iterations} threw a vertex far away")
-    run.x = x
-    run.value, run.g = run.evaluate(x)
-    return run.result("max_iterations", f"{run.iterations} sweeps done")

@@ -21,18 +21,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, swept, weights
+from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, weights
 from benchmarks.methods.minimisers.kernels import sweep_constraints
-from reference_sim import Potential
+from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
 from reference_sim.energies.term_kinds import terms_of
-from reference_sim.minimise import Result
-from reference_sim.minimise.descent import Descent
+from reference_sim.minimise.result import Stop
+from reference_sim.potential import Potential
 
 
-class XPBD:
-    """A minimiser of sorts, bound to one potential.
+class XPBD(SweepSolver):
+    """Extended position-based dynamics for one potential, of which it finds no minimum in general.
 
     Args:
+        potential: the sum of energies.
         max_iterations: sweeps over all constraints.
 
     Raises:
@@ -40,27 +41,25 @@ class XPBD:
     """
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
-        self.potential, self.max_iterations = potential, max_iterations
+        super().__init__(potential, max_iterations=max_iterations)
         self._terms = terms = terms_of(potential, "XPBD")
         self._membrane, self._hinges = membrane(terms.strain), hinges(terms.bending)
         masses, self._dt = terms.inertia.masses, terms.inertia.dt
         self._inverse = np.where(potential.cloth.free, self._dt**2 / masses, 0.0)
 
-    def minimise(self, x0: np.ndarray) -> Result:
-        """Run from the predicted positions; of x0 (V, 3) [m] only the pinned vertices are read.
-
-        The status is "max_iterations" or, where it runs away, "diverged".
-        """
-        run, terms = Descent(self.potential, x0), self._terms
+    def init(self, run: SweepRun) -> Stop | None:
+        """Begin at the predicted positions; of the guess only the pinned vertices are read."""
+        terms = self._terms
         touching = contacts(terms.contact)
         x = terms.inertia.x_hat.copy()
         x[:, 1] -= self._inverse * weights(terms)
-        x[terms.inertia.cloth.pins] = x0[terms.inertia.cloth.pins]
-        pulls = tuple(np.zeros(shape) for shape in (
-            (len(self._membrane[0]), 3), len(self._hinges[0]), len(touching[0])
-        ))  # fmt: skip
+        pins = terms.inertia.cloth.pins
+        x[pins] = run.x[pins]
+        shapes = (len(self._membrane[0]), 3), len(self._hinges[0]), len(touching[0])
+        run.swept, run.frozen = x, (touching, *(np.zeros(shape) for shape in shapes))
+        return None
 
-        def sweep(x: np.ndarray) -> None:
-            sweep_constraints(x, self._inverse, self._membrane, self._hinges, touching, *pulls)
-
-        return swept(run, x, x0, self.max_iterations, sweep)
+    def step(self, run: SweepRun) -> Stop | None:
+        """Solve every constraint once."""
+        sweep_constraints(run.swept, self._inverse, self._membrane, self._hinges, *run.frozen)
+        return None

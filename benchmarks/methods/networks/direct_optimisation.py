@@ -24,7 +24,7 @@ from benchmarks.scene import BuiltScene
 from benchmarks.scenes.dressed_body import declared_energies
 from reference_sim import Cloth, Potential, Trajectory
 from reference_sim.energies import ContactPenalty, Energy, Gravity, Inertia
-from reference_sim.minimise import make_minimiser
+from reference_sim.minimise.methods import make_minimiser
 
 ROUNDS, ITERATIONS, MEMORY = 40, 50, 20
 FALL = 1e-4  # a round that lowers the sum by a smaller share is the last

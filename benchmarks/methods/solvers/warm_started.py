@@ -20,7 +20,8 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
 from reference_sim import Potential, Trajectory
-from reference_sim.minimise import Minimiser, Result, make_minimiser
+from reference_sim.minimise.methods import Minimiser, make_minimiser
+from reference_sim.minimise.result import Result
 
 if TYPE_CHECKING:
     from benchmarks.methods.solvers.carried_residual import CarriedResidual

@@ -195,8 +195,8 @@ def optimality(
     scene: BuiltScene, positions: Floats, *, samples: int, scale: float | None = None
 ) -> Optimality:
     """Judge positions (T,V,3) [m] at `samples` frames or more, see above; scale [J] of the scene's gaps."""
-    from reference_sim.minimise import LBFGS
     from reference_sim.minimise.descent import mean_weight
+    from reference_sim.minimise.lbfgs import LBFGS
 
     frames = _judged(scene, positions)
     found, potential = Optimality(judged=len(frames)), _potential(scene)

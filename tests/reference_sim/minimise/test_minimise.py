@@ -10,7 +10,7 @@ from reference_sim import GRAVITY, Cloth, Material, Potential, Result, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchSpring, StretchStVK
 from reference_sim.minimise import METHODS, STATUSES, make_minimiser
 from reference_sim.minimise.lbfgs_history import LBFGSHistory
-from reference_sim.minimise.newton import Run
+from reference_sim.minimise.newton import NewtonRun
 from tests.reference_sim.meshes import grid, patch, random_rotation
 
 both = pytest.mark.parametrize("method", METHODS)
@@ -184,8 +184,10 @@ def test_too_few_iterations_is_said(method):
 
 def test_few_iterations_assemble_no_hessian_that_nobody_uses(monkeypatch):
     assembled = []
-    assemble = Run.assemble
-    monkeypatch.setattr(Run, "assemble", lambda run, share: assembled.append(share) or assemble(run, share))
+    assemble = NewtonRun.assemble
+    monkeypatch.setattr(
+        NewtonRun, "assemble", lambda run, share: assembled.append(share) or assemble(run, share)
+    )
     potential, x0 = crumpled()
     results = [
         minimise(potential, x0, max_iterations=1, start_projected=projected) for projected in (False, True)
@@ -349,7 +351,7 @@ def test_a_watchdog_ends_when_time_is_up(monkeypatch):
     cloth = Cloth(SHEET, FACES, Material(young_modulus=7e8), pins=[0, 8])
     potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)])
     x0 = SHEET + 1e-4 * np.random.default_rng(0).standard_normal(SHEET.shape)
-    monkeypatch.setattr(Run, "late", lambda self, timeout: self.iterations >= 45)
+    monkeypatch.setattr(NewtonRun, "late", lambda self, timeout: self.iterations >= 45)
     result = minimise(potential, x0)
     assert result.status == "timeout" and result.iterations <= 46
 

@@ -1,0 +1,27 @@
+from .cloth import Cloth as Cloth
+from .cloth import MeshError as MeshError
+from .material import GRAVITY as GRAVITY
+from .material import Material as Material
+from .minimise.methods import minimise as minimise
+from .minimise.result import Result as Result
+from .obstacle import Obstacle as Obstacle
+from .potential import Potential as Potential
+from .time_loop import simulate as simulate
+from .trajectory.trajectory import Trajectory as Trajectory
+from .trajectory.trajectory import TrajectoryError as TrajectoryError
+from .trajectory.writer import TrajectoryWriter as TrajectoryWriter
+
+__all__ = [
+    "GRAVITY",
+    "Cloth",
+    "Material",
+    "MeshError",
+    "Obstacle",
+    "Potential",
+    "Result",
+    "Trajectory",
+    "TrajectoryError",
+    "TrajectoryWriter",
+    "minimise",
+    "simulate",
+]

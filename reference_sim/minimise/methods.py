@@ -1,0 +1,74 @@
+"""Minimisers by name: same call, same type of result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from reference_sim.minimise.lbfgs import LBFGS
+from reference_sim.minimise.newton import Newton
+from reference_sim.minimise.result import Result
+from reference_sim.potential import Potential
+
+METHODS = {"newton": Newton, "lbfgs": LBFGS}
+
+
+class Minimiser(Protocol):
+    """Solver bound to one potential, so that symbolic analysis is done once for all steps."""
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        """Minimise from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
+        ...
+
+
+def make_minimiser(
+    potential: Potential, method: str | Callable[..., Minimiser] = "newton", **options: Any
+) -> Minimiser:
+    """Return a minimiser by name, for a caller that minimises the same potential again and again.
+
+    Args:
+        potential: the sum of energies.
+        method: a name in METHODS, or a function that is called as `method(potential, **options)`.
+        options: of the method's class.
+
+    Raises:
+        ValueError: unknown name.
+    """
+    if callable(method):
+        return method(potential, **options)
+    if method not in METHODS:
+        raise ValueError(f"unknown minimiser {method!r}: choose one of {', '.join(METHODS)}")
+    return METHODS[method](potential, **options)
+
+
+def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **options: Any) -> Result:
+    """Minimise `potential` from x0; pinned vertices stay where x0 has them.
+
+    Args:
+        potential: the sum of energies.
+        x0: (V, 3) [m].
+        method: "newton" or "lbfgs".
+        options: of the method's class, `Newton` or `LBFGS`: tolerance, max_iterations, timeout, ...
+
+    Returns:
+        The Result. Failure is a status in it, not an exception.
+
+    Raises:
+        ValueError: unknown method, or a tolerance that is no number above 0.
+
+    Example: a sheet of two triangles hangs from one side.
+
+        >>> import numpy as np
+        >>> from reference_sim import Cloth, Potential, minimise
+        >>> from reference_sim.energies import Gravity, StretchStVK
+        >>> x = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1], [0.1, 0.0, 0.1]])
+        >>> cloth = Cloth(x, np.array([[0, 2, 1], [1, 2, 3]]), pins=[0, 1])
+        >>> result = minimise(Potential([StretchStVK(cloth), Gravity(cloth)]), x - [0.0, 0.05, 0.0])
+        >>> result.status, bool(result.gradient_norm < 1e-6)
+        ('converged', True)
+        >>> (result.positions[2:, 1] - result.positions[:2, 1]).round(3).tolist()
+        [-0.1, -0.1]
+    """
+    return make_minimiser(potential, method, **options).minimise(x0)
