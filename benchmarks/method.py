@@ -70,6 +70,21 @@ def posed_body(dressed: Dressed) -> Callable[[int], tuple[np.ndarray, np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
+class Reporting:
+    """Place of a method among others in reports: curves, comparisons and pairing of seeds.
+
+    family: methods of one curve, which differ in effort alone; level: the place on it, as a number of
+    iterations or a tolerance. base: name of the method that this one is compared with. pairing_group: shared
+    by methods that are compared seed by seed.
+    """
+
+    family: str = ""
+    level: float | None = None
+    base: str = ""
+    pairing_group: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
 class MethodEntry:
     """The declaration of a method: cheap to list. Its module is imported when a cell needs it.
 
@@ -88,7 +103,7 @@ class MethodEntry:
     asked for where those of the scene are. declared_ms: [ms] a frame, as its author says, where no clock of
     ours can measure it; what a trajectory says as provenance counts as well. static_known: whether its answer
     to poses held still is what quasi_static() says. left_out: why it is not run, where somebody wants it so.
-    role, family, level, base, pairing_group: see benchmarks.results.run_folder.Row.
+    role: one of benchmarks.results.run_folder.ROLES. reporting: its place among others, for reports alone.
     """
 
     name: str
@@ -114,10 +129,7 @@ class MethodEntry:
     static_known: bool = True
     left_out: str = ""
     role: str = "baseline"
-    family: str = ""
-    level: float | None = None
-    base: str = ""
-    pairing_group: str = ""
+    reporting: Reporting = Reporting()
 
     def __post_init__(self) -> None:
         if self.role not in ROLES:

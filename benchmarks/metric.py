@@ -178,7 +178,8 @@ class SceneRollOuts(Kept):
         """The first that came to its end, of that role, and of that family and level where they are given."""
         for roll_out in self.roll_outs:
             entry = roll_out.entry
-            fits = entry.role == role and family in (None, entry.family) and level in (None, entry.level)
+            place = entry.reporting
+            fits = entry.role == role and family in (None, place.family) and level in (None, place.level)
             if fits and roll_out.status in USABLE:
                 return roll_out
         return None
@@ -190,8 +191,12 @@ class SceneRollOuts(Kept):
     @property
     def as_right(self) -> list[RollOut]:
         """Simulations that could stand in the reference's place."""
-        of = self.roll_outs
-        return [r for r in of if as_right(r.entry.family, r.entry.level) and r.status == "ok"]
+        return [
+            roll_out
+            for roll_out in self.roll_outs
+            if as_right(roll_out.entry.reporting.family, roll_out.entry.reporting.level)
+            and roll_out.status == "ok"
+        ]
 
     @property
     def positions(self) -> list[np.ndarray]:

@@ -88,8 +88,8 @@ def _rows(
         suite=suite, scene=scene.name, method=cell.method, seed=cell.seed, metric="cost/frame", unit="ms",
         status=status if status != "ok" else "failed", reason=reason, terms=outcome.result.get("terms", ""),
         dtype=entry.dtype, **outcome.origin, garment=scene.garment, motion=scene.motion, part=scene.part,
-        family=entry.family or entry.name, level=entry.level, role=entry.role, base=entry.base,
-        seeded=entry.seeded, pairing_group=entry.pairing_group,
+        family=entry.reporting.family or entry.name, level=entry.reporting.level, role=entry.role,
+        base=entry.reporting.base, seeded=entry.seeded, pairing_group=entry.reporting.pairing_group,
     )  # fmt: skip
     if not metrics:
         yield base
@@ -298,8 +298,14 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
         scene.name: _fields(scene, *without) | {"role": plan.motions.role_of(scene.motion)}
         for scene in plan.scenes
     }
-    words = ("label", "description", "role", "family", "level", "base", "seeded", "dtype")
-    said = {name: {word: getattr(entry, word) for word in words} for name, entry in methods.items()}
+    said = {
+        name: {
+            "label": entry.label, "description": entry.description, "role": entry.role,
+            "family": entry.reporting.family, "level": entry.reporting.level, "base": entry.reporting.base,
+            "seeded": entry.seeded, "dtype": entry.dtype,
+        }
+        for name, entry in methods.items()
+    }  # fmt: skip
     for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:
         if name in methods and not methods[name].timed:
             said[name]["label"] = f"{methods[name].label or name} (declared time)"

@@ -3,10 +3,32 @@
 from __future__ import annotations
 
 from benchmarks.method import MethodEntry
+from benchmarks.methods.catalogue import ablations, networks
 from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
-from benchmarks.methods.catalogue.learned import LEARNED, RECIPE_DEVIATIONS, network
-from benchmarks.methods.catalogue.solvers import SOLVERS
+from benchmarks.methods.catalogue.networks import network
+from benchmarks.methods.catalogue.solvers import SOLVERS, warm_started
 from benchmarks.registry import by_name
+
+# They run when they are named: further baselines, ablations of SNUG, post-processing, the bound.
+FURTHER_METHODS = (
+    *networks.NETWORKS,
+    *ablations.RECIPES,
+    *ablations.PRECISIONS,
+    *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
+    *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs", trained="snug-dynamic",
+                  pairing_group="snug"),
+    *networks.POST_PROCESSED,
+    MethodEntry(
+        name="direct-optimisation",
+        label="Vertices optimised directly",
+        description="no network: the vertices of a whole clip optimised directly, the least energy found",
+        module="benchmarks.methods.networks.direct_optimisation",
+        needs_body=True,
+        gives_first_frame=True,
+        static_known=False,
+        role="bound",
+    ),
+)  # fmt: skip
 
 METHODS = (
     MethodEntry(
@@ -33,8 +55,8 @@ METHODS = (
     network("snug", "SNUG", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
     network("supervised", "Supervised", "the SNUG network trained on simulated vertices instead"),
     network("pbns", "PBNS", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
-    *LEARNED,
-    *RECIPE_DEVIATIONS,
+    *FURTHER_METHODS,
+    *ablations.RECIPE_DEVIATIONS,
     *EQUAL_DATA,
     *SOLVERS,
 )  # fmt: skip

@@ -12,7 +12,7 @@ from benchmarks.plan import plug_ins as outside
 from benchmarks.plan.selection import default_suites
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS, find_preset
-from benchmarks.scenes import FURTHER, GARMENT_SCENES, SCENES
+from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES
 from benchmarks.scenes.variations import shapes, there_and_back
 from benchmarks.validation.registry import CASES
 
@@ -39,7 +39,7 @@ def listing() -> str:
                 *dressed,
                 *((s.name, s.description) for s in map(there_and_back, TEST[:1])),
                 *((s.name, s.description) for s in shapes(TEST[0])),
-                *((s.name, s.description) for s in FURTHER),
+                *((s.name, s.description) for s in FURTHER_SCENES),
             ],
         ),
         (

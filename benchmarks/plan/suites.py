@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from benchmarks.methods import METHODS
+from benchmarks.methods import FURTHER_METHODS, METHODS
+from benchmarks.methods.catalogue.ablations import RECIPE_DEVIATIONS
 from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
-from benchmarks.methods.catalogue.learned import LEARNED, RECIPE_DEVIATIONS
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import Preset
 from benchmarks.scenes import GARMENT_SCENES
@@ -71,7 +71,7 @@ EXACT = ("free_fall",)  # every method has no error there but round-off: only fo
 
 # The reference from coarse to fine in tolerance and in time; and again, as right as it, from moved starts and
 # with its contact planes searched twice: how far those lie apart is the uncertainty of whatever is compared.
-PERTURBED = tuple(entry.name for entry in METHODS if entry.family == "simulation-perturbed")
+PERTURBED = tuple(entry.name for entry in METHODS if entry.reporting.family == "simulation-perturbed")
 AGAIN = (*PERTURBED, "simulation-refrozen")
 FEW_AGAIN = (PERTURBED[-1], "simulation-refrozen")
 FEW_REFERENCES = ("simulation", "simulation-1e-2", "simulation-dt/2", *FEW_AGAIN)
@@ -108,7 +108,9 @@ def _solvers(extent: Extent) -> list[str]:
     levels = {family: [scale * budget for budget in budgets] for family, scale in FAMILIES}
     some = budgets if full else budgets[::2]
     levels |= {family: [scale * budget for budget in some] for family, scale in SLOWER_FAMILIES}
-    truncated = [entry.name for entry in METHODS if entry.level in levels.get(entry.family, ())]
+    truncated = [
+        entry.name for entry in METHODS if entry.reporting.level in levels.get(entry.reporting.family, ())
+    ]
     references, others = (REFERENCES, SOLVERS) if full else (FEW_REFERENCES, FEW_SOLVERS)
     return [*dict.fromkeys(references), *truncated, *others, *EXTERNAL, *FAST]
 
@@ -158,7 +160,7 @@ SUITES = (
             "simulation", *FEW_AGAIN, "skinning", "untrained", "snug", "supervised", "pbns", *CHEAP,
         ],
         more_methods=(
-            *(entry.name for entry in LEARNED), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
+            *(entry.name for entry in FURTHER_METHODS), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
             "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
         named_methods=(
@@ -174,7 +176,7 @@ SUITES = (
         more_methods=(
             "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4",
             *(entry.name for entry in METHODS if entry.role in ("solver", "warm-started")
-              and entry.base != "snug-dynamic"),
+              and entry.reporting.base != "snug-dynamic"),
         ),
     ),
     Suite(
@@ -191,7 +193,7 @@ SUITES = (
         "reported failure",
         scenes=_out_of_distribution,
         methods=lambda extent: ["simulation", *FAST, *CHEAP],
-        more_methods=tuple(entry.name for entry in LEARNED if entry.batched),
+        more_methods=tuple(entry.name for entry in FURTHER_METHODS if entry.batched),
     ),
     Suite(
         name="shapes",
@@ -200,7 +202,7 @@ SUITES = (
         scenes=_shapes,
         methods=lambda extent: ["simulation", "skinning", "snug", SHAPED, "pbns", *CHEAP],
         more_methods=(
-            *(entry.name for entry in LEARNED if entry.batched and entry.name != SHAPED), *AGAIN,
+            *(entry.name for entry in FURTHER_METHODS if entry.batched and entry.name != SHAPED), *AGAIN,
         ),
     ),
     Suite(

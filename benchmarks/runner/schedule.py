@@ -222,8 +222,8 @@ class Schedule:
             "samples": self.preset.gap_samples,
             "method": [
                 cell.entry.role,
-                cell.entry.family,
-                cell.entry.level,
+                cell.entry.reporting.family,
+                cell.entry.reporting.level,
                 cell.entry.conserving,
                 cell.entry.static_known,
             ],

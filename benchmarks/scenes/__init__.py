@@ -45,7 +45,7 @@ SCENES = (
         sizes=SHEET,
     ),
 )
-FURTHER = (
+FURTHER_SCENES = (
     *OUT_OF_DISTRIBUTION,
     *{scene.name: scene for preset in PRESETS for scene in meshes_and_steps(preset.dependence)}.values(),
     *DRAPES,
@@ -58,10 +58,10 @@ def find_scene(name: str, garment: str = "tshirt") -> Scene:
 
 
 def further_scenes(garment: str) -> tuple[Scene, ...]:
-    """FURTHER with that garment on the body: of another than the T-shirt without those that tailor one."""
+    """FURTHER_SCENES with that garment on the body: of another than the T-shirt without those that tailor one."""
     if garment == GARMENT_SCENES[0].garment:
-        return FURTHER
-    kept = (scene for scene in FURTHER if not scene.own_garment)
+        return FURTHER_SCENES
+    kept = (scene for scene in FURTHER_SCENES if not scene.own_garment)
     return tuple(replace(scene, garment=garment) if scene.dressed else scene for scene in kept)
 
 

@@ -53,8 +53,9 @@ class RunMicrobenchmark(Task):
         benchmark, entry = self.benchmark, self.entry
         base = Row(
             suite=SUITE, scene=benchmark.name, method=entry.name, seed=0, metric=PROCESS_MEMORY, unit="",
-            status="failed", reason=outcome.reason, dtype=entry.dtype, family=entry.family or entry.name,
-            level=entry.level, role=entry.role, base=entry.base,
+            status="failed", reason=outcome.reason, dtype=entry.dtype, role=entry.role,
+            family=entry.reporting.family or entry.name, level=entry.reporting.level,
+            base=entry.reporting.base,
         )  # fmt: skip
         rows = []
         for name, value in outcome.result.items():

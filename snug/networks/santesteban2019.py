@@ -7,7 +7,7 @@ taught by simulated vertices, as the supervised network is (snug.training.vertex
 two parts one after the other, the fit on drapes of many bodies in one pose; here both are trained together on
 the simulated motions. Those show one body shape, the mean one: the fit reads a constant and can only give a
 constant, a mean drape that the last layer's bias could hold as well. Its numbers say nothing of how it would
-do on other bodies. The 2 mm clean-up of its authors is a method of its own, see benchmarks.methods.networks.push_out.
+do on other bodies. The 2 mm clean-up of its authors is a method of its own, see benchmarks.methods.networks.collision_post_processing.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from benchmarks.method import MethodEntry
-from benchmarks.methods.catalogue.learned import cleaned, network
+from benchmarks.method import MethodEntry, Reporting
+from benchmarks.methods.catalogue.networks import network, post_processed
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.training import Simulated, Training
 
@@ -38,23 +38,25 @@ def _training(name: str, mixed: int, *, converged: bool) -> Training:
 def _entry(name: str, label: str, mixed: int, *, converged: bool) -> MethodEntry:
     """Its run time is that of the network whose data it changes: nobody asks for it again."""
     family = f"{name}-data" + "-converged" * converged
-    data = f"given frames and {mixed} mixed for each" if mixed else "given frames"
-    title = f"{label}, with {mixed} mixed" if mixed else f"{label}, given frames"
+    data = f"original data and {mixed} augmented frames for each" if mixed else "original data"
+    title = f"{label}, {mixed} augmented for each" if mixed else f"{label}, original data"
     return network(
         f"{family}-{mixed}", title + ", converged" * converged,
         f"{name} that learns from {data}" + ", until a held-out motion gets no better" * converged,
-        training=_training(name, mixed, converged=converged), family=family, level=float(mixed),
-        base=f"{name}-data-{mixed}" if converged else name, role="ablation", batched=False, timed=False,
-        pairing_group=name,
+        training=_training(name, mixed, converged=converged), role="ablation", batched=False, timed=False,
+        reporting=Reporting(
+            family=family, level=float(mixed), base=f"{name}-data-{mixed}" if converged else name,
+            pairing_group=name,
+        ),
     )  # fmt: skip
 
 
 def _block(name: str, label: str, numbers: tuple[int, ...]) -> tuple[MethodEntry, ...]:
-    """All numbers at equal steps; the ends to convergence too, and each of these cleaned up."""
+    """All numbers at equal steps; the ends to convergence too, and each of these post-processed."""
     equal = tuple(_entry(name, label, mixed, converged=False) for mixed in numbers)
     converged = tuple(_entry(name, label, mixed, converged=True) for mixed in ENDS)
-    ends = (entry for entry in (*equal, *converged) if entry.level in ENDS)
-    return (*equal, *converged, *map(cleaned, ends))
+    ends = (entry for entry in (*equal, *converged) if entry.reporting.level in ENDS)
+    return (*equal, *converged, *map(post_processed, ends))
 
 
 EQUAL_DATA = tuple(entry for own in NETWORKS for entry in _block(*own))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.method import MethodEntry
+from benchmarks.method import MethodEntry, Reporting
 
 SHIFTS = (1e-9, 3e-9, 1e-8, 1e-7, 1e-6, 1e-5, 3e-5, 1e-4)  # [m]
 _SIMULATION = "benchmarks.methods.solvers.simulation"
@@ -45,8 +45,7 @@ def _truncated(
             conserving=conserving,
             truncated=True,
             role="solver",
-            family=family,
-            level=count,
+            reporting=Reporting(family=family, level=count),
         )
         for count in counts
     )
@@ -70,10 +69,9 @@ def warm_started(
             conserving=solver == "fast-lbfgs",
             static_known=False,  # a pose held still leads back to the guess, and not to the simulator's drape
             role="warm-started",
-            family=f"{base}+{solver}",
-            level=count,
-            base=base,
-            pairing_group=pairing_group,
+            reporting=Reporting(
+                family=f"{base}+{solver}", level=count, base=base, pairing_group=pairing_group
+            ),
         )
         for count in (1, 2, 4, 8)
     )
@@ -94,8 +92,7 @@ SOLVERS = (
             module=_SIMULATION,
             options={"tolerance": float(f"1e-{power}")},
             role="reference-variant",
-            family="simulation-tolerance",
-            level=float(f"1e-{power}"),
+            reporting=Reporting(family="simulation-tolerance", level=float(f"1e-{power}")),
         )
         for power in (2, 4, 8)
     ),
@@ -107,22 +104,20 @@ SOLVERS = (
             module=_SIMULATION,
             options={"substeps": substeps},
             role="reference-variant",
-            family="simulation-dt",
-            level=substeps,
+            reporting=Reporting(family="simulation-dt", level=substeps),
         )
         for substeps in (2, 4, 8)
     ),
     *(
         MethodEntry(
             name=f"simulation-perturbed-{shift:.0e}".replace("e-0", "e-"),
-            label=f"Simulation, start moved by {shift * 1e9:,.0f} nm",
-            description=f"the reference again, its start moved by {shift:g} m: how far apart they end",
+            label=f"Simulation, perturbed by {shift * 1e9:,.0f} nm",
+            description=f"the reference from a start perturbed by {shift:g} m: how far apart both end",
             module="benchmarks.methods.solvers.perturbed_start",
             options={"shift": shift},
             role="reference-variant",
-            family="simulation-perturbed",
+            reporting=Reporting(family="simulation-perturbed", level=shift),
             timed=False,
-            level=shift,
         )
         for shift in SHIFTS
     ),
@@ -133,7 +128,7 @@ SOLVERS = (
         module=_SIMULATION,
         options={"refreeze": 1},
         role="reference-variant",
-        family="simulation-refrozen",
+        reporting=Reporting(family="simulation-refrozen"),
         timed=False,
     ),
     # A variant of the physics, set beside its base: a "reference-variant" would be read as an uncertainty of
@@ -146,7 +141,7 @@ SOLVERS = (
             module="benchmarks.methods.solvers.other_material",
             options={"exchange": exchange},
             role="ablation",
-            base="simulation",
+            reporting=Reporting(base="simulation"),
         )
         for exchange, words in (
             ("printed-bending", "hinges as the paper prints them, not scaled: some 3 times as stiff"),

@@ -24,7 +24,7 @@ from reference_sim.minimise.methods import Minimiser, make_minimiser
 from reference_sim.minimise.result import Result
 
 if TYPE_CHECKING:
-    from benchmarks.methods.solvers.carried_residual import CarriedResidual
+    from benchmarks.methods.solvers.residual_transport import ResidualTransport
 
 SKINNING = "skinning"
 SHARE = 0.6  # of the last residual
@@ -51,7 +51,7 @@ class WithResidual(FromElsewhere):
 
     def __init__(
         self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray, first: np.ndarray,
-        carry: CarriedResidual,
+        carry: ResidualTransport,
     ) -> None:  # fmt: skip
         super().__init__(inner, starts, pins)
         self._added, self._carry, self._frame = first, carry, 0
@@ -124,15 +124,15 @@ class WarmStarted(Method):
             return skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
         return predictions(model, dressed, motion, betas, before=before)
 
-    def _carry(self, scene: BuiltScene) -> CarriedResidual:
-        from benchmarks.methods.solvers.carried_residual import CarriedResidual
+    def _carry(self, scene: BuiltScene) -> ResidualTransport:
+        from benchmarks.methods.solvers.residual_transport import ResidualTransport
         from snug.networks.dressed_body import DressedBody
         from snug.recipes.recipe import DEFAULT
 
         assert scene.dressed is not None
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         transforms = dressed.transforms(scene.dressed.motion.poses, scene.dressed.betas)
-        return CarriedResidual(dressed.weights(DEFAULT.smoothing), transforms)
+        return ResidualTransport(dressed.weights(DEFAULT.smoothing), transforms)
 
 
 def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:

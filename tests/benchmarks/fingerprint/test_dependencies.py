@@ -13,7 +13,7 @@ from benchmarks.fingerprint.digest import digest
 from benchmarks.methods import METHODS
 from benchmarks.metrics import MODULE_OF
 from benchmarks.performance.registry import MICROBENCHMARKS
-from benchmarks.scenes import FURTHER, SCENES
+from benchmarks.scenes import FURTHER_SCENES, SCENES
 
 FILES = {
     "reference_sim/__init__.py": "from .cloth import Cloth\n",
@@ -160,7 +160,7 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
         "microbenchmark",
     )
     modules = [f"benchmarks.tasks.{name}" for name in names]
-    modules += [entry.module for entry in (*SCENES, *FURTHER, *METHODS)]
+    modules += [entry.module for entry in (*SCENES, *FURTHER_SCENES, *METHODS)]
     modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets.assets"]
     modules += list(MODULE_OF.values())
     assert {name: found for name in modules if (found := lists & set(code_of(name)))} == {}

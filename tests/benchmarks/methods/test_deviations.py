@@ -35,7 +35,7 @@ def test_a_deviation_is_a_method_for_whoever_names_it():
         assert name == f"snug-{TRAININGS[name].recipe.name}"
         entry = find_method(name)
         assert entry.trained == name and entry.role == "ablation" and entry.seeded
-        assert entry.base == ("snug-paper" if "paper" in name else "snug")
+        assert entry.reporting.base == ("snug-paper" if "paper" in name else "snug")
     assert not NAMES & chosen() and not NAMES & chosen(full=True)
     assert chosen("snug-without-*") == {name for name in NAMES if "without" in name}
     assert chosen("snug-paper-with-*") == NAMES - chosen("snug-without-*")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from benchmarks.methods import METHODS, find_method
-from benchmarks.methods.catalogue.learned import LEARNED
+from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser
@@ -29,7 +28,7 @@ def methods(*words):
 
 
 def test_they_run_when_named_and_not_otherwise(tmp_path):
-    further = {entry.name for entry in LEARNED}
+    further = {entry.name for entry in FURTHER_METHODS}
     out = ("-o", str(tmp_path))
     assert further <= set(SUITES[0].more_methods) and not further & methods(*out)
     assert further < methods(*out, "--methods", "*")
@@ -47,7 +46,7 @@ def test_they_run_when_named_and_not_otherwise(tmp_path):
 @pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])
 def test_every_trained_method_has_a_training_and_steps_in_each_preset(entry):
     kind = (entry.training or TRAININGS[entry.trained]).kind
-    assert entry.seeded and entry.pairing_group
+    assert entry.seeded and entry.reporting.pairing_group
     assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
 
 

@@ -13,8 +13,7 @@ from benchmarks import timing
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.cell import Cell
 from benchmarks.method import Method
-from benchmarks.methods import METHODS, find_method
-from benchmarks.methods.catalogue.learned import LEARNED
+from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import find_preset
@@ -42,13 +41,15 @@ TINY = dataclasses.replace(
     find_preset("smoke"), **SIZES, repeats=1, steps=dict.fromkeys(("snug", "supervised", "pbns"), 2)
 )
 # Further learned methods have tests of their own. Beyond the first scene the coarsest speaks for each family.
-SMALL_METHODS = [e for e in METHODS if e not in LEARNED and (e.trained is None or e.trained in KINDS)]
+SMALL_METHODS = [e for e in METHODS if e not in FURTHER_METHODS and (e.trained is None or e.trained in KINDS)]
 # One moved start speaks for all.
-SMALL_METHODS = [e for e in SMALL_METHODS if e.family != "simulation-perturbed" or e.level == 1e-9]
-BY_LEVEL = sorted(SMALL_METHODS, key=lambda entry: (entry.family, entry.level or 0.0))
-COARSEST = [next(own) for family, own in itertools.groupby(BY_LEVEL, lambda e: e.family) if family]
+SMALL_METHODS = [
+    e for e in SMALL_METHODS if e.reporting.family != "simulation-perturbed" or e.reporting.level == 1e-9
+]
+BY_LEVEL = sorted(SMALL_METHODS, key=lambda entry: (entry.reporting.family, entry.reporting.level or 0.0))
+COARSEST = [next(own) for family, own in itertools.groupby(BY_LEVEL, lambda e: e.reporting.family) if family]
 COARSEST += [find_method("simulation-1e-2")]
-FINER = [e for e in SMALL_METHODS if e.level is not None and e not in COARSEST] + [
+FINER = [e for e in SMALL_METHODS if e.reporting.level is not None and e not in COARSEST] + [
     find_method("simulation-1e-8")
 ]
 FEWER_METHODS = [entry for entry in SMALL_METHODS if entry not in FINER]
@@ -273,7 +274,7 @@ def test_another_material_is_simulated_and_judged_by_the_scenes_own(exchange, pl
     assert values[f"energy/{term.name}"] == pytest.approx(judged, rel=1e-9)
     # No uncertainty of the reference and no approximation of it: a variant that stands beside its base.
     assert group.reference is None and group.find(role="reference-variant") is None
-    assert (entry.role, entry.base) == ("ablation", "simulation")
+    assert (entry.role, entry.reporting.base) == ("ablation", "simulation")
 
 
 def test_every_method_has_the_whole_protocol(tmp_path):

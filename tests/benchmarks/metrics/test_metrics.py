@@ -364,8 +364,8 @@ def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
     def row(method: str, gap: float, metric: str = "gap/energy", scene: str = "flag", seed: int = 0) -> Row:
         entry = find_method(method)
         return Row(
-            "speed", scene, method, seed, metric, "1", gap, role=entry.role, family=entry.family or method,
-            level=entry.level,
+            "speed", scene, method, seed, metric, "1", gap, role=entry.role,
+            family=entry.reporting.family or method, level=entry.reporting.level,
         )  # fmt: skip
 
     falling = [row("newton-1", 0.5), row("newton-4", 0.1), row("newton-8", 0.1), row("simulation", 0.0)]
@@ -384,11 +384,13 @@ def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
 
 def test_families_hold_every_level_from_coarse_to_fine():
     families: dict[str, list[str]] = {}
-    for entry in sorted((e for e in METHODS if e.level is not None), key=lambda e: e.level):
-        families.setdefault(entry.family, []).append(entry.name)
+    for entry in sorted(
+        (e for e in METHODS if e.reporting.level is not None), key=lambda e: e.reporting.level
+    ):
+        families.setdefault(entry.reporting.family, []).append(entry.name)
     assert families["lbfgs"] == ["lbfgs-5", "lbfgs-10", "lbfgs-20", "lbfgs-40"]
     assert families["snug+newton"] == [f"snug+newton-{count}" for count in (1, 2, 4, 8)]
-    assert all(entry.level for entry in METHODS if entry.truncated)
+    assert all(entry.reporting.level for entry in METHODS if entry.truncated)
 
 
 def test_every_metric_has_a_unit_a_title_and_a_definition_and_a_pattern_serves_a_new_term():

@@ -65,11 +65,11 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
 
 def test_simulations_of_another_step_are_not_as_right_and_all_others_are():
     variants = [entry for entry in METHODS if entry.role == "reference-variant"]
-    others = {entry.name for entry in variants if not as_right(entry.family, entry.level)}
+    others = {entry.name for entry in variants if not as_right(entry.reporting.family, entry.reporting.level)}
     assert others == {f"simulation-{what}" for what in ("1e-2", "1e-4", "dt/2", "dt/4", "dt/8")}
-    perturbed = [entry for entry in METHODS if entry.family == "simulation-perturbed"]
-    assert len(perturbed) >= 8 and min(e.level for e in perturbed) == 1e-9
-    assert max(e.level for e in perturbed) == 1e-4 and not any(e.timed for e in perturbed)
+    perturbed = [entry for entry in METHODS if entry.reporting.family == "simulation-perturbed"]
+    assert len(perturbed) >= 8 and min(e.reporting.level for e in perturbed) == 1e-9
+    assert max(e.reporting.level for e in perturbed) == 1e-4 and not any(e.timed for e in perturbed)
 
 
 def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike(tmp_path):
@@ -81,9 +81,9 @@ def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike(tmp_path):
         method.prepare(scene)
         moved = method.scene.start - scene.start
         lengths = np.linalg.norm(moved, axis=1)
-        assert lengths[scene.cloth.free] == pytest.approx(entry.level, rel=1e-6)
+        assert lengths[scene.cloth.free] == pytest.approx(entry.reporting.level, rel=1e-6)
         assert not lengths[scene.cloth.pins].any()
-        starts.append(moved / entry.level)
+        starts.append(moved / entry.reporting.level)
     assert np.abs(starts[0] - starts[1]).max() > 0.1
 
 
@@ -91,7 +91,7 @@ def test_numbers_of_the_reference_are_as_uncertain_as_right_simulations_differ()
     def row(method, metric, value, uncertainty=None):
         entry = find_method(method)
         return Row(
-            "garments", "tshirt/x", method, 0, metric, "J", value, role=entry.role, family=entry.family,
+            "garments", "tshirt/x", method, 0, metric, "J", value, role=entry.role, family=entry.reporting.family,
             uncertainty=uncertainty,
         )  # fmt: skip
 

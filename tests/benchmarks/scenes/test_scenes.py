@@ -20,7 +20,7 @@ from benchmarks.presets import PRESETS, find_preset
 from benchmarks.run import main
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.schedule import Schedule
-from benchmarks.scenes import FURTHER, GARMENT_SCENES, SCENES, all_scenes
+from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES, all_scenes
 from benchmarks.scenes.free_fall import exact_fall
 from benchmarks.scenes.variations import SHAPES, shapes
 from reference_sim import simulate
@@ -53,7 +53,7 @@ def test_scene_names_are_unique_and_a_dressed_scene_needs_assets():
     scenes = all_scenes(["walk", "run"], ["twist_stop"])
     worn = sum(2 * (1 if garment.dynamic else 3) for garment in GARMENT_SCENES)  # whole, and as a clip
     shaped = 1 + SHAPES  # the mean body and others
-    assert len(scenes) == len(SCENES) + worn + len(FURTHER) + shaped + 1  # one long
+    assert len(scenes) == len(SCENES) + worn + len(FURTHER_SCENES) + shaped + 1  # one long
     assert scenes["tshirt/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
     assert scenes["tshirt/walk"].dressed and not scenes["flag"].dressed
     with pytest.raises(ValueError, match="needs assets"):

@@ -174,15 +174,18 @@ def test_the_block_of_equal_data_gives_all_networks_the_same_frames_and_steps(tm
     for entry in BLOCK:
         task, training = tasks[entry.trained], entry.training
         mixed = training.simulated.mixed if training.simulated else training.recipe.mixed
-        assert mixed == entry.level and len(task.clips) == (mixed if training.simulated else 0)
+        assert mixed == entry.reporting.level and len(task.clips) == (mixed if training.simulated else 0)
         assert task.motions == ("walk", "run")
         assert task.steps == plan.preset.steps["snug"] * (LONGEST if training.converged else 1)
         assert task.held_out == (("bow",) if training.converged else ())
         assert (training.simulated is None) == (TRAININGS[training.kind].simulated is None)
         usual = TRAININGS[training.kind].recipe
         assert dataclasses.replace(training.recipe, mixed=usual.mixed, name=usual.name) == usual
-    families = {entry.family for entry in BLOCK}
-    assert len({(entry.family, entry.level) for entry in BLOCK}) == len(BLOCK) and len(families) == 20
+    families = {entry.reporting.family for entry in BLOCK}
+    assert (
+        len({(entry.reporting.family, entry.reporting.level) for entry in BLOCK}) == len(BLOCK)
+        and len(families) == 20
+    )
     alone = dataclasses.replace(plan, motions=Motions(train=("walk",), test=("kick",)))
     network = Network("snug", 0, "tshirt", find_method("snug-data-converged-0").training)
     task = Schedule(alone).network(network)  # a single motion cannot be held out

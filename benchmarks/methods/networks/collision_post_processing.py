@@ -18,7 +18,7 @@ from snug.training.contact.cache import Patch
 MARGIN = 2e-3  # [m]
 
 
-class CleanUp:
+class CollisionPostProcessing:
     """Pushes a garment off a body that moves in a known way.
 
     rest_positions (V, 3) of the garment and body_rest (B, 3), body_faces of the body in its T-pose, which say

@@ -15,7 +15,7 @@ from torch import Tensor
 from reference_sim.kernels.kernel_cache import njit
 
 
-class CarriedResidual:
+class ResidualTransport:
     """Turns vectors at the vertices of a garment from one frame of a motion to the next.
 
     Args:

@@ -17,22 +17,24 @@ from reference_sim import Trajectory
 WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
 
 
-class CleanedNetwork(Network):
+class PostProcessedNetwork(Network):
     """A model read from its file, and the body that its garment is pushed out of, posed before run()."""
 
     def prepare(self, scene: BuiltScene) -> None:
-        from benchmarks.methods.networks.push_out import CleanUp
+        from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
 
         assert scene.dressed is not None and scene.obstacle is not None
         body, garment = scene.dressed.body, scene.dressed.garment
         positions = np.asarray(scene.obstacle.positions)
-        self.then = clean = CleanUp(garment.rest_positions, body.shaped(), body.faces, positions)
+        self.then = clean = CollisionPostProcessing(
+            garment.rest_positions, body.shaped(), body.faces, positions
+        )
         for frame in range(min(WARM_UP, len(positions))):
             clean(np.asarray(scene.cloth.rest_positions), frame)
         super().prepare(scene)
 
     def run(self) -> Trajectory:
-        from benchmarks.methods.networks.push_out import MARGIN
+        from benchmarks.methods.networks.collision_post_processing import MARGIN
 
         cleaned = super().run()
         said = {"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN}
@@ -52,6 +54,6 @@ class CleanedNetwork(Network):
         return replace(still, positions=np.stack(cleaned))
 
 
-def make(*, models: Path, seed: int, kind: str) -> CleanedNetwork:
+def make(*, models: Path, seed: int, kind: str) -> PostProcessedNetwork:
     """The network of that name and seed, cleaned up after."""
-    return CleanedNetwork(model_path(models, kind, seed))
+    return PostProcessedNetwork(model_path(models, kind, seed))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.methods.networks.push_out import MARGIN, CleanUp
+from benchmarks.methods.networks.collision_post_processing import MARGIN, CollisionPostProcessing
 from reference_sim import Obstacle
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -15,7 +15,7 @@ def scene():
     dressed, motion = tube_dress(), swaying(8)
     body = dressed.body
     skin = body.vertices(motion.poses, motion.translations)
-    clean = CleanUp(dressed.garment.rest_positions, body.shaped(), body.faces, skin)
+    clean = CollisionPostProcessing(dressed.garment.rest_positions, body.shaped(), body.faces, skin)
     obstacle = Obstacle(skin, body.faces, rest_positions=body.shaped())
     return clean, obstacle, dressed.skinned(motion, smoothing=20)
 

@@ -1,0 +1,49 @@
+"""Ablations of SNUG: one choice of its recipe changed, one deviation from the paper, coarser weights."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from benchmarks.method import MethodEntry
+from benchmarks.methods.catalogue.networks import network
+from snug.recipes.deviations import DEVIATIONS
+from snug.recipes.named import ABLATIONS
+
+_LABELS = {
+    "no-noise": "first states of zero",
+    "noise-alone": "first states of noise, none remembered",
+    "window6": "windows of 6",
+    "window12": "windows of 12",
+    "shapes": "trained on body shapes",
+    "springs": "springs instead of StVK",
+}
+
+
+def _rounded(precision: str) -> MethodEntry:
+    label = f"SNUG, its weights in {precision}"
+    entry = network(
+        "snug", label, f"{label}: less memory to read in a frame, rounded answers", role="ablation",
+        options={"kind": "snug", "precision": precision}, batched=False, base="snug",
+    )  # fmt: skip
+    return replace(entry, name=f"snug-{precision}")
+
+
+RECIPES = tuple(
+    network(
+        f"snug-{recipe.name}", f"SNUG, {_LABELS.get(recipe.name, recipe.name.replace('-', ' '))}",
+        f"ablation: SNUG, recipe {recipe.name}", role="ablation", base="snug", pairing_group="snug",
+    )
+    for recipe in ABLATIONS
+)  # fmt: skip
+
+PRECISIONS = tuple(map(_rounded, ("bf16", "int8")))
+
+# Each a training of its own, of equal steps: their times stand beside them.
+RECIPE_DEVIATIONS = tuple(
+    network(
+        f"{base}-{verb}-{deviation.name}", f"{label} {verb} {deviation.words}",
+        f"{base} {verb} {deviation.words}", role="ablation", base=base, pairing_group="snug",
+    )
+    for base, label, verb in (("snug", "SNUG", "without"), ("snug-paper", "SNUG, paper's text,", "with"))
+    for deviation in DEVIATIONS
+)  # fmt: skip

@@ -1,0 +1,75 @@
+"""Networks as methods, and the further ones that run when they are named: baselines and variants of SNUG."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from benchmarks.method import MethodEntry, Reporting
+
+
+def network(
+    name: str, label: str, description: str, *, base: str = "", pairing_group: str = "", **fields: Any
+) -> MethodEntry:
+    """Return the entry of a network.
+
+    Args:
+        name: that of its training in TRAININGS, unless `fields` has a `training`.
+        label: its name for people.
+        description: one line for --list and run.json.
+        base: the method that it is compared with.
+        pairing_group: shared by methods that are compared seed by seed; its own name by default.
+        fields: other fields of MethodEntry, in place of those of a network.
+
+    >>> network("snug-windy", "SNUG, windy", "SNUG, trained in a wind", base="snug").reporting.pairing_group
+    'snug-windy'
+    """
+    usual: dict[str, Any] = {
+        "module": "benchmarks.methods.networks.network",
+        "options": {"kind": name},
+        "needs_body": True,
+        "dtype": "float32",
+        "trained": name,
+        "seeded": True,
+        "batched": True,
+        "gives_first_frame": True,
+        "conserving": True,
+        "role": "network",
+        "reporting": Reporting(base=base, pairing_group=pairing_group or name),
+    }
+    return MethodEntry(name=name, label=label, description=description, **usual | fields)
+
+
+def post_processed(entry: MethodEntry) -> MethodEntry:
+    """Return the entry of a network with collision post-processing behind it."""
+    family = entry.reporting.family
+    return replace(
+        entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, post-processed",
+        description=f"{entry.name}, then vertices within 2 mm of the skin pushed out; both are timed",
+        module="benchmarks.methods.networks.post_processed_network", batched=False,
+        reporting=replace(
+            entry.reporting, base=entry.name, family=f"{family}+cleanup" if family else ""
+        ),
+    )  # fmt: skip
+
+
+NETWORKS = (
+    network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),
+    network("santesteban2019", "Santesteban 2019",
+            "fit by shape and one GRU of 1500, trained on simulated vertices"),
+    network("tailornet", "TailorNet",
+            "low and high frequencies by static networks, trained on simulated vertices"),
+    network("snug-dynamic", "SNUG, dynamic",
+            "SNUG that learns its dynamics from a simulation, the rest from the energies",
+            base="snug", pairing_group="snug"),
+    network("snug-paper", "SNUG, paper's text", "SNUG by the paper's text, its closest points remembered",
+            base="snug", pairing_group="snug"),
+)  # fmt: skip
+
+POST_PROCESSED = tuple(
+    post_processed(network(name, label, ""))
+    for name, label in (
+        ("snug", "SNUG"), ("pbns", "PBNS"), ("supervised", "Supervised"),
+        ("santesteban2019", "Santesteban 2019"), ("tailornet", "TailorNet"),
+    )
+)  # fmt: skip
