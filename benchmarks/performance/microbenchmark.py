@@ -1,6 +1,6 @@
 """A microbenchmark: some measured numbers of one case, alone on the machine in a process of its own.
 
-Times are medians of repeats inside that process, of part left_out minima. They belong to the machine that
+Times are medians of repeats inside that process. They belong to the machine that
 they were taken on: compare ratios.
 """
 

@@ -38,19 +38,6 @@ SIMULATOR = (
         )
         for side, frames, repeats in ((32, 4, 5), (64, 4, 5), (128, 4, 5), (256, 4, 3), (512, 1, 1))
     ),
-    *(
-        Microbenchmark(
-            name=f"left_out/{what}",
-            description=f"the same scene without and with {title} that it does not need",
-            module=f"{_HERE}.left_out",
-            options={"what": what},
-            smoke=what == "hinges",
-        )
-        for what, title in (
-            ("body", "a body"), ("hinges", "hinges"), ("inertia", "inertia"),
-            ("networks", "a library of networks"),
-        )
-    ),
 )  # fmt: skip
 
 NETWORKS = (

@@ -59,12 +59,6 @@ METRICS = (
         table="scaling",
     ),
     *_metrics(
-        _clocked("without", "ms", "Without", "least time of the scene as it is, or of loading what it needs"),
-        _clocked("with", "ms", "With", "the same with what it does not need"),
-        _clocked("saved", "%", "Saved", "share of the time that leaving it out saves", False),
-        table="left_out",
-    ),
-    *_metrics(
         _size("training_frames", "Frames", "poses that the training draws from, augmented motions included"),
         _clocked("setup", "s", "Making ready", "what a training does before its first step"),
         _clocked("training_step", "ms", "Step", "a training step; the median over blocks of steps"),

@@ -19,7 +19,7 @@ from benchmarks.methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.metrics import find_metric
 from benchmarks.metrics.cost.microbenchmarks import METRICS, PROCESS_MEMORY
-from benchmarks.performance import convergence, garment, inference, left_out, sheet, training_step
+from benchmarks.performance import convergence, garment, inference, sheet, training_step
 from benchmarks.performance.convergence import HELD_OUT
 from benchmarks.performance.microbenchmark import Microbenchmark, Settings
 from benchmarks.performance.registry import MICROBENCHMARKS
@@ -72,12 +72,12 @@ def test_they_are_run_only_where_their_suite_is_named():
     short = {benchmark for benchmark in MICROBENCHMARKS if not benchmark.long}
     assert set(chosen()) == short and len(short) == len(MICROBENCHMARKS) - 1
     with pytest.raises(PlanError, match="nothing to run"):
-        chosen(suites=("speed",), scenes=("left_out/*",))
+        chosen(suites=("speed",), scenes=("scaling/*",))
 
 
 def test_patterns_methods_and_the_smallest_preset_choose_among_them():
-    assert {b.name for b in chosen(scenes=("left_out/*",))} == {
-        f"left_out/{what}" for what in ("body", "hinges", "inertia", "networks")
+    assert {b.name for b in chosen(scenes=("scaling/*",))} == {
+        f"scaling/{side}x{side}" for side in (32, 64, 128, 256, 512)
     }
     assert {b.name.split("/")[0] for b in chosen(methods=("pbns",))} == {"training_step", "inference"}
     assert chosen(preset=SMOKE) == tuple(b for b in MICROBENCHMARKS if b.smoke)
@@ -96,11 +96,11 @@ def test_a_wrong_word_is_one_line_and_exit_2(capsys):
 
 
 def test_the_command_says_what_it_would_measure(tmp_path, capsys):
-    words = ["--suite", "performance", "--scenes", "left_out/*", "-o", str(tmp_path / "run"), "--dry-run"]
+    words = ["--suite", "performance", "--scenes", "scaling/*", "-o", str(tmp_path / "run"), "--dry-run"]
     assert run.main(words) == 0
     said = capsys.readouterr().out
-    assert "suites performance;" in said and "0 cells, 0 skipped, 0 cases, 4 microbenchmarks" in said
-    assert "  microbenchmark left_out/hinges x simulation: run (missing)\n" in said
+    assert "suites performance;" in said and "0 cells, 0 skipped, 0 cases, 5 microbenchmarks" in said
+    assert "  microbenchmark scaling/64x64 x simulation: run (missing)\n" in said
 
 
 def test_names_are_unique_and_of_methods_that_there_are():
@@ -245,16 +245,6 @@ def test_the_shirt_is_cut_to_its_frames_and_measured(monkeypatch):
     assert found["converged_frames"] == 100.0 and found["vertices"] == scene.cloth.vertex_count
     assert 0 < found["iterations"] <= found["iterations_worst"]
     assert 0 <= found["deep_vertices"] <= found["penetrating_vertices"] < 100
-
-
-@pytest.mark.parametrize("what", ["body", "hinges", "inertia"])
-def test_what_is_not_needed_changes_nothing_but_round_off(what, monkeypatch):
-    monkeypatch.setattr(left_out, "FRAMES", 4)
-    with_and_without = {"body": left_out._body, "hinges": left_out._hinges, "inertia": left_out._inertia}
-    without, with_it = (run().positions for run in with_and_without[what]())
-    assert np.abs(without - with_it).max() < 1e-5
-    found = values(left_out.measure(settings(), what=what))
-    assert found["saved"] == pytest.approx(100 * (1 - found["without"] / found["with"]))
 
 
 # --- networks -----------------------------------------------------------------------------------------------
