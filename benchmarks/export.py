@@ -8,17 +8,14 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.methods import find_method
-from benchmarks.plan.one_scene import plan_of_scene, words_of_scene
-from benchmarks.plan.options import add_scene_options
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import add_scene_options, scene_fields, split
 from benchmarks.plan.plan import Plan, PlanError
+from benchmarks.plan.request import Request
 from benchmarks.timing import one_thread
 from reference_sim.command.command_line import Parser, command
-
-if TYPE_CHECKING:
-    from benchmarks.scene import BuiltScene
 
 PROGRAM = "benchmarks.export"
 EXAMPLES = """examples:
@@ -60,8 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     demand_new(folder)
     plan = plan_of(options)
     try:
-        scene = built(plan)
-        from benchmarks.external.exported_scene import write_scene
+        scene = plan.scenes[0].build(plan.open_assets() if plan.garments else None)
+        from benchmarks.external.exported_scene import write_scene  # loads the simulator
 
         chosen = ["--scene", options.scene, *words_of_scene(options)]
         score = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
@@ -76,19 +73,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def plan_of(options: argparse.Namespace) -> Plan:
-    """A plan of that scene and its simulation alone. Raises ValueError, one line."""
-    # Nobody simulates scenes for networks alone: the network is there to find them, and taken out again.
-    plan = plan_of_scene(options, options.scene, ["simulation", "untrained", "snug"])
+    """Return the plan of one scene and its simulation alone. Raises ValueError, one line."""
+    # Nobody simulates scenes for networks alone: the networks are there to find them, and taken out again.
+    methods = ("simulation", "untrained", "snug")
+    fields = scene_fields(options)
+    plan = make_plan(Request(scenes=split([options.scene]), methods=methods, one_scene=True, **fields))
     first = plan.cells[0]
     return replace(plan, cells=(replace(first, entry=replace(first.entry, trained=None)),))
 
 
-def built(plan: Plan) -> BuiltScene:
-    """Build the scene of the plan. Raises ValueError where a garment or a motion cannot be."""
-    from benchmarks.runner.whole_run import assets_of
-
-    assets = assets_of(plan) if plan.garments else None
-    return plan.scenes[0].build(assets)
+def words_of_scene(options: argparse.Namespace) -> list[str]:
+    """Return the options of a scene that were given, as words of another command; the preset always."""
+    parser, words = make_export_parser(), ["--preset", options.preset]
+    for name, value in vars(options).items():
+        if name in ("scene", "out", "reference", "preset") or value == parser.get_default(name):
+            continue
+        values = value if isinstance(value, list) else [value]
+        for each in values:
+            words += [f"--{name.replace('_', '-')}", *([] if each is True else [str(each)])]
+    return words
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from benchmarks.external.roll_out_option import RollOutError
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import PROGRAM, make_parser
+from benchmarks.plan.options import PROGRAM, make_parser, request_of_run
 from benchmarks.plan.plan import Plan
 from benchmarks.registry import DeclarationError
 from benchmarks.tasks.task import RunStopped
@@ -25,11 +25,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = make_parser().parse_args(words)
         if options.list:
-            from benchmarks.plan.listing import listing
+            from benchmarks.plan.list_names import list_names
 
-            print(listing())
+            print(list_names())
             return 0
-        plan = make_plan(options, words)
+        plan = make_plan(request_of_run(options, words))
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> int:
     """Run the plan, or say what would be run; returns the exit status."""
-    for motion in plan.motions.files.values():
+    for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     from benchmarks.runner.lock import HeldError, held
 

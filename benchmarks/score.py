@@ -23,18 +23,17 @@ from benchmarks.external.roll_out_option import (
     Stated,
     checked_ms,
 )
-from benchmarks.plan.one_scene import plan_of_scene
-from benchmarks.plan.options import add_scene_options
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import add_scene_options, scene_fields, split
 from benchmarks.plan.plan import Plan
-from benchmarks.plan.selection import stored_cells
+from benchmarks.plan.request import Request
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
 from benchmarks.timing import one_thread
 from reference_sim.command.command_line import Parser
 
 PROGRAM = "benchmarks.score"
-JUDGED_BY_STEP = "speed"  # the suite in which steps are solved again: gaps and one-step errors
-ANY_SCENE = "hanging_sheet"  # whose place the scene of a file takes
+SOLVED_AGAIN = "speed"  # the suite in which steps are solved again: gaps and one-step errors
 NO_REFERENCE = "left out by --no-reference: curvature error and histogram, distances, dynamics, relative gap"
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
@@ -89,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     try:
-        plan = make_plan(make_parser().parse_args(words), words)
+        plan = plan_of(make_parser().parse_args(words), words)
     except (ValueError, OSError) as error:  # as in benchmarks.run
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
@@ -100,43 +99,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def make_plan(options: argparse.Namespace, words: Sequence[str]) -> Plan:
-    """A run of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
+def plan_of(options: argparse.Namespace, words: Sequence[str]) -> Plan:
+    """Return the plan of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
     stated = Stated(options.units, options.up, options.fps, options.match_vertices)
     stem = Path(options.roll_out.rstrip("/").replace(PLACE, "")).stem
     name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-.") or "roll-out"
     option = RollOutOption(name, options.roll_out, stated, checked_ms(options.declared_ms))
-    plan = plan_of_scene(options, options.scene or ANY_SCENE, ["simulation"], out=options.out)
+    fields, scenes = scene_fields(options), split([options.scene or ""])
     if options.rest_mesh:
-        plan, option = _of_file(plan, option, options.rest_mesh)
-    cells = [_with_steps(_reference(cell, options)) for cell in plan.cells]
-    return replace(
-        plan,
-        cells=(*cells, *stored_cells((option,), cells)),
-        suites=tuple(dict.fromkeys((*plan.suites, JUDGED_BY_STEP))),
+        from benchmarks.scenes.from_roll_out import declared  # loads the simulator
+
+        scene = declared(option, options.rest_mesh)
+        scenes, fields = (scene.name,), fields | {"further_scenes": (scene,), "suites": (SOLVED_AGAIN,)}
+        # The rate that the user has stated of the file is now that of the scene.
+        option = replace(option, stated=replace(stated, fps=None))
+    request = Request(
         command=shlex.join(["python", "-m", PROGRAM, *words]),
+        scenes=scenes,
+        methods=("simulation",),
+        one_scene=True,
+        roll_outs=(option,),
+        folder=Path(options.out) if options.out else None,
+        **fields,
     )
-
-
-def _of_file(plan: Plan, option: RollOutOption, rest_mesh: str) -> tuple[Plan, RollOutOption]:
-    """The plan with the scene that the roll-out brings in place of another; what is said of the file has then
-    been said of the scene, but for unit and axis.
-    """
-    from benchmarks.scenes.from_roll_out import declared
-
-    scene = declared(option, rest_mesh)
-    cells = tuple(replace(cell, scene=scene, suites=(JUDGED_BY_STEP,)) for cell in plan.cells)
-    same_rate = replace(option.stated, fps=None)
-    return replace(plan, cells=cells), replace(option, stated=same_rate)
+    plan = make_plan(request)
+    cells = tuple(_solved_again(_reference(cell, options)) for cell in plan.cells)
+    return replace(plan, cells=cells, suites=tuple(dict.fromkeys((*plan.suites, SOLVED_AGAIN))))
 
 
 def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
-    """The simulation's cell, or what takes its place."""
+    """Return the simulation's cell, or the one that takes its place; others as they are."""
+    if cell.entry.role != "reference":
+        return cell
     if options.no_reference:
         return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
     if options.reference is None:
         return cell
-    from benchmarks.methods.outside.stored_roll_out import entry_of
+    from benchmarks.methods.outside.stored_roll_out import entry_of  # loads numpy
 
     stored = RollOutOption("reference", options.reference, Stated(), role="reference")
     entry = entry_of(stored, cell.scene.name)
@@ -145,8 +144,9 @@ def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
     return replace(cell, entry=replace(entry, label="Reference, from a file"))
 
 
-def _with_steps(cell: Cell) -> Cell:
-    return replace(cell, suites=tuple(dict.fromkeys((*cell.suites, JUDGED_BY_STEP))))
+def _solved_again(cell: Cell) -> Cell:
+    """Return the cell in the suite, too, in which steps are solved again."""
+    return replace(cell, suites=tuple(dict.fromkeys((*cell.suites, SOLVED_AGAIN))))
 
 
 SHOWN = (

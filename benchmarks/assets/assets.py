@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from benchmarks.assets.inputs import Inputs
 
 if TYPE_CHECKING:
     import numpy as np
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
     from benchmarks.presets import Preset
     from snug.body.parametric_body import Body
     from snug.garments.garment import Garment
-    from snug.garments.options import GarmentFile
     from snug.motion.motion import Motion
 
 
@@ -65,21 +65,27 @@ def open_assets(
     motions: Iterable[Motion],
     garments: Iterable[str],
     *,
-    body: Path | None = None,
-    own: GarmentFile | None = None,
+    inputs: Inputs | None = None,
 ) -> Assets:
-    """Load the body, or that of a file, tailor these garments and no other, or read the user's own; motions
-    are cut to the preset's length.
+    """Tailor these garments and no others to the body, and cut motions to the preset's length.
+
+    Args:
+        preset: vertices of a garment, frames of a motion and of a clip.
+        motions: at their full length.
+        garments: names of templates, or that of the user's garment, which is taken as read.
+        inputs: the user's body and garment; without them the package's body.
+
+    Raises:
+        ValueError: a garment that cannot be tailored to this body.
     """
     from benchmarks.assets.liveliest_part import clip
-    from snug.body.smpl_files import read_body
-    from snug.garments.reading import read_garment
     from snug.garments.templates import find_template
 
-    wearer = read_body(body)
+    inputs = inputs or Inputs()
+    wearer, user_garment = inputs.wearer, inputs.garment
     tailored = {
-        name: read_garment(own, wearer)
-        if own and name == own.name
+        name: user_garment.garment
+        if user_garment and name == user_garment.name
         else find_template(name).tailor(wearer, vertices=preset.garment_vertices)
         for name in garments
     }

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.assets.inputs import FEWEST_FRAMES, read_inputs
 from benchmarks.methods import METHODS
-from benchmarks.plan.make_plan import WORKERS, choose_body, choose_garment, choose_states, split
-from benchmarks.plan.motion_roles import FEWEST
+from benchmarks.plan.make_plan import WORKERS, check_garment_name, choose_states, scenes_of_file
+from benchmarks.plan.options import split
 from benchmarks.plan.plan import Motions, Plan, PlanError
 from benchmarks.presets import find_preset
 from benchmarks.registry import by_name
@@ -27,7 +28,7 @@ from benchmarks.runner.whole_run import executor_of
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.sequence import SimulateSequence
 from benchmarks.tasks.task import Outcome
-from snug.garments.options import demand_garment_file, is_garment_file
+from snug.garments.options import demand_garment_file, is_garment_file, make_garment_file
 from snug.motion.options import parse_motion_options
 from snug.recipes.recipe import DEFAULT
 from snug.training.simulated_data import INDEX, DataSet, SimulatedSequence, settings_of
@@ -40,12 +41,11 @@ LONGEST = 1_000_000  # frames of a sequence
 
 def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
     """Simulate what the folder lacks. Raises ValueError, one line, before anything is written."""
-    plan, entry = make_plan(options, words)
+    plan, entry = plan_sequences(options, words)
     _there(plan.folder)  # a folder of other things is refused before any work
     garment = plan.motions.first_garment
-    own = plan.garment.file if plan.garment else None
-    motions = plan.motions.files.values()
-    assets = open_assets(plan.preset, motions, [garment], body=plan.body_file, own=own)
+    motions = plan.inputs.motions.values()
+    assets = open_assets(plan.preset, motions, [garment], inputs=plan.inputs)
     settings = settings_of(assets.body, assets.garments[garment]) | {
         "frames_per_second": _rate(motions), "method": entry.name, "settle_frames": plan.preset.settle_frames,
     }  # fmt: skip
@@ -72,24 +72,32 @@ def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
     return found
 
 
-def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, Any]:
-    """A plan of these motions, and the method that simulates them. Raises ValueError, one line."""
-    for name, least in (("sequences", 1), ("frames", FEWEST), ("vertices", 1), ("settle", 2), ("workers", 1)):
+def plan_sequences(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, Any]:
+    """Return the plan of these motions, and the method that simulates them. Raises ValueError, one line."""
+    for name, least in (
+        ("sequences", 1),
+        ("frames", FEWEST_FRAMES),
+        ("vertices", 1),
+        ("settle", 2),
+        ("workers", 1),
+    ):
         value = getattr(options, name)
         if value is not None and not least <= value <= LONGEST:
             raise PlanError(f"--{name} {value}: give a whole number from {least} to {LONGEST}")
     methods = {entry.name: entry for entry in METHODS if not (entry.trained or entry.needs_body)}
     if options.method not in methods:
         raise PlanError(f"--method {options.method}: no solver is called so; see benchmarks.run --list")
-    own = None
+    garment_file = None
     if is_garment_file(options.garment):
-        own = choose_garment(options)
+        garment_file = make_garment_file(options.garment, options)
+        check_garment_name(garment_file)
+        worn = (scenes_of_file(garment_file),)
     else:
         demand_garment_file(options)
-    worn = (own.scenes,) if own else (of_garment(options.garment),)
+        worn = (of_garment(options.garment),)
     if why := methods[options.method].skip(worn[0].scene("")):
         raise PlanError(f"--method {options.method}: {why}")
-    motions = choose_motions(options, dynamic=worn[0].dynamic)
+    motions = choose_sequences(options, dynamic=worn[0].dynamic)
     preset = replace(
         find_preset("quick"), garment_vertices=options.vertices, frames=LONGEST, settle_frames=options.settle
     )
@@ -97,12 +105,13 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
         from benchmarks.process.scheduler import check_scheduler
 
         check_scheduler(options.scheduler)
+    inputs = read_inputs(Path(options.body) if options.body else None, garment_file)
     rest = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     rest.add_argument("-o", "--out")
     plan = Plan(
         preset=preset, suites=(), cells=(), cases=(), seeds=(), device="cpu", folder=Path(options.out),
-        motions=Motions(train=tuple(motions), files=motions, worn=worn), body=choose_body(options.body),
-        garment=own, only=choose_states(split(options.only), fresh=False),
+        motions=Motions(train=tuple(motions), files=tuple(motions), worn=worn),
+        inputs=replace(inputs, motions=motions), only=choose_states(split(options.only), fresh=False),
         scheduler=options.scheduler or "",
         workers=options.workers or min(WORKERS, provenance.usable_cores()),
         command=shlex.join(["python", "-m", "benchmarks.dataset", *rest.parse_known_args(words)[1]]),
@@ -110,8 +119,8 @@ def make_plan(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, 
     return plan, methods[options.method]
 
 
-def choose_motions(options: argparse.Namespace, *, dynamic: bool) -> dict[str, Motion]:
-    """Name -> motion of each sequence. Raises ValueError for names that come twice, and for none."""
+def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str, Motion]:
+    """Return name -> motion of each sequence. Raises ValueError for names that come twice, and for none."""
     from snug.motion import library
     from snug.motion.files import load_motions
     from snug.training.motion_augmentation import FRAMES, SHARED_SEED, mixed_motions
@@ -130,15 +139,17 @@ def choose_motions(options: argparse.Namespace, *, dynamic: bool) -> dict[str, M
     chosen = list(motions.values())[options.first :]
     cut = [motion.cut(0, options.frames) if options.frames else motion for motion in chosen]
     for motion in cut:
-        if motion.frames < FEWEST:
-            raise PlanError(f"motion {motion.name}: {motion.frames} frames; at least {FEWEST} are needed")
+        if motion.frames < FEWEST_FRAMES:
+            raise PlanError(
+                f"motion {motion.name}: {motion.frames} frames; at least {FEWEST_FRAMES} are needed"
+            )
     return {motion.name: motion for motion in cut}
 
 
 def tasks_of(plan: Plan, entry: Any) -> list[SimulateSequence]:
     """One for each motion. On what machine they run decides nothing."""
     schedule, garment, tasks = Schedule(plan), plan.motions.first_garment, []
-    for name, motion in plan.motions.files.items():
+    for name, motion in plan.inputs.motions.items():
         task = schedule.data(name, garment, entry)
         given = {field.name: getattr(task, field.name) for field in fields(task)}
         inputs = {name: value for name, value in task.inputs.items() if name != "machine"}

@@ -13,17 +13,17 @@ is executed.
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.external.roll_out_option import RollOutError
-from benchmarks.fingerprint.digest import digest_of_files
-from reference_sim.files.mesh_files import MESH_SUFFIXES, read_mesh, read_sequence
+from reference_sim.files.mesh_files import MESH_SUFFIXES, Surface, read_mesh, read_sequence
 
 PACKED = 1032  # bytes that deflate packs into one at most
 KEYS = {  # of an npz, and of a pickle
@@ -59,12 +59,42 @@ class StoredRollOut:
 
 
 def read_roll_out(path: str | Path) -> StoredRollOut:
-    """Read a file, a folder or a pattern of files. Raises RollOutError, one line, for whatever is wrong."""
-    return _read(str(path), digest_of_files(str(path)))
+    """Read a file, a folder or a pattern of files; a process reads it once, until it changes.
+
+    Raises:
+        RollOutError: one line with the file, for whatever is wrong.
+    """
+    return _read(str(path), _state(str(path)))
 
 
-@lru_cache(maxsize=1)  # a plan, its checks and a cell ask for the same file one after another
-def _read(path: str, digest: str) -> StoredRollOut:
+def read_rest_mesh(path: str | Path) -> Surface:
+    """Read the mesh of a cloth at rest; a process reads it once, until it changes. Raises MeshError."""
+    return _read_mesh(str(path), _state(str(path)))
+
+
+def forget_roll_outs() -> None:
+    """Free the memory of what has been read."""
+    _read.cache_clear()
+    _read_mesh.cache_clear()
+
+
+def _state(path: str) -> tuple[tuple[str, int, int], ...]:
+    """Names, times and sizes of the files that a path means: these tell a change without opening any."""
+    given = Path(path)
+    files = sorted(given.iterdir()) if given.is_dir() else sorted(map(Path, glob.glob(path))) or [given]
+    if given.suffix.lower() in (".pc2", ".pc16"):
+        files.append(given.with_suffix(".obj"))
+    stats = ((file.name, file.stat()) for file in files if file.is_file())
+    return tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
+
+
+@cache
+def _read_mesh(path: str, state: object) -> Surface:
+    return read_mesh(path)
+
+
+@cache
+def _read(path: str, state: object) -> StoredRollOut:
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES and not (Path(path).is_dir() or "*" in path):
         raise RollOutError(

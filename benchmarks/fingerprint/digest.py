@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import glob
 import hashlib
 import json
 from pathlib import Path
@@ -33,15 +32,3 @@ def digest_of_file(path: Path) -> str:
     """Return 16 hexadecimal digits of a file's bytes. Raises OSError."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
-
-
-def digest_of_files(path: str) -> str:
-    """Return the digest of all that a path means: a file, those of a folder or of a pattern.
-
-    The mesh beside a point cache (.pc2, .pc16) counts with it.
-    """
-    given = Path(path)
-    files = sorted(given.iterdir()) if given.is_dir() else sorted(map(Path, glob.glob(path))) or [given]
-    if given.suffix.lower() in (".pc2", ".pc16"):
-        files.append(given.with_suffix(".obj"))
-    return digest([[file.name, digest_of_file(file)] for file in files if file.is_file()])

@@ -1,4 +1,4 @@
-"""The options of benchmarks.run, and those of a scene, which benchmarks.score and benchmarks.export take too.
+"""The options of benchmarks.run, those of a scene, which score and export take too, and their requests.
 
 Light, so that --help answers at once.
 """
@@ -6,12 +6,19 @@ Light, so that --help answers at once.
 from __future__ import annotations
 
 import argparse
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from benchmarks.external.roll_out_option import HELP as ROLL_OUT_HELP
-from benchmarks.presets import PRESETS
+from benchmarks.external.roll_out_option import parse as parse_roll_out
+from benchmarks.plan.plan import PlanError
+from benchmarks.plan.request import Request
+from benchmarks.presets import PRESETS, find_preset
 from reference_sim.command.command_line import Parser
-from snug.garments.options import add_garment_options
-from snug.motion.options import add_motion_options
+from snug.garments.options import add_garment_options, demand_garment_file, make_garment_file
+from snug.motion.options import add_motion_options, parse_motion_options
 
 PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:
@@ -52,7 +59,7 @@ exit status: 0 when every cell ended as ok or as an explained skip (in extremes 
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of benchmarks.run."""
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Dress a body, simulate the ground truth, train the networks, compare all of them "
@@ -93,7 +100,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def add_scene_options(parser: argparse.ArgumentParser) -> None:
-    """What a scene is made of; benchmarks.score and benchmarks.export take the same."""
+    """Add the options of what a scene is made of; benchmarks.score and benchmarks.export take the same."""
     add = parser.add_argument
     names = ", ".join(preset.name for preset in PRESETS)
     add("--preset", default="quick", metavar="NAME", help=f"how much of everything: {names} (default quick)")
@@ -113,3 +120,67 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
         help="an own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; its scenes are "
         "<name of the file>/<motion>. What will work says python -m snug.check FILE")  # fmt: skip
     add_garment_options(parser)
+
+
+def request_of_run(options: argparse.Namespace, words: Sequence[str]) -> Request:
+    """Return the request of benchmarks.run.
+
+    Args:
+        options: of `make_parser`.
+        words: the command line that they were parsed from.
+
+    Raises:
+        ValueError: one line for an option that means nothing.
+    """
+    return Request(
+        command=shlex.join(["python", "-m", PROGRAM, *words]),
+        suites=split(options.suite),
+        scenes=split(options.scenes),
+        methods=split(options.methods),
+        metrics=split(options.metrics),
+        roll_outs=tuple(map(parse_roll_out, options.rollout)),
+        split=options.split,
+        seeds=parse_seeds(options.seeds),
+        device=options.device,
+        folder=Path(options.out) if options.out else None,
+        only=split(options.only),
+        fresh=options.fresh,
+        workers=options.workers,
+        scheduler=options.scheduler or "",
+        **scene_fields(options),
+    )
+
+
+def scene_fields(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the fields of a Request that the options of `add_scene_options` fill. Raises ValueError."""
+    garment = None
+    if options.garment is None:
+        demand_garment_file(options)
+    else:
+        garment = make_garment_file(options.garment, options)
+    return {
+        "preset": find_preset(options.preset),
+        "motions": tuple(options.motions),
+        "motion_options": parse_motion_options(options),
+        "test_motions": split(options.test_motions),
+        "validation_motions": split(options.validation_motions),
+        "body": Path(options.body) if options.body else None,
+        "garment": garment,
+    }
+
+
+def split(values: Sequence[str]) -> tuple[str, ...]:
+    """Return repeated and comma-separated words one by one.
+
+    >>> split(["snug,pbns", "skinning"])
+    ('snug', 'pbns', 'skinning')
+    """
+    return tuple(word.strip() for value in values for word in value.split(",") if word.strip())
+
+
+def parse_seeds(text: str) -> tuple[int, ...]:
+    """Return whole numbers separated by commas, each once. Raises PlanError."""
+    try:
+        return tuple(dict.fromkeys(int(word) for word in split([text])))
+    except ValueError:
+        raise PlanError(f"--seeds '{text[:40]}': give whole numbers separated by commas") from None

@@ -1,12 +1,13 @@
-"""What a run will do, decided and checked before anything is created. See benchmarks.plan.selection."""
+"""What a run will do, decided and checked before anything is created. See benchmarks.plan.choose_cells."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from benchmarks.assets.inputs import Inputs
 from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.presets import Preset
@@ -16,10 +17,9 @@ from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
 from benchmarks.training import Training
 
 if TYPE_CHECKING:
+    from benchmarks.assets.assets import Assets
     from benchmarks.performance.microbenchmark import Microbenchmark
     from benchmarks.validation.case import Case
-    from snug.garments.options import GarmentFile
-    from snug.motion.motion import Motion
 
 
 # Of a task in the folder of a run, and the states in which it is done again unless --only names others.
@@ -60,47 +60,17 @@ class Network:
 
 
 @dataclass(frozen=True)
-class OwnBody:
-    """A user's body: its file, and a digest of what it held when the run was planned."""
-
-    path: Path
-    digest: str
-
-
-@dataclass(frozen=True)
-class OwnGarment:
-    """A user's garment: its file, how to take it, and digests of all that it is read from when the run was
-    planned.
-    """
-
-    file: GarmentFile
-    digests: tuple[str, ...]
-
-    @property
-    def scenes(self) -> GarmentScenes:
-        """What takes the place of the T-shirt's."""
-        return GarmentScenes(self.file.name, f"a garment of {self.file.path.name}")
-
-    @property
-    def inputs(self) -> dict[str, Any]:
-        """What decides it: contents and options, and not where the files lie."""
-        file = self.file
-        how = [file.units, file.up, list(file.shift), file.rest, file.uv_scale]
-        return {"files": list(self.digests), "how": how}
-
-
-@dataclass(frozen=True)
 class Motions:
-    """Names of the motions of a run, by their roles, and those that came from files.
+    """Names of the motions of a run by their roles.
 
-    dynamic_*: the same for garments that swing. worn: the garments that do them; the first is that of a run
+    files: those that came from a user's files. dynamic_*: the same for garments that swing. worn: the garments that do them; the first is that of a run
     where none is named. split: the role whose motions stand in the suites' scenes, "test" or "validation";
     chosen: whether the user has named those.
     """
 
     train: tuple[str, ...] = ()
     test: tuple[str, ...] = ()
-    files: dict[str, Motion] = field(default_factory=dict)
+    files: Collection[str] = ()
     dynamic_train: tuple[str, ...] = ()
     dynamic_test: tuple[str, ...] = ()
     worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
@@ -154,7 +124,7 @@ class Motions:
 class Plan:
     """Everything to be done.
 
-    body, garment: own ones; None: the package's. only: states of what the folder holds in which a task is
+    inputs: the user's files, as read. only: states of what the folder holds in which a task is
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
     metrics: modules of metrics that are not the project's, see benchmarks.plan.plug_ins. scheduler: address
     of a cluster that does what is not timed; empty: this machine does. Raises PlanError, see check_names.
@@ -167,8 +137,7 @@ class Plan:
     microbenchmarks: tuple[Microbenchmark, ...] = ()
     metrics: tuple[str, ...] = ()
     motions: Motions = Motions()
-    body: OwnBody | None = None
-    garment: OwnGarment | None = None
+    inputs: Inputs = field(default_factory=Inputs)
     seeds: tuple[int, ...]
     device: str
     folder: Path
@@ -207,10 +176,16 @@ class Plan:
         learning = (network for network in self.networks if network.learns_from_simulation)
         return tuple(dict.fromkeys(network.garment for network in learning))
 
-    @property
-    def body_file(self) -> Path | None:
-        """The file of an own body."""
-        return self.body.path if self.body else None
+    def open_assets(self) -> Assets:
+        """Make body, garments and motions of the plan's scenes. Raises ValueError where one cannot be made."""
+        from benchmarks.assets.assets import embedded_motions, open_assets  # loads numpy
+
+        names = [name for garment in self.garments for name in self.motions_of(garment)]
+        names += [name for network in self.networks for name in self.motions.train_of(network.garment)]
+        names, read = list(dict.fromkeys(names)), self.inputs.motions
+        motions = [read[name] for name in names if name in read]
+        motions += embedded_motions(name for name in names if name not in read)
+        return open_assets(self.preset, motions, self.garments, inputs=self.inputs)
 
 
 def check_names(cells: Sequence[Cell]) -> None:

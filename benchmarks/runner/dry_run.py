@@ -38,7 +38,7 @@ def _head(plan: Plan) -> list[str]:
         f"folder {plan.folder}",
         f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
         f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
-        *([f"body {plan.body.path}"] if plan.body else []),
+        *([f"body {plan.inputs.body.path}"] if plan.inputs.body else []),
         *map(partial(_size, plan), plan.garments),
     ]
     for garment in dict.fromkeys(network.garment for network in plan.networks):
@@ -50,8 +50,8 @@ def _head(plan: Plan) -> list[str]:
 
 
 def _size(plan: Plan, garment: str) -> str:
-    if plan.garment and garment == plan.garment.file.name:
-        return f"{garment} of {plan.garment.file.path}"
+    if (user_garment := plan.inputs.garment) and garment == user_garment.name:
+        return f"{garment} of {user_garment.file.path}"
     return f"{garment} of about {plan.preset.garment_vertices} vertices"
 
 

@@ -113,7 +113,7 @@ class Schedule:
 
     def _frames(self, motion: str) -> int:
         """Of the motion, as far as progress goes: those of the library have some hundred."""
-        files = self.plan.motions.files
+        files = self.plan.inputs.motions
         return min(self.preset.frames, files[motion].frames if motion in files else 100)
 
     def network(self, network: Network) -> TrainNetwork:

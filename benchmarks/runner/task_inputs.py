@@ -50,16 +50,16 @@ class TaskInputs:
     def of_body(self, garment: str) -> dict[str, Any]:
         """What the assets are made from."""
         sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
-        own: dict[str, Any] = {}
-        if self.plan.body:
-            own["body"] = self.plan.body.digest
-        if self.plan.garment and garment == self.plan.garment.file.name:
-            own["own garment"] = self.plan.garment.inputs
-        return {"assets": sizes} | own
+        digests: dict[str, str] = {}
+        if user_body := self.plan.inputs.body:
+            digests["body"] = user_body.digest
+        if (user_garment := self.plan.inputs.garment) and garment == user_garment.name:
+            digests["own garment"] = user_garment.digest
+        return {"assets": sizes} | digests
 
     def motion(self, name: str) -> str:
         """Of a file its content; an embedded one is made by code, looked at by itself."""
-        files = self.plan.motions.files
+        files = self.plan.inputs.motions
         return f"{name} {digest(files[name])}" if name in files else name
 
     def simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:

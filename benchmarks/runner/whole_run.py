@@ -86,19 +86,6 @@ def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executo
         raise RunStopped(str(error)) from None
 
 
-def assets_of(plan: Plan) -> Assets:
-    """Body, garments and motions of the plan's scenes. Raises ValueError where one cannot be made."""
-    from benchmarks.assets.assets import embedded_motions, open_assets
-
-    names = [name for garment in plan.garments for name in plan.motions_of(garment)]
-    names += [name for network in plan.networks for name in plan.motions.train_of(network.garment)]
-    names, files = list(dict.fromkeys(names)), plan.motions.files
-    motions = [files[name] for name in names if name in files]
-    motions += embedded_motions(name for name in names if name not in files)
-    own = plan.garment.file if plan.garment else None
-    return open_assets(plan.preset, motions, plan.garments, body=plan.body_file, own=own)
-
-
 def check_roll_outs(plan: Plan) -> Assets | None:
     """Compare every stored roll-out with its scene before anything is written; gives the assets that it made.
 
@@ -107,12 +94,15 @@ def check_roll_outs(plan: Plan) -> Assets | None:
     stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
     if not stored:
         return None
+    from benchmarks.external.roll_out_files import forget_roll_outs  # loads numpy
+
     try:
-        assets = assets_of(plan) if plan.garments else None
+        assets = plan.open_assets() if plan.garments else None
     except ValueError:
         return None  # the run says so itself, of all dressed scenes
     for cell in stored:
         cell.entry.make(models=plan.folder, seed=0).prepare(cell.scene.build(assets))
+    forget_roll_outs()  # each task that takes one reads it in its own process
     return assets
 
 
@@ -126,6 +116,7 @@ class RunLog:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
+        body, garment = plan.inputs.body, plan.inputs.garment
         self.folder = RunFolder(plan.folder)
         self.hardware = provenance.hardware(plan.device)
         # Only training uses an accelerator: its rows name it, see write_rows.
@@ -150,8 +141,8 @@ class RunLog:
                 )
             },
             "split": plan.motions.split,
-            "body": [plan.body.path.name, plan.body.digest] if plan.body else "of the package",
-            "garment": [plan.garment.file.path.name, plan.garment.inputs] if plan.garment else "tailored",
+            "body": [body.path.name, body.digest] if body else "of the package",
+            "garment": [garment.file.path.name, garment.digest] if garment else "tailored",
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
@@ -194,7 +185,7 @@ class RunLog:
     def open_assets(self, made: Assets | None = None) -> Assets:
         """Body, garments and motions of the dressed scenes. Raises ValueError where one cannot be made."""
         with self.stage("body, garments and motions"):
-            assets = made or assets_of(self.plan)
+            assets = made or self.plan.open_assets()
         self.config["garments"] = {
             garment.name: {
                 "vertices": len(garment.rest_positions),

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.external.roll_out_files import StoredRollOut, read_roll_out
+from benchmarks.external.roll_out_files import StoredRollOut, read_rest_mesh, read_roll_out
 from benchmarks.external.roll_out_option import RollOutError, RollOutOption
-from benchmarks.fingerprint.digest import digest_of_files
+from benchmarks.fingerprint.digest import digest
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim import Cloth, Material, MeshError, Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
-from reference_sim.files.mesh_files import METRES, read_mesh, to_metres_y_up
+from reference_sim.files.mesh_files import METRES, to_metres_y_up
 
 FPS = 30.0  # where neither the file nor the user says another rate
 LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn
@@ -36,7 +36,7 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
         module=__name__,
         options={
             "path": option.path, "rest_mesh": rest_mesh, "units": stated.units, "up": stated.up,
-            "fps": stated.fps, "digests": (digest_of_files(option.path), digest_of_files(rest_mesh)),
+            "fps": stated.fps, "digests": (digest(stored), digest(read_rest_mesh(rest_mesh))),
         },
         obstacle=not gone,
     )  # fmt: skip
@@ -52,7 +52,7 @@ def build(
     if len(positions) < FEWEST:
         raise RollOutError(f"{path}: {len(positions)} frames; at least {FEWEST} are needed")
     try:
-        rest = read_mesh(rest_mesh)
+        rest = read_rest_mesh(rest_mesh)
         if len(rest.positions) != positions.shape[1]:
             raise RollOutError(
                 f"{rest_mesh}: {len(rest.positions)} vertices, {path} has {positions.shape[1]}: give the "

@@ -275,10 +275,10 @@ def test_a_folder_of_other_things_is_refused(tube, tmp_path, capsys):
 
 def test_more_sequences_are_mixed_from_the_given_ones(tube, tmp_path):
     options = dataset.make_parser().parse_args(words(tube, tmp_path, "--sequences", "16"))
-    motions = build_dataset.choose_motions(options, dynamic=False)
+    motions = build_dataset.choose_sequences(options, dynamic=False)
     assert list(motions)[-3:] == ["lunge", "mixed_0", "mixed_1"] and len(motions) == 16
     more = dataset.make_parser().parse_args(words(tube, tmp_path, "--sequences", "20", "--from", "14"))
-    later = build_dataset.choose_motions(more, dynamic=False)
+    later = build_dataset.choose_sequences(more, dynamic=False)
     assert list(later) == [f"mixed_{number}" for number in range(6)]
     assert np.array_equal(later["mixed_1"].poses, motions["mixed_1"].poses)
 

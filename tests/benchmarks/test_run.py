@@ -14,7 +14,7 @@ import pytest
 
 from benchmarks import methods, run
 from benchmarks.methods import METHODS
-from benchmarks.plan import selection
+from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan.make_plan import choose_folder
 from benchmarks.plan.plan import Motions, PlanError
 from benchmarks.plan.suites import SUITES, Extent
@@ -164,7 +164,7 @@ def misbehaving(monkeypatch):
     wrong = {"module": "misbehaving", "options": {"how": "raise"}}
     entries = tuple(dataclasses.replace(m, **wrong) if m.name == "newton-1" else m for m in METHODS)
     monkeypatch.setattr(methods, "METHODS", entries)
-    monkeypatch.setattr(selection, "METHODS", entries)
+    monkeypatch.setattr(choosing, "METHODS", entries)
 
 
 def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, capsys):

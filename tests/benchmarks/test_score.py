@@ -22,7 +22,7 @@ from benchmarks.methods import find_method
 from benchmarks.methods.outside.stored_roll_out import entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser
+from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
@@ -104,7 +104,7 @@ def test_without_a_reference_the_reason_is_said(made, tmp_path):
 
 def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_changed(made, tmp_path):
     def planned() -> Cell:
-        plan = make_plan(make_parser().parse_args(words), words)
+        plan = make_plan(request_of_run(make_parser().parse_args(words), words))
         (stored,) = (cell for cell in plan.cells if cell.method == "mine")  # the flag has no file
         return digest(Schedule(plan).cell(stored).inputs), stored
 

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.external.roll_out_files import StoredRollOut, read_roll_out
 from benchmarks.external.roll_out_option import MODULE, RollOutError, RollOutOption, Stated
 from benchmarks.external.scene_fit import fitted
-from benchmarks.fingerprint.digest import digest_of_files
+from benchmarks.fingerprint.digest import digest
 from benchmarks.method import Method, MethodEntry
 from benchmarks.scene import BuiltScene
 from reference_sim import Trajectory
@@ -73,7 +73,7 @@ def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
         label=option.name,
         description=f"roll-out of {Path(path).name}" + ", time as its author says" * declared,
         module=MODULE,
-        options={"path": path, "digest": digest_of_files(path), **asdict(option.stated)},
+        options={"path": path, "digest": digest(stored), **asdict(option.stated)},
         dtype=stored.dtype,
         gives_first_frame=True,
         conserving=True,

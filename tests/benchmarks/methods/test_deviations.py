@@ -9,10 +9,10 @@ import pytest
 
 from benchmarks.methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.plan.motion_roles import choose_motions
+from benchmarks.plan.choose_cells import Selection, choose_cells
+from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.options import EXAMPLES
 from benchmarks.plan.plan import Motions, PlanError
-from benchmarks.plan.selection import Request, choose
 from benchmarks.presets import find_preset
 from snug.motion.library import TEST, VALIDATION
 from snug.recipes.deviations import DEVIATIONS
@@ -26,7 +26,7 @@ NAMES = {
 def chosen(*methods, **changes):
     words = {"suites": ("garments", "extremes"), "preset": find_preset("paper")} | changes
     motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
-    cells = choose(Request(motions=motions, methods=methods, **words))[0]
+    cells = choose_cells(Selection(motions=motions, methods=methods, **words))[0]
     return {cell.method for cell in cells}
 
 
@@ -48,10 +48,10 @@ def test_a_deviation_is_a_method_for_whoever_names_it():
 def test_a_recipe_is_never_chosen_by_the_test_motions():
     words = [word for line in EXAMPLES.splitlines() if "snug-without" in line for word in line.split()]
     assert words and "--split validation" in EXAMPLES and "--test-motions" not in words
-    motions = choose_motions([], [], find_preset("quick"), split="validation")
+    motions = split_motions([], [], find_preset("quick"), split="validation")
     assert motions.measured == VALIDATION and not set(TEST) & {*motions.measured, *motions.train}
     with pytest.raises(PlanError, match="'dance_turn' is a test motion"):
-        choose_motions([], [], find_preset("quick"), validation_names=["dance_turn"], split="validation")
+        split_motions([], [], find_preset("quick"), validation_names=["dance_turn"], split="validation")
 
 
 @pytest.mark.parametrize("preset", ["smoke", "quick", "paper"])

@@ -8,7 +8,7 @@ import torch
 from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser
+from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
@@ -20,7 +20,7 @@ from tests.snug.training.dressing import swaying, tube_dress
 
 
 def plan(*words):
-    return make_plan(make_parser().parse_args(["--suite", "garments", *words]), words)
+    return make_plan(request_of_run(make_parser().parse_args(["--suite", "garments", *words]), words))
 
 
 def methods(*words):

@@ -10,8 +10,8 @@ import pytest
 from benchmarks.assets.assets import Assets
 from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.plan import Motions
-from benchmarks.plan.selection import Request, choose
 from benchmarks.presets import PRESETS, Dependence, find_preset
 from benchmarks.scenes import dependence as module
 from benchmarks.scenes import find_scene
@@ -85,8 +85,8 @@ def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
 
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
 def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
-    request = Request(suites=("validation",), preset=preset, motions=Motions())
-    found = choose(dataclasses.replace(request, full=True))[0]
+    request = Selection(suites=("validation",), preset=preset, motions=Motions())
+    found = choose_cells(dataclasses.replace(request, full=True))[0]
     sizes = preset.dependence
     assert {cell.scene.name for cell in found} == {
         *(f"dependence/mesh/{count}" for count in sizes.meshes),
@@ -96,13 +96,13 @@ def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
     printed = {"simulation-printed-bending"} if preset.further else set()
     assert {cell.method for cell in found} == {"simulation", "skinning", "newton-1"} | printed
     assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
-    assert choose(request)[0] == (() if preset.name == "quick" else found)  # where no suite is named
+    assert choose_cells(request)[0] == (() if preset.name == "quick" else found)  # where no suite is named
 
 
 def test_drapes_of_each_size_and_family_run_where_they_are_named():
     words = {"suites": ("validation",), "preset": find_preset("quick"), "motions": Motions()}
     methods = ("simulation", "simulation-printed-bending")
-    found = choose(Request(**words, scenes=("dependence/drape/*",), methods=methods))[0]
+    found = choose_cells(Selection(**words, scenes=("dependence/drape/*",), methods=methods))[0]
     assert {(cell.scene.name, cell.method) for cell in found} == {
         (scene.name, method) for scene in DRAPES for method in methods
     }

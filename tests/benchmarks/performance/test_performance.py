@@ -23,8 +23,8 @@ from benchmarks.performance import convergence, garment, inference, sheet, train
 from benchmarks.performance.convergence import HELD_OUT
 from benchmarks.performance.microbenchmark import Microbenchmark, Settings
 from benchmarks.performance.registry import MICROBENCHMARKS
+from benchmarks.plan.choose_cells import MEASURED, Selection, choose_cells, choose_suites
 from benchmarks.plan.plan import Motions, Plan, PlanError
-from benchmarks.plan.selection import MEASURED, Request, choose, choose_suites
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.rows import described, rows_of
@@ -59,8 +59,8 @@ def plan_of(folder, *benchmarks, device="cpu", preset=SMOKE):
 
 
 def chosen(*, preset=QUICK, scenes=(), methods=(), suites=("performance",)):
-    request = Request(suites=suites, preset=preset, motions=Motions(), scenes=scenes, methods=methods)
-    return choose(request)[2]
+    request = Selection(suites=suites, preset=preset, motions=Motions(), scenes=scenes, methods=methods)
+    return choose_cells(request)[2]
 
 
 # --- what a run takes of them -------------------------------------------------------------------------------

@@ -16,8 +16,8 @@ from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.methods.outside.program import program
+from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan import plug_ins as outside
-from benchmarks.plan import selection
 from benchmarks.plan.plan import Motions, Plan
 from benchmarks.registry import DeclarationError
 from benchmarks.results.run_folder import RunFolder
@@ -229,8 +229,8 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
         installed(tmp_path / "site", module, name=name)
     monkeypatch.syspath_prepend(tmp_path / "site")
     with monkeypatch.context() as patch:
-        case = dataclasses.replace(selection.MEASURED[0], name="membrane/uniaxial")
-        patch.setattr("benchmarks.plan.selection.MEASURED", (case,))
+        case = dataclasses.replace(choosing.MEASURED[0], name="membrane/uniaxial")
+        patch.setattr("benchmarks.plan.choose_cells.MEASURED", (case,))
         assert run.main(["--scenes", "free_fall", option, word, "-o", "out"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and words in error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import random
@@ -22,8 +21,9 @@ pytest.importorskip("distributed")
 
 from benchmarks import run
 from benchmarks.fingerprint.digest import digest, digest_of_file
-from benchmarks.plan.make_plan import choose_scheduler
+from benchmarks.plan.make_plan import check_scheduler_fits
 from benchmarks.plan.plan import PlanError
+from benchmarks.plan.request import Request
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster as runner_side
 from benchmarks.runner import cluster_worker
@@ -254,9 +254,9 @@ def test_a_scheduler_that_does_not_answer_is_refused_in_one_line(tmp_path, monke
 
 @pytest.mark.parametrize(("option", "value"), [("device", "cuda"), ("rollout", ["mine=out.npz"])])
 def test_what_a_cluster_cannot_do_is_refused(option, value):
-    plain = {"scheduler": "tcp://127.0.0.1:1", "device": "cpu", "rollout": []}
+    name = {"rollout": "roll_outs"}.get(option, option)
     with pytest.raises(PlanError, match=f"--{option}.*leave out --scheduler"):
-        choose_scheduler(argparse.Namespace(**plain | {option: value}))
+        check_scheduler_fits(Request(scheduler="tcp://127.0.0.1:1", **{name: value}))
 
 
 # --- what dies ---------------------------------------------------------------------------------------------

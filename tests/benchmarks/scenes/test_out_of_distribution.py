@@ -14,8 +14,8 @@ from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import extrapolation
+from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.plan import Motions, Plan
-from benchmarks.plan.selection import Request, choose
 from benchmarks.plan.suites import CHEAP
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
@@ -227,7 +227,7 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(assets, models, tmp_pa
 def cells(**words):
     motions = Motions(("walk",), ("kick",), {})
     preset = find_preset(words.pop("preset", "quick"))
-    return choose(Request(suites=("extremes",), preset=preset, motions=motions, **words))[0]
+    return choose_cells(Selection(suites=("extremes",), preset=preset, motions=motions, **words))[0]
 
 
 def test_suite_extremes_trains_what_it_needs():

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.assets.inputs import read_inputs
 from benchmarks.assets.liveliest_part import clip, joint_speeds
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods import find_method
 from benchmarks.metrics.surface import body_shape
+from benchmarks.plan.choose_cells import choose_suites
 from benchmarks.plan.plan import network_of
-from benchmarks.plan.selection import choose_suites
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.run import main
 from benchmarks.runner.cache import dependencies
@@ -254,7 +255,8 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
         for plan in (plain, own)
     ]
     assert not set(keys[0]) & set(keys[1])
-    low, high = (open_assets(TINY, [make_motion("walk")], ["tshirt"], body=file) for file in (None, path))
+    each = (read_inputs(body=file) for file in (None, path))
+    low, high = (open_assets(TINY, [make_motion("walk")], ["tshirt"], inputs=inputs) for inputs in each)
     heights = [np.ptp(assets.garments["tshirt"].rest_positions[:, 1]) for assets in (low, high)]
     assert 1.05 < heights[1] / heights[0] < 1.15
     scene = dressed_scene("walk").build(high)
@@ -268,9 +270,9 @@ def key_of(task) -> str:
 
 def planned(*words):
     from benchmarks.plan.make_plan import make_plan
-    from benchmarks.plan.options import make_parser
+    from benchmarks.plan.options import make_parser, request_of_run
 
-    return make_plan(make_parser().parse_args(list(words)), words)
+    return make_plan(request_of_run(make_parser().parse_args(list(words)), words))
 
 
 def test_a_clip_is_the_liveliest_part_and_what_is_not_judged_before_it():

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.plan import Motions
-from benchmarks.plan.selection import Request, choose
 from benchmarks.presets import find_preset
 from benchmarks.validation.case import Case
 from benchmarks.validation.convergence import fitted_order
@@ -41,8 +41,8 @@ def test_there_are_enough_of_every_kind():
 def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
     def chosen(preset, scenes=()):
         suites = ("validation",)
-        return choose(
-            Request(suites=suites, full=True, preset=find_preset(preset), motions=Motions(), scenes=scenes)
+        return choose_cells(
+            Selection(suites=suites, full=True, preset=find_preset(preset), motions=Motions(), scenes=scenes)
         )[1]
 
     assert chosen("quick") == KNOWN_ANSWERS

@@ -12,8 +12,9 @@ import pytest
 
 from benchmarks import run as run_command
 from benchmarks.assets.assets import embedded_motions, open_assets
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser
+from benchmarks.assets.inputs import read_inputs
+from benchmarks.plan.make_plan import make_plan, scenes_of_file
+from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
 from benchmarks.presets import find_preset
 from benchmarks.runner.schedule import Schedule
@@ -164,7 +165,7 @@ def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
     (tmp_path / "silk.toml").write_text("young_modulus = 5e4\nbending_stiffness = 1e-6\n")
     file = GarmentFile(path=saved(tmp_path, tube), material=tmp_path / "silk.toml")
     preset = replace(find_preset("smoke"), frames=8, clip_frames=4)
-    assets = open_assets(preset, embedded_motions(["walk"]), ["mine"], own=file)
+    assets = open_assets(preset, embedded_motions(["walk"]), ["mine"], inputs=read_inputs(garment=file))
     silk = Material(young_modulus=5e4, bending_stiffness=1e-6)
     scene = file_scene(file).at(preset).build(assets)
     assert scene.cloth.material == DressedBody(body, assets.garments["mine"]).cloth.material == silk
@@ -172,9 +173,7 @@ def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
 
 
 def file_scene(file):
-    from benchmarks.plan.plan import OwnGarment
-
-    return OwnGarment(file, ()).scenes.scene("walk")
+    return scenes_of_file(file).scene("walk")
 
 
 # --- what is refused --------------------------------------------------------------------------------------
@@ -310,7 +309,7 @@ def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_pa
 
 
 def planned(*words):
-    return make_plan(make_parser().parse_args(words), words)
+    return make_plan(request_of_run(make_parser().parse_args(words), words))
 
 
 def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, tube):

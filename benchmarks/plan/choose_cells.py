@@ -1,4 +1,4 @@
-"""What a request asks for: scenes and methods, cases, microbenchmarks."""
+"""Which scenes meet which methods in a run: its cells; beside them its cases and microbenchmarks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE, Microbenchmark
 from benchmarks.performance.registry import MICROBENCHMARKS
-from benchmarks.plan.motion_roles import nearest
+from benchmarks.plan.motion_split import nearest
 from benchmarks.plan.plan import Motions, PlanError
 from benchmarks.plan.suites import SUITE_NAMES, SUITES, Extent, Suite
 from benchmarks.presets import PRESETS, Preset
@@ -32,10 +32,12 @@ UNTRAINED = "networks are trained for a second garment where its scenes are name
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
-    """The words of a request. full: whether suites are named; scenes and methods: names or patterns; empty
-    means all that the suites list. own_scenes, own_methods: entries that are not the project's, named among
-    these. roll_outs: stored ones, which meet each scene that is asked for.
+class Selection:
+    """What cells are chosen by: names and patterns, and all that they may name.
+
+    full: whether suites are named. scenes, methods: names or patterns; empty means all that the suites list.
+    user_scenes, user_methods: entries that are not the project's, named among these. roll_outs: stored ones,
+    which meet each scene that is asked for. one_scene: as of a selection.
     """
 
     suites: tuple[str, ...]
@@ -45,9 +47,10 @@ class Request:
     scenes: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()
     seeds: tuple[int, ...] = (0,)
-    own_scenes: tuple[Scene, ...] = ()
-    own_methods: tuple[MethodEntry, ...] = ()
+    user_scenes: tuple[Scene, ...] = ()
+    user_methods: tuple[MethodEntry, ...] = ()
     roll_outs: tuple[RollOutOption, ...] = ()
+    one_scene: bool = False
 
     @cached_property
     def declared_scenes(self) -> dict[str, Scene]:
@@ -57,18 +60,18 @@ class Request:
         dynamic = dict.fromkeys((*of.dynamic_measured, *of.dynamic_test, *of.dynamic_validation))
         declared = all_scenes(motions, dynamic, of.worn)
         taken = {entry.name for entry in MEASURED}
-        for scene in self.own_scenes:
+        for scene in self.user_scenes:
             if scene.name in taken:
                 raise DeclarationError(
                     f"{scene.declared_in}: scene '{scene.name}': a case of the project has this name: "
                     "give it another"
                 )
-        return by_name("scene", (*declared.values(), *self.own_scenes))
+        return by_name("scene", (*declared.values(), *self.user_scenes))
 
     @cached_property
     def declared_methods(self) -> dict[str, MethodEntry]:
         """The same of methods."""
-        return by_name("method", (*METHODS, *self.own_methods))
+        return by_name("method", (*METHODS, *self.user_methods))
 
     @property
     def extent(self) -> Extent:
@@ -77,22 +80,33 @@ class Request:
         return Extent(self.preset, self.motions, self.full or further, further)
 
 
-def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Microbenchmark, ...]]:
-    """What the request names. Raises PlanError for a word that names nothing."""
-    declared, methods = request.declared_scenes, request.declared_methods
-    _check_words("scene", request.scenes, [*declared, *(entry.name for entry in MEASURED)])
-    _check_words("method", request.methods, list(methods))
+def choose_cells(
+    selection: Selection,
+) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Microbenchmark, ...]]:
+    """Return the cells, cases and microbenchmarks that a selection names.
+
+    Raises:
+        PlanError: a word that names nothing, a selection of nothing, a roll-out that cannot take part.
+        DeclarationError: two scenes or methods of one name.
+    """
+    declared, methods = selection.declared_scenes, selection.declared_methods
+    _check_words("scene", selection.scenes, [*declared, *(entry.name for entry in MEASURED)])
+    _check_words("method", selection.methods, list(methods))
     found: dict[tuple[str, str, int], Cell] = {}
-    for suite, scene, entry in _pairs(request):
+    for suite, scene, entry in _pairs(selection):
         method = entry.name
-        for seed in request.seeds if entry.seeded else (0,):
+        for seed in selection.seeds if entry.seeded else (0,):
             key = (scene, method, seed)
             before = found[key].suites if key in found else ()
-            found[key] = Cell(declared[scene].at(request.preset), entry, seed, (*before, suite))
-    stored = stored_cells(request.roll_outs, tuple(found.values()))
-    cases, microbenchmarks = tuple(_cases(request)), tuple(_microbenchmarks(request))
+            found[key] = Cell(declared[scene].at(selection.preset), entry, seed, (*before, suite))
+    cases, microbenchmarks = tuple(_cases(selection)), tuple(_microbenchmarks(selection))
+    if selection.one_scene:  # some have the name of a scene
+        cases, microbenchmarks = (), ()
     if not (found or cases or microbenchmarks):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
+    if selection.one_scene and len({scene for scene, _, _ in found}) != 1:
+        raise PlanError(f"{', '.join(selection.scenes)}: name one scene; see python -m benchmarks.run --list")
+    stored = _stored_cells(selection.roll_outs, tuple(found.values()))
     # The reference first: an error against it can be said as soon as another cell is done.
     order = {name: place for place, name in enumerate(methods)}
     places = {name: place for place, name in enumerate(declared)}
@@ -102,10 +116,10 @@ def choose(request: Request) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[
         key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
     )
     scenes = {cell.scene.name: cell.scene for cell in cells}
-    settled = (*SCENES, *further_scenes(request.motions.first_garment))  # those that any run may start from
+    settled = (*SCENES, *further_scenes(selection.motions.first_garment))  # those that any run may start from
     known = {scene.name: scene for scene in settled} | scenes
     for own in (scene for scene in scenes.values() if scene.declared_in):
-        _check_words_of(own, known, request.motions)
+        _check_words_of(own, known, selection.motions)
     return tuple(cells), cases, microbenchmarks
 
 
@@ -132,7 +146,7 @@ def _check_words_of(scene: Scene, known: Mapping[str, Scene], motions: Motions) 
             )
 
 
-def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:
+def _stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:
     """The stored roll-outs in the scenes of these cells, and in their suites. Raises PlanError, and
     RollOutError for a file that cannot be read.
     """
@@ -161,56 +175,58 @@ def stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> l
     return found
 
 
-def _pairs(request: Request) -> Iterator[tuple[str, str, MethodEntry]]:
+def _pairs(selection: Selection) -> Iterator[tuple[str, str, MethodEntry]]:
     """(suite, scene, method), suite by suite; a method that is left out of a scene says why.
 
     A scene that no suite lists is met where it is named: a body in a whole motion in garments, all else in
     speed. A method that no suite lists takes part in each suite where its whole name is given.
     """
-    extent, declared = request.extent, request.declared_scenes
-    unlisted = _unlisted_scenes(request)
-    own_methods = set(request.methods) & set(request.declared_methods) - _listed_methods()
+    extent, declared = selection.extent, selection.declared_scenes
+    unlisted = _unlisted_scenes(selection)
+    user_methods = set(selection.methods) & set(selection.declared_methods) - _listed_methods()
     for suite in SUITES:
         listed = suite.scenes(extent)
-        if suite.name not in request.suites or not suite.methods(extent):
+        if suite.name not in selection.suites or not suite.methods(extent):
             continue
-        more = suite.more_methods if request.methods or request.preset.further else ()
-        further = suite.named_methods if request.methods else ()
-        asked = replace(extent, full=extent.full or bool(request.methods))
-        methods = dict.fromkeys((*suite.methods(asked), *more, *further, *sorted(own_methods)))
+        more = suite.more_methods if selection.methods or selection.preset.further else ()
+        further = suite.named_methods if selection.methods else ()
+        asked = replace(extent, full=extent.full or bool(selection.methods))
+        methods = dict.fromkeys((*suite.methods(asked), *more, *further, *sorted(user_methods)))
         for scene in (*listed, *(name for name, home in unlisted.items() if home == suite.name)):
             # Networks for a second garment double the training: only for whoever names its scenes.
             plain = not extent.further and declared[scene].garment not in ("", extent.motions.first_garment)
             for method in methods:
-                if not (named(scene, request.scenes) and named(method, request.methods)):
+                if not (named(scene, selection.scenes) and named(method, selection.methods)):
                     continue
-                entry = request.declared_methods[method]
+                entry = selection.declared_methods[method]
                 if entry.meant_for(declared[scene]):
                     if plain and entry.trained:
                         entry = replace(entry, left_out=UNTRAINED)
                     yield suite.name, scene, entry
 
 
-def _cases(request: Request) -> Iterator[Case]:
+def _cases(selection: Selection) -> Iterator[Case]:
     """Those of the suites; the smallest preset runs those marked, unless they are named, and a run that names
     no suite those that are not long.
 
     Naming methods without the simulation leaves them out.
     """
-    if named(METHOD, request.methods):
+    if named(METHOD, selection.methods):
         for case in CASES:
-            small = case.smoke or request.scenes or not request.preset.smallest
-            short = request.extent.full or not case.long
-            if small and short and case.suite in request.suites and named(case.name, request.scenes):
+            small = case.smoke or selection.scenes or not selection.preset.smallest
+            short = selection.extent.full or not case.long
+            if small and short and case.suite in selection.suites and named(case.name, selection.scenes):
                 yield case
 
 
-def _microbenchmarks(request: Request) -> Iterator[Microbenchmark]:
+def _microbenchmarks(selection: Selection) -> Iterator[Microbenchmark]:
     """Those of the scenes and methods named; the smallest preset runs those marked, unless they are named."""
-    for benchmark in MICROBENCHMARKS if SUITE in request.suites else ():
-        small = benchmark.smoke or request.scenes or not request.preset.smallest
-        wanted = small and named(benchmark.name, request.scenes) and named(benchmark.method, request.methods)
-        if wanted and (not benchmark.long or benchmark.name in request.scenes):
+    for benchmark in MICROBENCHMARKS if SUITE in selection.suites else ():
+        small = benchmark.smoke or selection.scenes or not selection.preset.smallest
+        wanted = (
+            small and named(benchmark.name, selection.scenes) and named(benchmark.method, selection.methods)
+        )
+        if wanted and (not benchmark.long or benchmark.name in selection.scenes):
             yield benchmark
 
 
@@ -224,17 +240,17 @@ def default_suites(method: str, preset: Preset) -> list[str]:
     return [suite.name for suite in SUITES if method in suite.methods(Extent(preset, Motions()))]
 
 
-def _unlisted_scenes(request: Request) -> dict[str, str]:
+def _unlisted_scenes(selection: Selection) -> dict[str, str]:
     """Scenes that no suite lists -> the suite that takes them: those called by their whole names, and by a
     pattern that no listed scene has, as 'trousers/*', the motions of the split.
     """
-    motions = request.motions
-    everything = Extent(request.preset, motions, full=True, further=True)
+    motions = selection.motions
+    everything = Extent(selection.preset, motions, full=True, further=True)
     listed = {name for suite in SUITES for name in suite.scenes(everything)}
-    patterns = [p for p in request.scenes if not any(named(name, [p]) for name in listed)]
+    patterns = [p for p in selection.scenes if not any(named(name, [p]) for name in listed)]
 
     def asked(scene: Scene) -> bool:
-        return scene.name in request.scenes or (
+        return scene.name in selection.scenes or (
             any(named(scene.name, [p]) for p in patterns)
             and scene.dressed
             and scene.motion in motions.measured_of(scene.garment)
@@ -242,7 +258,7 @@ def _unlisted_scenes(request: Request) -> dict[str, str]:
 
     return {
         name: "garments" if scene.part == "whole" else "speed"
-        for name, scene in request.declared_scenes.items()
+        for name, scene in selection.declared_scenes.items()
         if name not in listed and asked(scene)
     }
 

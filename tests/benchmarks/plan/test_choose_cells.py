@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
 
-from benchmarks.plan import selection
-from benchmarks.plan.motion_roles import choose_motions
+from benchmarks.plan import choose_cells as choosing
+from benchmarks.plan.choose_cells import Selection, choose_cells
+from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.plan import Motions, PlanError
-from benchmarks.plan.selection import Request, choose
 from benchmarks.plan.suites import FEW_MOTIONS
 from benchmarks.presets import find_preset
 from benchmarks.validation.stress.cases import MAPS
@@ -20,8 +18,8 @@ SMOKE = find_preset("smoke")
 
 
 def chosen(suites, *, full=False, scenes=(), methods=(), seeds=(0,), test=("kick", "punch")):
-    cells, cases, _ = choose(
-        Request(
+    cells, cases, _ = choose_cells(
+        Selection(
             suites=tuple(suites), full=full, preset=find_preset("quick"), scenes=tuple(scenes),
             motions=Motions(("walk",), test, {}), methods=tuple(methods), seeds=seeds,
         )
@@ -73,8 +71,10 @@ def test_patterns_choose_scenes_methods_and_cases():
 
 def test_a_pattern_of_another_garment_means_its_motions_of_the_split():
     def names(pattern, split="test", suites=("garments",)):
-        of = choose_motions([], [], find_preset("quick"), split=split)
-        found = choose(Request(suites=suites, preset=find_preset("quick"), motions=of, scenes=(pattern,)))[0]
+        of = split_motions([], [], find_preset("quick"), split=split)
+        found = choose_cells(
+            Selection(suites=suites, preset=find_preset("quick"), motions=of, scenes=(pattern,))
+        )[0]
         return of, {cell.scene.name for cell in found}
 
     for split in ("test", "validation"):
@@ -106,16 +106,18 @@ def test_what_is_left_out_of_a_default_run_is_there_where_its_suite_or_itself_is
 def dynamic(suites, **changes):
     motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
     words = {name: tuple(value) for name, value in changes.items()}
-    return choose(Request(suites=tuple(suites), preset=find_preset("quick"), motions=motions, **words))[0]
+    return choose_cells(
+        Selection(suites=tuple(suites), preset=find_preset("quick"), motions=motions, **words)
+    )[0]
 
 
 def test_the_quick_subset_has_some_motions_and_all_where_the_suite_or_they_are_named():
     def motions(full=False, preset="quick", **choice):
-        of = choose_motions([], choice.get("tests", []), find_preset(preset), **choice.get("split", {}))
-        request = Request(suites=("garments",), full=full, preset=find_preset(preset), motions=of)
-        return {cell.scene.motion for cell in choose(request)[0] if cell.scene.part == "whole"}
+        of = split_motions([], choice.get("tests", []), find_preset(preset), **choice.get("split", {}))
+        request = Selection(suites=("garments",), full=full, preset=find_preset(preset), motions=of)
+        return {cell.scene.motion for cell in choose_cells(request)[0] if cell.scene.part == "whole"}
 
-    everything = set(choose_motions([], [], find_preset("quick")).test)
+    everything = set(split_motions([], [], find_preset("quick")).test)
     assert len(everything) == 5 and motions(full=True) == motions(preset="paper") >= everything
     assert motions() < everything and len(motions()) == FEW_MOTIONS
     named = ["kick", "punch", "walk", "bow"]
@@ -126,12 +128,14 @@ def test_the_quick_subset_has_some_motions_and_all_where_the_suite_or_they_are_n
 
 def test_networks_of_a_second_garment_are_left_out_with_a_reason_until_its_scenes_are_named():
     motions = Motions(("walk",), ("kick",), {}, dynamic_test=("twist_stop",))
-    request = Request(suites=("speed",), full=True, preset=find_preset("quick"), motions=motions)
+    request = Selection(suites=("speed",), full=True, preset=find_preset("quick"), motions=motions)
     skirt = {
-        cell.method: cell.entry.skip(cell.scene) for cell in choose(request)[0] if "skirt" in cell.scene.name
+        cell.method: cell.entry.skip(cell.scene)
+        for cell in choose_cells(request)[0]
+        if "skirt" in cell.scene.name
     }
     assert "second garment" in skirt["snug"] and "second garment" in skirt["pbns"] and not skirt["newton-4"]
-    named = choose(replace(request, scenes=("skirt/twist_stop@clip",)))[0]
+    named = choose_cells(replace(request, scenes=("skirt/twist_stop@clip",)))[0]
     assert {cell.entry.skip(cell.scene) for cell in named if cell.method == "snug"} == {None}
 
 
@@ -153,7 +157,7 @@ def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
     mine = Scene(name="my_scene", description="", module="my_scene")
     monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, mine))
     entries = (*methods.METHODS, MethodEntry(name="my-method", description="", module="my_method"))
-    for module in (methods, selection):
+    for module in (methods, choosing):
         monkeypatch.setattr(module, "METHODS", entries)
     found = dynamic(("garments", "speed"), scenes=["my_scene"], methods=["simulation", "my-method"])
     assert [(c.scene, c.method, c.suites) for c in found] == [
@@ -168,34 +172,34 @@ def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
         }
 
 
-def test_motions_are_divided_as_help_says(tmp_path):
+def test_motions_are_divided_as_help_says():
     from snug.motion.library import TEST, TRAIN, VALIDATION
 
     quick = find_preset("quick")
-    library = choose_motions([], [], quick)
+    library = split_motions([], [], quick)
     assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION, TEST)
-    assert library.files == {} and library.measured == TEST
-    moved = choose_motions([], ["walk", "kick"], quick)
+    assert library.files == () and library.measured == TEST
+    moved = split_motions([], ["walk", "kick"], quick)
     assert moved.test == ("walk", "kick") and "kick" not in moved.validation
     assert not {"walk", *VALIDATION, *TEST} & set(moved.train)
-    other = choose_motions([], [], quick, validation_names=["bow"], split="validation")
+    other = split_motions([], [], quick, validation_names=["bow"], split="validation")
     assert (other.validation, other.test, other.measured) == (("bow",), TEST, ("bow",))
     assert not {"bow", *VALIDATION, *TEST} & set(other.train)
-    small = choose_motions([], [], SMOKE)
+    small = split_motions([], [], SMOKE)
     assert (len(small.train), len(small.test)) == (SMOKE.train_motions, SMOKE.test_motions)
 
-    clips = clips_folder(tmp_path, "b", "a", "c")
-    files = choose_motions([clips], [], quick)
+    clips = "abc"
+    files = split_motions(clips, [], quick)
     assert (files.train, files.test, sorted(files.files)) == (("b", "c"), ("a",), ["a", "b", "c"])
-    named = choose_motions([], ["kick", "punch", "walk"], SMOKE)  # all those named, whatever the preset
+    named = split_motions([], ["kick", "punch", "walk"], SMOKE)  # all those named, whatever the preset
     assert set(named.test) == {"kick", "punch", "walk"} and len(named.train) == SMOKE.train_motions
-    chosen = choose_motions([clips], ["c", "b"], quick)
+    chosen = split_motions(clips, ["c", "b"], quick)
     assert (chosen.train, chosen.test) == (("a",), ("b", "c"))
-    both = choose_motions(["library", clips], [], quick)
+    both = split_motions(clips, [], quick, library=True)
     assert both.train == ("a", "b", "c", *TRAIN) and both.test == TEST
-    single = choose_motions([str(Path(clips) / "a.npz")], [], quick)
+    single = split_motions("a", [], quick)
     assert (single.train, single.test) == (TRAIN, ("a",))
-    roles = choose_motions([clips], ["b"], quick, validation_names=["a", "c"])  # none is left to train on
+    roles = split_motions(clips, ["b"], quick, validation_names=["a", "c"])  # none is left to train on
     assert (roles.train, roles.validation, roles.test) == (TRAIN, ("a", "c"), ("b",))
     assert [roles.role_of(name) for name in ("a", "b", "walk", "kick")] == [
         "validation", "test", "training", "",
@@ -206,16 +210,4 @@ def test_motions_are_divided_as_help_says(tmp_path):
         ({"test_names": ["a"], "split": "validation"}, "name some by --validation-motions"),
     ):
         with pytest.raises(PlanError, match=said):
-            choose_motions([clips], preset=quick, **words)
-    (tmp_path / "short").mkdir()
-    with pytest.raises(PlanError, match="2 frames; at least 3 are needed"):
-        choose_motions([clips_folder(tmp_path / "short", "d", frames=2) + "/d.npz"], [], quick)
-    with pytest.raises(PlanError, match="taken"):
-        choose_motions([clips, clips], [], quick)
-
-
-def clips_folder(folder: Path, *names: str, frames: int = 12) -> str:
-    for name in names:
-        poses = np.zeros((frames, 52 * 3))
-        np.savez(folder / f"{name}.npz", poses=poses, trans=np.zeros((frames, 3)), mocap_framerate=30.0)
-    return str(folder)
+            split_motions(clips, preset=quick, **words)

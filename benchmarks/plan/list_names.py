@@ -9,7 +9,7 @@ from benchmarks.methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan import plug_ins as outside
-from benchmarks.plan.selection import default_suites
+from benchmarks.plan.choose_cells import default_suites
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES
@@ -17,7 +17,7 @@ from benchmarks.scenes.variations import shapes, there_and_back
 from benchmarks.validation.registry import CASES
 
 
-def listing() -> str:
+def list_names() -> str:
     """Suites, scenes, methods, motions and presets, one line each."""
     from snug.motion.library import DYNAMIC_TEST, DYNAMIC_TRAIN, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
 
