@@ -152,7 +152,7 @@ def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monk
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(PlanError, match="cannot be written"):
-        choose_folder(str(tmp_path / "new"))
+        choose_folder(tmp_path / "new")
 
 
 # --- a run -----------------------------------------------------------------------------------------------
