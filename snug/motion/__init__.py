@@ -1,1 +1,24 @@
-"""Motions: joint rotations over time, the embedded library, files of motion capture."""
+"""Motions: joint rotations over time, the embedded library, files of motion capture.
+
+| module | what lies there |
+| --- | --- |
+| motion | `Motion`, and operations on one: resample, place, mirror, spread arms |
+| library | the motions of the package by name and role; `make_motion` |
+| clips | tables of angles that the library is made of |
+| files | `load_motions`: a user's files, checked and ready to use |
+| options | facts that a file does not state, such as its vertical axis |
+| formats | the table of readers: acclaim, bvh, smpl_arrays; joint_names matches foreign skeletons |
+| raw_motion | a motion as its file has it |
+| vertical_axis, recording_errors | which axis is up; jumps and numbers that are not finite |
+
+>>> from snug.motion import LIBRARY, make_motion
+>>> len(LIBRARY)
+38
+>>> kick = make_motion("kick")
+>>> kick.poses.shape, kick.fps
+((78, 24, 3), 30.0)
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,7 +3,7 @@
 Format: J. Lander, Working with motion capture file formats, Game Developer, January 1998. A bone's angles
 are given in its own axes C (columns in the world of the zero pose), so with M the product of its rotations
 the bone turns, relative to its parent and seen from the zero pose, by C M C^-1, and
-G_bone = G_parent C M C^-1 is its turn in the world. Its far end lies at G_bone direction length.
+G_bone = G_parent C M C^-1 is its rotation in the world. Its far end lies at G_bone direction length.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from snug.motion.motion import MotionError
-from snug.motion.raw_motion import check_length, open_text
+from snug.motion.raw_motion import check_frame_count, read_lines
 
 INCH = 0.0254  # [m]
 _ROTATIONS = ("rx", "ry", "rz")
@@ -24,7 +24,15 @@ _TRANSLATIONS = ("tx", "ty", "tz")
 
 @dataclass
 class Bone:
-    """direction: (3,) unit, in the zero pose; length [m]; axes: (3, 3) C; channels in the file's order."""
+    """A bone of the skeleton.
+
+    Attributes:
+        direction: (3,) unit, in the zero pose.
+        length: [m].
+        axes: (3, 3), C.
+        channels: in the file's order.
+        parent: name of the bone that it hangs on.
+    """
 
     name: str
     direction: np.ndarray = field(default_factory=lambda: np.zeros(3))
@@ -36,7 +44,14 @@ class Bone:
 
 @dataclass
 class Skeleton:
-    """Bones by name, parents first; "root" is one of them. metres: length of the file's unit."""
+    """Bones by name, parents first; "root" is one of them.
+
+    Attributes:
+        bones: by name.
+        metres: length of the file's unit [m].
+        position: (3,) [m] of the root.
+        degrees: whether angles are in degrees.
+    """
 
     bones: dict[str, Bone]
     metres: float
@@ -46,17 +61,18 @@ class Skeleton:
 
 @dataclass(slots=True)
 class _Line:
-    """One line of a file: its words, and where it stands for messages."""
+    """One line of a file, split into words, and its place for messages."""
 
     path: Path
     number: int
     words: list[str]
 
     def error(self, problem: str) -> MotionError:
+        """Return the error that names file and line."""
         return MotionError(f"{self.path}, line {self.number}: {problem}")
 
     def numbers(self, first: int, last: int | None = None) -> list[float]:
-        """Words first to last - 1 as numbers. Raises MotionError."""
+        """Return words first to last - 1 as numbers. Raises MotionError."""
         text = " ".join(self.words)[:60]
         try:
             values = [float(word) for word in self.words[first:last]]
@@ -123,7 +139,7 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
             frames[-1][word] = values
     if not frames:
         raise MotionError(f"{path}: holds no frame; give a whole .amc file")
-    check_length(path, len(frames))
+    check_frame_count(path, len(frames))
     _check_whole(lines[-1], frames, moving)
     channels = {}
     for name in moving:
@@ -136,7 +152,7 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
 
 
 def turns(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
-    """M: the product of a bone's rotations, the first channel applied first. (T, channels) -> (T, 3, 3)."""
+    """Return M (T, 3, 3) of a bone: the product of its rotations (T, channels), the first applied first."""
     from scipy.spatial.transform import Rotation
 
     rotation = Rotation.identity(len(values))
@@ -147,7 +163,7 @@ def turns(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
 
 
 def _lines(path: Path) -> list[_Line]:
-    numbered = ((number, line.split("#")[0].split()) for number, line in enumerate(open_text(path), 1))
+    numbered = ((number, line.split("#")[0].split()) for number, line in enumerate(read_lines(path), 1))
     lines = [_Line(path, number, words) for number, words in numbered if words]
     if not lines:
         raise MotionError(f"{path}: the file is empty; fetch it again")

@@ -1,4 +1,4 @@
-"""From an Acclaim skeleton's motion to ours: same limb directions, same hinge axes.
+"""Convert an Acclaim skeleton's motion to our joints: same limb directions, same hinge axes.
 
 Our joint j is driven by bone b: G_j = G_b A_j, where A_j turns our rest pose's limb into the bone's zero
 pose. A limb's far end then points along G_b A_j t_j = G_b d_b, the recorded direction.
@@ -22,7 +22,7 @@ from snug.body.skeleton import (
 from snug.motion.acclaim import Skeleton, read_amc, read_asf, turns
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
-from snug.motion.raw_motion import RawMotion, rate
+from snug.motion.raw_motion import RawMotion, frame_rate
 
 CMU_RATE = 120.0  # [1/s] the .amc format has no field for it
 # Our joint: the CMU bone whose turn it takes. Thumbs and the half bones inside hips and neck are not needed.
@@ -48,8 +48,8 @@ _HINGES = {
 }  # fmt: skip
 
 
-def read_asf_amc(path: Path, reading: MotionFileOptions) -> RawMotion:
-    """One .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf). Raises MotionError."""
+def read_asf_amc(path: Path, options: MotionFileOptions) -> RawMotion:
+    """Read an .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf). Raises MotionError."""
     stem = path.stem
     names = (stem, stem.split("_")[0])
     candidates = [path.with_name(name + end) for name in names for end in (".asf", ".ASF")]
@@ -59,7 +59,7 @@ def read_asf_amc(path: Path, reading: MotionFileOptions) -> RawMotion:
     skeleton = read_asf(skeleton_file)
     poses, translations = retarget(skeleton, read_amc(path, skeleton), skeleton_file)
     return RawMotion(
-        path=path, poses=poses, translations=translations, fps=rate(path, None, reading, CMU_RATE),
+        path=path, poses=poses, translations=translations, fps=frame_rate(path, None, options, CMU_RATE),
         source=f"{path.name} with {skeleton_file.name}",
     )  # fmt: skip
 
@@ -67,10 +67,12 @@ def read_asf_amc(path: Path, reading: MotionFileOptions) -> RawMotion:
 def retarget(
     skeleton: Skeleton, channels: dict[str, np.ndarray], skeleton_file: Path
 ) -> tuple[np.ndarray, np.ndarray]:
-    """-> poses (T, 24, 3) [rad], translations (T, 3) [m] in the axes of the file.
+    """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] in the axes of the file.
 
     Translations are scaled by the ratio of leg lengths, so that steps and legs agree.
-    Raises MotionError when the skeleton lacks a bone that drives a joint.
+
+    Raises:
+        MotionError: the skeleton lacks a bone that drives a joint.
     """
     missing = [bone for bone in JOINT_BONES.values() if bone not in skeleton.bones]
     if missing:
@@ -95,7 +97,7 @@ def retarget(
 
 
 def relative_poses(rotations: np.ndarray) -> np.ndarray:
-    """Rotations of our joints in the world (T, 24, 3, 3) -> relative to their parents (T, 24, 3) [rad]."""
+    """Return poses relative to the parents (T, 24, 3) [rad] of world rotations (T, 24, 3, 3)."""
     relative = rotations.copy()
     for joint, parent in enumerate(PARENTS):
         if parent >= 0:
@@ -104,7 +106,7 @@ def relative_poses(rotations: np.ndarray) -> np.ndarray:
 
 
 def local_turns(skeleton: Skeleton, channels: dict[str, np.ndarray], name: str, frames: int) -> np.ndarray:
-    """C M C^-1 of one bone, (T, 3, 3): its turn relative to its parent, seen from the zero pose."""
+    """Return C M C^-1 of one bone, (T, 3, 3): its rotation relative to its parent, from the zero pose."""
     bone = skeleton.bones[name]
     if not bone.channels:
         return np.broadcast_to(np.eye(3), (frames, 3, 3)).copy()
@@ -120,7 +122,7 @@ def world_turns(skeleton: Skeleton, local: dict[str, np.ndarray]) -> dict[str, n
 
 
 def root_positions(skeleton: Skeleton, channels: dict[str, np.ndarray]) -> np.ndarray:
-    """Where the root is, (T, 3) [m]."""
+    """Return the path of the root (T, 3) [m]."""
     order = skeleton.bones["root"].channels
     return skeleton.position + np.stack(
         [channels["root"][:, order.index(axis)] if axis in order else np.zeros(len(channels["root"]))
@@ -129,7 +131,7 @@ def root_positions(skeleton: Skeleton, channels: dict[str, np.ndarray]) -> np.nd
 
 
 def alignment(skeleton: Skeleton, joint: str) -> np.ndarray:
-    """A of one joint: our rest pose's limb and hinge axis onto the bone's zero pose. -> (3, 3).
+    """Return A (3, 3) of one joint: our rest pose's limb and hinge axis onto the bone's zero pose.
 
     Feet turn about the vertical only, since both skeletons stand flat in their rest poses. Spine, head and
     collars have no limb to align: upright is upright.
@@ -149,14 +151,14 @@ def alignment(skeleton: Skeleton, joint: str) -> np.ndarray:
 
 
 def foot_alignment(side: str, theirs: np.ndarray) -> np.ndarray:
-    """The turn about the vertical of our resting foot to one along theirs (3,), y up. -> (3, 3)."""
+    """Return the turn (3, 3) about the vertical of our resting foot to one along theirs (3,), y up."""
     ours = REST_JOINTS[JOINT[f"{side}_foot"]] - REST_JOINTS[JOINT[f"{side}_ankle"]]
     yaw = np.arctan2(theirs[0], theirs[2]) - np.arctan2(ours[0], ours[2])
     return rotation_matrices(np.array([0.0, yaw, 0.0]))
 
 
 def _frame(along: np.ndarray, hinge: np.ndarray) -> np.ndarray:
-    """Orthonormal columns: along, the part of hinge across it, and their cross product."""
+    """Return orthonormal columns: along, the part of hinge across it, and their cross product."""
     first = along / np.linalg.norm(along)
     second = hinge - first * (first @ hinge)
     second /= np.linalg.norm(second)

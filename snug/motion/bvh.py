@@ -15,17 +15,21 @@ from pathlib import Path
 import numpy as np
 
 from snug.motion.motion import MotionError
-from snug.motion.raw_motion import check_length, open_text
+from snug.motion.raw_motion import check_frame_count, read_lines
 
-MOST_JOINTS = 1000
-MOST_TURNS = 5_000_000  # joints times frames: 11 minutes of 60 joints at 120 frames per second
+MAX_JOINTS = 1000
+MAX_ROTATIONS = 5_000_000  # joints times frames: 11 minutes of 60 joints at 120 frames per second
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 
 
 @dataclass
 class Joint:
-    """parent: index, -1 for the root; offset: (3,) in the file's unit; channels: "Xposition" and so on, from
-    column `first` of the frames on. An end site is a joint without channels and without a name.
+    """A joint of the hierarchy. An end site is a joint without channels and without a name.
+
+    Attributes:
+        parent: index, -1 for the root.
+        offset: (3,) in the file's unit.
+        channels: "Xposition" and so on, from column `first` of the frames on.
     """
 
     name: str
@@ -37,14 +41,20 @@ class Joint:
 
 @dataclass(frozen=True)
 class Clip:
-    """joints, parents first; frames: (T, C) numbers; fps [1/s], None where the file states none."""
+    """A parsed file.
+
+    Attributes:
+        joints: parents first.
+        frames: (T, C) numbers.
+        fps: frames per second [1/s], None where the file states none.
+    """
 
     joints: list[Joint]
     frames: np.ndarray
     fps: float | None
 
     def turns(self, joint: Joint) -> np.ndarray:
-        """Rotation of a joint relative to its parent, (T, 3, 3)."""
+        """Return the rotation of a joint relative to its parent, (T, 3, 3)."""
         from scipy.spatial.transform import Rotation
 
         rotation = Rotation.identity(len(self.frames))
@@ -55,7 +65,7 @@ class Clip:
         return rotation.as_matrix()
 
     def shift(self, joint: Joint) -> np.ndarray:
-        """Place of a joint in its parent's axes, (T, 3): its positions where it has any, else its offset."""
+        """Return a joint's place in its parent's axes, (T, 3): its positions, or its offset without any."""
         shift = np.tile(joint.offset, (len(self.frames), 1))
         for column, channel in enumerate(joint.channels, joint.first):
             if channel.endswith("position"):
@@ -64,38 +74,40 @@ class Clip:
 
 
 class _Lines:
-    """The lines of a file that are not empty, as words; the last one read stands for messages."""
+    """Lines of a file that are not empty, split into words; the last one read stands for messages."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.number = path, 0
-        self._lines: Iterator[tuple[int, str]] = iter(enumerate(open_text(path), 1))
+        self._lines: Iterator[tuple[int, str]] = iter(enumerate(read_lines(path), 1))
 
     def next(self) -> list[str]:
-        """Raises MotionError at the end of the file."""
+        """Return the next line. Raises MotionError at the end of the file."""
         for words in self.rest():
             return words
         raise MotionError(f"{self.path}: ends in line {self.number}, before it is whole; export it again")
 
     def rest(self) -> Iterator[list[str]]:
+        """Yield the lines that are left."""
         for number, line in self._lines:
             if words := line.split():
                 self.number = number
                 yield words
 
     def error(self, problem: str) -> MotionError:
+        """Return the error that names file and line."""
         return MotionError(f"{self.path}, line {self.number}: {problem}")
 
     def expect(self, *words: str) -> list[str]:
-        """The rest of a line that begins with these words, in any case. Raises MotionError."""
-        found = self.next()
-        if [word.lower() for word in found[: len(words)]] != [word.lower() for word in words]:
+        """Return the rest of a line that begins with these words, in any case. Raises MotionError."""
+        line = self.next()
+        if [word.lower() for word in line[: len(words)]] != [word.lower() for word in words]:
             raise self.error(
-                f"'{' '.join(found)[:40]}' where '{' '.join(words)}' should be; is it a .bvh file?"
+                f"'{' '.join(line)[:40]}' where '{' '.join(words)}' should be; is it a .bvh file?"
             )
-        return found[len(words) :]
+        return line[len(words) :]
 
     def numbers(self, words: list[str], count: int) -> list[float]:
-        """Raises MotionError for another count, and for what is no finite number."""
+        """Return `count` finite numbers. Raises MotionError for another count, or for other text."""
         try:
             values = [float(word) for word in words]
         except ValueError:
@@ -137,8 +149,8 @@ def _hierarchy(lines: _Lines) -> list[Joint]:
             name = "" if word == "end" else " ".join(words[1:])
             if word != "end" and (not name or any(joint.name == name for joint in joints)):
                 raise lines.error(f"joint '{name[:40]}' has no name or one that is taken")
-            if len(joints) == MOST_JOINTS:
-                raise lines.error(f"more than {MOST_JOINTS} joints; is it the skeleton of one body?")
+            if len(joints) == MAX_JOINTS:
+                raise lines.error(f"more than {MAX_JOINTS} joints; is it the skeleton of one body?")
             joints.append(Joint(name, open_joints[-1] if open_joints else -1, first=columns))
             open_joints.append(len(joints) - 1)
             lines.expect("{")
@@ -167,14 +179,14 @@ def _channels(lines: _Lines, words: list[str]) -> tuple[str, ...]:
 
 
 def _header(lines: _Lines, joints: int) -> tuple[int, float | None]:
-    """Number of frames, and seconds a frame where it is stated."""
+    """Return the number of frames, and seconds a frame where it is stated."""
     lines.expect("MOTION")
     words = lines.expect("Frames:")
     if len(words) != 1 or not (words[0].isascii() and words[0].isdigit() and len(words[0]) < 10):
         raise lines.error(f"'{' '.join(words)[:40]}' is no number of frames")
     frames = int(words[0])
-    check_length(lines.path, frames)
-    if frames * joints > MOST_TURNS:
+    check_frame_count(lines.path, frames)
+    if frames * joints > MAX_ROTATIONS:
         raise lines.error(f"{frames} frames of {joints} joints are too many; cut the clip")
     seconds = lines.numbers(lines.expect("Frame", "Time:"), 1)[0]
     if seconds < 0:

@@ -1,4 +1,4 @@
-"""Motions from files of motion capture, made ready to be worn: checked, upright, resampled, arms spread."""
+"""Motions from files of motion capture, ready to use: checked, y up, resampled, arms spread."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from snug.body.skeleton import JOINT
 from snug.motion.formats import READERS
 from snug.motion.motion import Motion, MotionError, clear_arms, place, resample, spread_arms
 from snug.motion.options import MotionFileOptions
-from snug.motion.recording_errors import without_glitches
-from snug.motion.vertical_axis import turned_upright
+from snug.motion.recording_errors import remove_recording_errors
+from snug.motion.vertical_axis import turn_y_up
 
 # As the authors of SNUG did: recorded hands are noisy and drive nothing.
 HAND_DAMPING = 0.1
 HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("wrist", "hand")]
 
-LONGEST_NAME = 100  # bytes of a motion's name
+MAX_NAME_BYTES = 100  # bytes of a motion's name
 
 
 def load_motions(
@@ -27,12 +27,27 @@ def load_motions(
     spread_degrees: float | None = None,
     options: MotionFileOptions | None = None,
 ) -> list[Motion]:
-    """Motions from a file, or from every motion file of a folder, in the order of their names.
+    """Read motions from a file, or from every motion file of a folder, in the order of their names.
 
     Each comes back whole, at 30 frames per second, placed on the floor at the origin facing +z, with the arms
-    spread by `spread_degrees` (0: as recorded; None: as far as clear_arms finds needed) and the hands' turns
-    at a tenth. options: what the files do not say. CMU files (.amc) need their skeleton (.asf) beside them.
-    Raises MotionError, one line with file, element and remedy, for anything that cannot be read.
+    spread and the hands' rotations at a tenth. CMU files (.amc) need their skeleton (.asf) beside them.
+
+    Args:
+        path: a file of a kind in `snug.motion.formats.READERS`, or a folder of them.
+        spread_degrees: angle by which arms are spread (0: as recorded; None: as far as clear_arms finds
+            needed).
+        options: facts that the files do not state.
+
+    Raises:
+        MotionError: one line with file, element and remedy, for anything that cannot be read.
+
+    >>> import tempfile, numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = f"{folder}/standing.npz"
+    ...     np.savez(file, poses=np.zeros((60, 72)), trans=np.zeros((60, 3)), mocap_framerate=60.0)
+    ...     [motion] = load_motions(file)
+    >>> motion.name, motion.frames, motion.fps
+    ('standing', 31, 30.0)
     """
     path, known = Path(path), ", ".join(READERS)
     if not path.exists():
@@ -48,12 +63,12 @@ def load_motions(
     return [spread_arms(clip, spread_degrees) for clip in clips]
 
 
-def read_motion(file: Path, reading: MotionFileOptions) -> Motion:
-    """One clip as recorded, at the file's rate, upright and without glitches. Raises MotionError."""
-    if not file.stem.isprintable() or len(file.stem.encode(errors="replace")) > LONGEST_NAME:
+def read_motion(file: Path, options: MotionFileOptions) -> Motion:
+    """Read one clip as recorded, at its rate, y up and without recording errors. Raises MotionError."""
+    if not file.stem.isprintable() or len(file.stem.encode(errors="replace")) > MAX_NAME_BYTES:
         raise MotionError(
             f"{str(file)[:200]!a}: files are named after a motion; give this one a name of at most "
-            f"{LONGEST_NAME} printable bytes"
+            f"{MAX_NAME_BYTES} printable bytes"
         )
     reader = READERS.get(file.suffix.lower())
     if reader is None:
@@ -61,13 +76,11 @@ def read_motion(file: Path, reading: MotionFileOptions) -> Motion:
         raise MotionError(
             f"{file}: unknown kind of file; motions are read from {', '.join(READERS)}.{remedy}"
         )
-    # Absurd numbers overflow here, and are refused by name where glitches are looked for.
+    # Absurd numbers overflow here, and are refused by name where recording errors are looked for.
     with np.errstate(all="ignore"):
-        recording = reader(file, reading)
-        damped = recording.poses.copy()
+        raw = reader(file, options)
+        damped = raw.poses.copy()
         damped[:, HANDS] *= HAND_DAMPING
-        recording = without_glitches(replace(recording, poses=damped), repair=reading.repair)
-    recording = turned_upright(recording, reading.up)
-    return Motion(
-        file.stem, recording.poses, recording.translations, recording.fps, "recorded", recording.source
-    )
+        raw = remove_recording_errors(replace(raw, poses=damped), repair=options.repair)
+    raw = turn_y_up(raw, options.up)
+    return Motion(file.stem, raw.poses, raw.translations, raw.fps, "recorded", raw.source)

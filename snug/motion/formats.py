@@ -1,4 +1,4 @@
-"""Readers of other people's files: one file per format, one line in a visible table."""
+"""Readers of motion files: one module per format, one line in a visible table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which joint of a foreign skeleton is which of ours: from a file, or guessed from common names.
+"""Joints of a foreign skeleton matched with ours: from a file, or guessed from common names.
 
 Limbs are found by name; pelvis, spine and neck by place: the pelvis is where the legs meet, the spine leads
 from there to where the arms meet, and the neck from there to the head.
@@ -35,39 +35,44 @@ SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _BREAKS = re.compile(r"[\s_.\-]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
-def find_joints(
+def match_joints(
     path: Path, names: Sequence[str], parents: Sequence[int], given: Path | None
 ) -> dict[str, int]:
-    """Our name -> index of their joint; what they lack and nothing needs is left out.
+    """Return our joint names with the indices of their joints; optional ones that they lack are left out.
 
-    names: of their joints, empty for end sites; parents: indices, -1 for the root, parents first. given: a
-    TOML file, our name = theirs, which goes before what is guessed.
-    Raises MotionError, naming the joint, where one that is needed is missing or hangs elsewhere.
+    Args:
+        path: of the motion, for messages.
+        names: of their joints, empty for end sites.
+        parents: indices, -1 for the root, parents first.
+        given: a TOML file, our name = theirs, which goes before all guesses.
+
+    Raises:
+        MotionError: a needed joint is missing or hangs elsewhere; names the joint.
     """
-    found = {ours: names.index(theirs) for ours, theirs in _given(given, path, names).items()}
-    found = _limbs(names) | found
+    matches = {ours: names.index(theirs) for ours, theirs in _given(given, path, names).items()}
+    matches = _limbs(names) | matches
     needed = [f"{side}_{joint}" for side in ("left", "right") for joint in NEEDED]
     for ours in needed:
-        if ours not in found:
-            there = ", ".join(filter(None, names))
+        if ours not in matches:
+            known = ", ".join(filter(None, names))
             raise MotionError(
-                f"{path}: no joint is known as '{ours}'; name it by --joint-map (there are {there[:300]})"
+                f"{path}: no joint is known as '{ours}'; name it by --joint-map (there are {known[:300]})"
             )
-    found = _trunk(path, names, parents, found) | found
+    matches = _trunk(path, names, parents, matches) | matches
     above = {
         f"{side}_{joint}": f"{side}_{before}"
         for side in ("left", "right")
         for limb in LIMBS
         for before, joint in pairwise(limb)
     }
-    for ours, theirs in found.items():
+    for ours, theirs in matches.items():
         upper = above.get(ours, "pelvis")
-        if upper in found and ours != "pelvis" and found[upper] not in _way(parents, theirs)[1:]:
+        if upper in matches and ours != "pelvis" and matches[upper] not in _way(parents, theirs)[1:]:
             raise MotionError(
-                f"{path}: '{names[theirs]}' taken for {ours} does not hang below '{names[found[upper]]}' "
+                f"{path}: '{names[theirs]}' taken for {ours} does not hang below '{names[matches[upper]]}' "
                 f"taken for {upper}; name them by --joint-map"
             )
-    return found
+    return matches
 
 
 def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, str]:
@@ -91,29 +96,29 @@ def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, str
 
 
 def _limbs(names: Sequence[str]) -> dict[str, int]:
-    """The joints of legs and arms, each in the style that names most of those needed."""
+    """Return the joints of legs and arms, each in the style that names most of those needed."""
     sided: dict[tuple[str, str], int] = {}
     for index, name in enumerate(names):
         side, base = _side(name)
         if side:
             sided.setdefault((side, base), index)
-    found: dict[str, int] = {}
+    matches: dict[str, int] = {}
     for limb in LIMBS:
         guesses = [_limb(limb, style, sided) for style in STYLES]
         best = max(guesses, key=_needed)
-        found.update(best)
-    return found
+        matches.update(best)
+    return matches
 
 
 def _needed(guess: Mapping[str, int]) -> int:
-    """How many of the joints that a skeleton must have are named."""
+    """Count the joints that a skeleton must have."""
     return sum(ours.partition("_")[2] in NEEDED for ours in guess)
 
 
 def _limb(
     limb: Sequence[str], style: Mapping[str, Sequence[str]], sided: Mapping[tuple[str, str], int]
 ) -> dict[str, int]:
-    """The joints of both limbs of a kind, named in one style; none stands for two of ours."""
+    """Return the joints of both limbs of a kind, named in one style; none stands for two of ours."""
     guess: dict[str, int] = {}
     for side in ("left", "right"):
         for joint in limb:
@@ -124,22 +129,25 @@ def _limb(
 
 
 def _side(name: str) -> tuple[str, str]:
-    """ "mixamorig:LeftUpLeg", "lThigh", "thigh_l", "Bip01 L Thigh" -> side and the rest, in small letters."""
-    words = [word.lower() for word in _BREAKS.split(name.rpartition(":")[2]) if word]
-    for place, rest in ((0, words[1:]), (-1, words[:-1]), (1, words[2:])):
-        if rest and words[place] in SIDES:
-            return SIDES[words[place]], "".join(rest)
-    return "", "".join(words)
+    """Split a name into side and the rest, in small letters.
+
+    Such as "mixamorig:LeftUpLeg", "lThigh", "thigh_l", "Bip01 L Thigh".
+    """
+    parts = [word.lower() for word in _BREAKS.split(name.rpartition(":")[2]) if word]
+    for place, rest in ((0, parts[1:]), (-1, parts[:-1]), (1, parts[2:])):
+        if rest and parts[place] in SIDES:
+            return SIDES[parts[place]], "".join(rest)
+    return "", "".join(parts)
 
 
 def _trunk(
-    path: Path, names: Sequence[str], parents: Sequence[int], found: Mapping[str, int]
+    path: Path, names: Sequence[str], parents: Sequence[int], matches: Mapping[str, int]
 ) -> dict[str, int]:
-    """Pelvis, spine, neck and head by their places; from one to any number of joints in the spine."""
-    pelvis = found.get("pelvis", _meet(parents, found["left_hip"], found["right_hip"]))
-    chest = _meet(parents, found["left_shoulder"], found["right_shoulder"])
+    """Match pelvis, spine, neck and head by their places; the spine may have one or any number of joints."""
+    pelvis = matches.get("pelvis", _meet(parents, matches["left_hip"], matches["right_hip"]))
+    chest = _meet(parents, matches["left_shoulder"], matches["right_shoulder"])
     heads = [index for index, name in enumerate(names) if _side(name)[1].endswith("head")]
-    head = found.get("head", heads[0] if heads else None)
+    head = matches.get("head", heads[0] if heads else None)
     if head is None:
         raise MotionError(f"{path}: no joint is known as 'head'; name it by --joint-map")
     trunk = {"pelvis": pelvis, "head": head}
@@ -155,7 +163,7 @@ def _trunk(
 
 
 def _way(parents: Sequence[int], joint: int) -> list[int]:
-    """The joint and all above it, upwards."""
+    """Return the joint and all above it, upwards."""
     way = [joint]
     while parents[way[-1]] >= 0:
         way.append(parents[way[-1]])
@@ -163,6 +171,6 @@ def _way(parents: Sequence[int], joint: int) -> list[int]:
 
 
 def _meet(parents: Sequence[int], one: int, other: int) -> int:
-    """The lowest joint above both."""
+    """Return the lowest joint above both."""
     above = set(_way(parents, other))
     return next(joint for joint in _way(parents, one) if joint in above)

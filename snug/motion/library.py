@@ -1,4 +1,4 @@
-"""The embedded library: the motions by name, in the roles of training, validation and test.
+"""Embedded library: its motions by name, in the roles of training, validation and test.
 
 Nothing heavy is loaded before a motion is made, so that names can be listed quickly.
 """
@@ -27,9 +27,17 @@ LIBRARY = (*TRAIN, *VALIDATION, *TEST, *DYNAMIC_TRAIN, *DYNAMIC_VALIDATION)
 
 
 def make_motion(name: str) -> Motion:
-    """A motion of the embedded library at 30 fps, arms already spread clear of the torso.
+    """Make a motion of the embedded library at 30 fps, arms already spread clear of the torso.
 
-    Deterministic. Raises MotionError for a name that is not in LIBRARY.
+    Args:
+        name: one of LIBRARY.
+
+    Raises:
+        MotionError: a name that is not in LIBRARY.
+
+    >>> walk = make_motion("walk")
+    >>> walk.frames, walk.fps, walk.kind
+    (120, 30.0, 'walk')
     """
     if name not in LIBRARY:
         raise MotionError(f"unknown motion '{name}'; the library has: {', '.join(LIBRARY)}")

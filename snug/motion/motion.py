@@ -1,8 +1,8 @@
-"""Motions: joint rotations and root translations over time, and what is done to one.
+"""Motions, and operations on one: spread arms, resample, place, turn, mirror, compare poses.
 
-A motion follows the convention of `snug.body.parametric_body.Body`: rotation of each joint relative to its parent as
-axis-angle, joint 0 at its rest position plus the translation, y up, facing +z at first, standing at
-translation zero. They come from `snug.motion.library` or `snug.motion.files`.
+A motion follows the convention of `snug.body.parametric_body.Body`: rotation of each joint relative to its
+parent as axis-angle, joint 0 at its rest position plus the translation, y up, facing +z at first, standing at
+translation zero. Motions come from `snug.motion.library` or `snug.motion.files`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,23 @@ class MotionError(ValueError):
 
 @dataclass(frozen=True)
 class Motion:
-    """poses: (T, 24, 3) axis-angle [rad]; translations: (T, 3) [m]; fps [1/s].
+    """Joint rotations and root translations over time.
 
-    kind groups motions of one sort ("walk", "jump"); source tells where it came from and every repair.
-    Raises MotionError when the shapes disagree, a number is not finite or there is no frame.
+    Attributes:
+        name: of the file, or in the library.
+        poses: (T, 24, 3) [rad], axis-angle relative to the parent joint.
+        translations: (T, 3) [m] of the root.
+        fps: frames per second [1/s].
+        kind: groups motions of one sort ("walk", "jump").
+        source: where it came from, and every repair.
+
+    Raises:
+        MotionError: shapes disagree, a number is not finite, or there is no frame.
+
+    >>> import numpy as np
+    >>> standing = Motion("standing", poses=np.zeros((60, 24, 3)), translations=np.zeros((60, 3)))
+    >>> standing.frames, round(standing.duration, 2)
+    (60, 1.97)
     """
 
     name: str
@@ -61,19 +74,20 @@ class Motion:
 
     @property
     def frames(self) -> int:
+        """Number of frames."""
         return len(self.poses)
 
     @property
     def duration(self) -> float:
-        """Seconds from the first frame to the last."""
+        """Time [s] from the first frame to the last."""
         return (self.frames - 1) / self.fps
 
     def cut(self, start: int, stop: int) -> Motion:
-        """Frames start to stop - 1. Raises MotionError when nothing is left."""
+        """Return frames start to stop - 1. Raises MotionError when nothing is left."""
         return replace(self, poses=self.poses[start:stop], translations=self.translations[start:stop])
 
     def followed_by(self, other: Motion) -> Motion:
-        """This motion and then the other one's frames, as they are."""
+        """Return this motion followed by the other one's frames, unchanged."""
         poses = np.concatenate([self.poses, other.poses])
         return replace(
             self, poses=poses, translations=np.concatenate([self.translations, other.translations])
@@ -83,8 +97,13 @@ class Motion:
 def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
     """Turn both shoulders outward and up by the same angle in all frames, about the chest's front axis.
 
-    So did the authors of SNUG with their data: a T-shirt pinched between upper arm and torso has no good
-    solution (and the simulator's contact planes no good choice).
+    The authors of SNUG did the same with their data: a T-shirt pinched between upper arm and torso has no
+    good solution (and the simulator's contact planes no good choice).
+
+    >>> import numpy as np
+    >>> standing = Motion("standing", poses=np.zeros((1, 24, 3)), translations=np.zeros((1, 3)))
+    >>> np.round(np.degrees(spread_arms(standing, 20.0).poses[0, JOINT["left_shoulder"]]), 6)
+    array([ 0.,  0., 20.])
     """
     if degrees == 0.0:
         return motion
@@ -99,8 +118,8 @@ def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
 def clear_arms(motion: Motion) -> Motion:
     """Spread the arms by 20 degrees, or in steps of 5 up to 40 until they are clear of the torso.
 
-    Clear: every upper arm at least ARMS_CLEAR from the spine's direction in 95 % of the frames. A clip
-    whose arms stay nearer says so in its source.
+    Clear: every upper arm at least ARMS_CLEAR from the spine's direction in 95 % of the frames. A clip whose
+    arms stay nearer says so in its source.
     """
     for degrees in (20.0, 25.0, 30.0, 35.0, 40.0):
         spread = spread_arms(motion, degrees)
@@ -113,10 +132,18 @@ def clear_arms(motion: Motion) -> Motion:
 
 
 def resample(motion: Motion, fps: float = 30.0) -> Motion:
-    """The same motion at another frame rate: spherical interpolation of rotations, linear of translations.
+    """Return the motion at another frame rate: rotations along the shortest arc, translations linearly.
 
-    First and last pose stay. Where the rates do not divide, the clip is stretched by at most half a new
-    frame in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed).
+    First and last pose stay. Where the rates do not divide, the clip is stretched by at most half a new frame
+    in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed).
+
+    Raises:
+        MotionError: a rate that is not positive.
+
+    >>> import numpy as np
+    >>> fast = Motion("standing", poses=np.zeros((121, 24, 3)), translations=np.zeros((121, 3)), fps=120.0)
+    >>> resample(fast, 30.0).frames
+    31
     """
     if not (np.isfinite(fps) and fps > 0):
         raise MotionError(f"motion {motion.name}: cannot resample to {fps} frames per second")
@@ -132,10 +159,24 @@ def resample(motion: Motion, fps: float = 30.0) -> Motion:
 
 
 def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarray:
-    """From one pose to another in `frames` frames, both ends included, at rest at both.
+    """Make the frames from one pose to another, both ends included, at rest at both.
 
-    pose_a, pose_b: (24, 3) [rad] -> (frames, 24, 3) [rad]. Each joint turns along the shortest arc with
-    the minimum-jerk timing 10 s^3 - 15 s^4 + 6 s^5 (Flash and Hogan 1985).
+    Each joint turns along the shortest arc with the minimum-jerk timing 10 s^3 - 15 s^4 + 6 s^5.
+
+    Args:
+        pose_a: (24, 3) [rad], the first frame.
+        pose_b: (24, 3) [rad], the last frame.
+        frames: number of frames, at least 2.
+
+    Returns:
+        Poses (frames, 24, 3) [rad].
+
+    Source:
+        T. Flash and N. Hogan, The coordination of arm movements, Journal of Neuroscience 5 (1985).
+
+    >>> import numpy as np
+    >>> transition(np.zeros((24, 3)), np.full((24, 3), 0.1), 5)[2, 0].round(3)
+    array([0.05, 0.05, 0.05])
     """
     if frames < 2:
         raise MotionError(f"a transition needs at least 2 frames, not {frames}")
@@ -148,8 +189,8 @@ def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarra
 def place(motion: Motion) -> Motion:
     """Move a clip so that it starts above the origin, facing +z, with its feet on the floor y = 0.
 
-    The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second
-    percentile of the lower foot's height over all frames is taken for the floor.
+    The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second percentile
+    of the lower foot's height over all frames is taken for the floor.
     """
     placed = turn_about_vertical(motion, -heading(motion.poses[0]))
     poses, translations = placed.poses, placed.translations
@@ -159,14 +200,14 @@ def place(motion: Motion) -> Motion:
 
 
 def heading(pose: np.ndarray) -> float:
-    """Where a pose (24, 3) [rad] faces: the angle [rad] about the vertical from +z towards +x."""
+    """Return the angle [rad] about the vertical, from +z towards +x, that a pose (24, 3) [rad] faces."""
     facing = rotation_matrices(pose[0])[:, 2]
     # A body lying on its back or front has no heading; it keeps the recorded one.
     return float(np.arctan2(facing[0], facing[2])) if np.hypot(facing[0], facing[2]) > 0.1 else 0.0
 
 
 def turn_about_vertical(motion: Motion, angle: float) -> Motion:
-    """The whole motion turned by that angle [rad] about the vertical, beginning above the origin."""
+    """Turn the whole motion by an angle [rad] about the vertical, and begin it above the origin."""
     turn = rotation_matrices(np.array([0.0, angle, 0.0]))
     poses = motion.poses.copy()
     poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
@@ -175,7 +216,13 @@ def turn_about_vertical(motion: Motion, angle: float) -> Motion:
 
 
 def mirror_motion(motion: Motion) -> Motion:
-    """The motion as a mirror in the plane x = 0 shows it: sides change, turns about y and z change sign."""
+    """Mirror the motion in the plane x = 0: sides change, turns about y and z change sign.
+
+    >>> import numpy as np
+    >>> step = Motion("step", poses=np.zeros((1, 24, 3)), translations=np.array([[0.2, 0.0, 0.0]]))
+    >>> mirror_motion(step).translations
+    array([[-0.2,  0. ,  0. ]])
+    """
     twin = [JOINT[_other_side(name)] for name in JOINT]
     return Motion(
         name=f"{motion.name}_mirrored",
@@ -194,17 +241,17 @@ def _other_side(name: str) -> str:
 
 
 def joint_speeds(motion: Motion) -> np.ndarray:
-    """Angular speed of every joint relative to its parent. -> (T - 1, 24) [rad/s]."""
+    """Return the angular speed of every joint relative to its parent, (T - 1, 24) [rad/s]."""
     rotations = rotation_matrices(motion.poses)
     steps = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
     return np.linalg.norm(steps, axis=-1) * motion.fps
 
 
 def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """How far each pose is from the nearest of the others: poses (T, 24, 3), others (N, 24, 3) [rad] -> (T,).
+    """Return how far each pose (T, 24, 3) is from the nearest of the others (N, 24, 3): (T,) [rad].
 
-    The mean over the body's joints, hands aside, of the geodesic angle between their rotations [rad]. Of the
-    root it is the angle between the two upward directions: which way a body faces is no difference.
+    The mean over the body's joints, hands aside, of the geodesic angle between their rotations. For the root
+    it is the angle between the two upward directions: which way a body faces is no difference.
     """
     up, turns = _up_and_turns(poses)
     other_up, other_turns = _up_and_turns(others)
@@ -218,7 +265,7 @@ def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _up_and_turns(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Upward directions in the root's axes (T, 3), and unit quaternions (T, 21, 4) of the other joints."""
+    """Return upward directions in the root's axes (T, 3), and quaternions (T, 21, 4) of the other joints."""
     from scipy.spatial.transform import Rotation
 
     turning = [JOINT[name] for name in JOINT_NAMES[1:] if not name.endswith("hand")]
@@ -227,9 +274,9 @@ def _up_and_turns(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def arm_clearance(motion: Motion) -> np.ndarray:
-    """Angle between each upper arm and the downward spine: small when the arm lies on the torso.
+    """Return the angles (T, 2) [rad] between the left and right upper arm and the downward spine.
 
-    -> (T, 2) [rad], left and right.
+    Small when the arm lies on the torso.
     """
     joints = joint_positions(motion.poses, motion.translations)
     down = joints[:, JOINT["spine1"]] - joints[:, JOINT["spine3"]]
@@ -242,7 +289,7 @@ def arm_clearance(motion: Motion) -> np.ndarray:
 
 
 def slerp(poses_a: np.ndarray, poses_b: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Interpolate along the shortest arc: twice (..., 3) [rad], a share in [0, 1] for (...) -> (..., 3)."""
+    """Interpolate between poses (..., 3) [rad] along the shortest arc, by a share (...) in [0, 1]."""
     start = rotation_matrices(poses_a)
     arc = axis_angles(np.swapaxes(start, -1, -2) @ rotation_matrices(poses_b))
     return axis_angles(start @ rotation_matrices(arc * share[..., None]))

@@ -1,4 +1,4 @@
-"""Motions of SMPL's joints from arrays: .npz in AMASS's layout and others by their keys, .npy, .pkl.
+"""Read motions of SMPL's joints from arrays: .npz in AMASS's layout and others by their keys, .npy, .pkl.
 
 Axis-angle, rotation matrices or unit quaternions, relative to the parent joint. SMPL, SMPL+H and SMPL-X
 begin with the same 22 joints. Only SMPL's own two hand joints are the ones of our tree; the others carry
@@ -17,7 +17,7 @@ from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
 from snug.body.skeleton import JOINT_NAMES, axis_angles
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
-from snug.motion.raw_motion import RawMotion, check_length, rate
+from snug.motion.raw_motion import RawMotion, check_frame_count, frame_rate
 
 LAYOUTS = {22: "body", 24: "SMPL", 52: "SMPL+H", 55: "SMPL-X"}  # joints, the root among them
 BODY_JOINTS = 22
@@ -25,60 +25,60 @@ BODY_JOINTS = 22
 QUATERNIONS = {  # name: where w stands
     "quaternions": 0, "rotations_quat": 0, "quaternions_wxyz": 0, "quaternions_xyzw": 3,
 }  # fmt: skip
-WHOLE = ("poses", "pose", "rotations", "rotation_matrices", *QUATERNIONS)
+ROTATIONS = ("poses", "pose", "rotations", "rotation_matrices", *QUATERNIONS)
 BODIES = ("pose_body", "body_pose")
 ROOTS = ("root_orient", "global_orient")
 PATHS = ("trans", "transl", "translations")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
-NAMES = (*WHOLE, *BODIES, *ROOTS, *PATHS, *RATES)
+NAMES = (*ROTATIONS, *BODIES, *ROOTS, *PATHS, *RATES)
 PLAIN = (np.ndarray, int, float)
 UNIT = 0.02  # a quaternion's length, and a matrix's entries, may be off by as much
 
 
-def read_npz(path: Path, reading: MotionFileOptions) -> RawMotion:
-    """An .npz with rotations, a path of the root (T, 3) [m] and a frame rate [1/s]. Raises MotionError."""
+def read_npz(path: Path, options: MotionFileOptions) -> RawMotion:
+    """Read an .npz with rotations, a path of the root [m] and a frame rate [1/s]. Raises MotionError."""
     try:
         arrays = read_arrays(path, NAMES)
         if not arrays:
-            found = ", ".join(array_names(path)[:12]) or "nothing"
-            raise MotionError(f"{path}: no array of a motion (found {found}); give 'poses', 'trans', 'fps'")
+            names = ", ".join(array_names(path)[:12]) or "nothing"
+            raise MotionError(f"{path}: no array of a motion (found {names}); give 'poses', 'trans', 'fps'")
     except ArrayFileError as error:
         raise MotionError(f"{error}; give an .npz motion file, export or download it again") from None
-    return recording_of(path, arrays, reading)
+    return make_raw_motion(path, arrays, options)
 
 
-def read_npy(path: Path, reading: MotionFileOptions) -> RawMotion:
-    """An .npy with rotations alone, as 'poses' of an .npz. The root stays in place. Raises MotionError."""
+def read_npy(path: Path, options: MotionFileOptions) -> RawMotion:
+    """Read an .npy with rotations alone; the root stays in place. Raises MotionError."""
     try:
         poses = read_array(path)
     except ArrayFileError as error:
         raise MotionError(f"{error}; give an .npy of plain numbers, or an .npz motion file") from None
     in_place = np.zeros((len(np.atleast_1d(poses)), 3))
-    return recording_of(path, {"poses": poses, "trans": in_place}, reading, "; no path: the root stays")
+    return make_raw_motion(path, {"poses": poses, "trans": in_place}, options, "; no path: the root stays")
 
 
-def read_pkl(path: Path, reading: MotionFileOptions) -> RawMotion:
-    """A pickle of a dict with the arrays of an .npz. Nothing in it is executed. Raises MotionError."""
+def read_pkl(path: Path, options: MotionFileOptions) -> RawMotion:
+    """Read a pickled dict with the arrays of an .npz. Nothing in it is executed. Raises MotionError."""
     try:
-        held = read_plain_pickle(path)
+        content = read_plain_pickle(path)
     except PlainPickleError as error:
         raise MotionError(str(error)) from None
-    if not isinstance(held, dict):
+    if not isinstance(content, dict):
         raise MotionError(f"{path}: holds no dict of arrays; write an .npz motion file")
-    arrays = {name: np.asarray(held[name]) for name in NAMES if isinstance(held.get(name), PLAIN)}
+    arrays = {name: np.asarray(content[name]) for name in NAMES if isinstance(content.get(name), PLAIN)}
     if not arrays:
-        found = ", ".join(map(str, list(held)[:12]))[:200] or "nothing"
-        raise MotionError(f"{path}: no array of a motion (found {found}); give 'poses', 'trans', 'fps'")
-    return recording_of(path, arrays, reading)
+        names = ", ".join(map(str, list(content)[:12]))[:200] or "nothing"
+        raise MotionError(f"{path}: no array of a motion (found {names}); give 'poses', 'trans', 'fps'")
+    return make_raw_motion(path, arrays, options)
 
 
-def recording_of(
-    path: Path, arrays: dict[str, np.ndarray], reading: MotionFileOptions, note: str = ""
+def make_raw_motion(
+    path: Path, arrays: dict[str, np.ndarray], options: MotionFileOptions, note: str = ""
 ) -> RawMotion:
-    """The motion in arrays by name, as docs/bring-your-own.md lists them. Raises MotionError."""
+    """Make a motion of arrays by the names that docs/bring-your-own.md lists. Raises MotionError."""
     arrays = {name: _numbers(path, name, array) for name, array in arrays.items()}
     turns, what = _rotations(path, arrays)
-    check_length(path, len(turns))
+    check_frame_count(path, len(turns))
     name = _first(arrays, PATHS)
     if name is None:
         raise MotionError(f"{path}: no array 'trans', the root's path (frames, 3) [m]; zeros where it stays")
@@ -90,12 +90,9 @@ def recording_of(
     poses = np.zeros((len(turns), len(JOINT_NAMES), 3))
     kept = poses.shape[1] if turns.shape[1] == poses.shape[1] else BODY_JOINTS
     poses[:, :kept] = turns[:, :kept]
-    stated = _stated_rate(path, arrays)
+    fps = frame_rate(path, _stated_rate(path, arrays), options)
     source = f"{path.name} ({what}, {LAYOUTS[turns.shape[1]]} layout{note})"
-    return RawMotion(
-        path=path, poses=poses, translations=translations.reshape(-1, 3), fps=rate(path, stated, reading),
-        source=source,
-    )  # fmt: skip
+    return RawMotion(path=path, poses=poses, translations=translations.reshape(-1, 3), fps=fps, source=source)
 
 
 def _numbers(path: Path, name: str, array: np.ndarray) -> np.ndarray:
@@ -119,14 +116,14 @@ def _stated_rate(path: Path, arrays: dict[str, np.ndarray]) -> float | None:
 
 
 def _rotations(path: Path, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, str]:
-    """(T, J, 3) [rad] of the root and the others, J one of LAYOUTS, and the name of what they were read from.
+    """Return rotations (T, J, 3) [rad] of the root and the others, J one of LAYOUTS, and their array's name.
 
     Raises MotionError.
     """
-    name = _first(arrays, (*WHOLE, *BODIES))
+    name = _first(arrays, (*ROTATIONS, *BODIES))
     if name is None:
-        found = ", ".join(sorted(arrays))
-        raise MotionError(f"{path}: no array of rotations (found {found}); give 'poses' (frames, 72)")
+        names = ", ".join(sorted(arrays))
+        raise MotionError(f"{path}: no array of rotations (found {names}); give 'poses' (frames, 72)")
     turns = _axis_angles(path, name, arrays[name])
     if turns.shape[1] + 1 in LAYOUTS:
         root = _first(arrays, ROOTS)
@@ -149,16 +146,16 @@ def _rotations(path: Path, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, s
 
 
 def _axis_angles(path: Path, name: str, array: np.ndarray) -> np.ndarray:
-    """(T, J, 3) [rad] of axis-angles (T, 3 J) or (T, J, 3), matrices (T, J, 3, 3), quaternions (T, J, 4)."""
+    """Return (T, J, 3) [rad] of axis-angles (T, 3 J) or (T, J, 3), matrices, or quaternions (T, J, 4)."""
     shape = array.shape
     if array.size == 0:
         raise MotionError(f"{path}: '{name}' has shape {shape} and no frame; give a clip with frames")
     if name in QUATERNIONS:
         if array.ndim == 3 and shape[2] == 4:
-            return _of_quaternions(path, name, array)
+            return _from_quaternions(path, name, array)
         raise MotionError(f"{path}: '{name}' has shape {shape}; give (frames, joints, 4)")
     if array.ndim == 4 and shape[2:] == (3, 3):
-        return _of_matrices(path, name, array)
+        return _from_matrices(path, name, array)
     if (array.ndim == 3 and shape[2] == 3) or (array.ndim == 2 and shape[1] % 3 == 0):
         return array.reshape(len(array), -1, 3)
     raise MotionError(
@@ -167,7 +164,7 @@ def _axis_angles(path: Path, name: str, array: np.ndarray) -> np.ndarray:
     )
 
 
-def _of_matrices(path: Path, name: str, matrices: np.ndarray) -> np.ndarray:
+def _from_matrices(path: Path, name: str, matrices: np.ndarray) -> np.ndarray:
     whole = np.isfinite(matrices).all(axis=(2, 3))
     matrices = np.where(whole[..., None, None], matrices, np.eye(3))
     off = np.abs(np.swapaxes(matrices, -1, -2) @ matrices - np.eye(3)).max(axis=(2, 3))
@@ -175,7 +172,7 @@ def _of_matrices(path: Path, name: str, matrices: np.ndarray) -> np.ndarray:
     return np.where(whole[..., None], axis_angles(matrices), np.nan)
 
 
-def _of_quaternions(path: Path, name: str, quaternions: np.ndarray) -> np.ndarray:
+def _from_quaternions(path: Path, name: str, quaternions: np.ndarray) -> np.ndarray:
     from scipy.spatial.transform import Rotation
 
     w = QUATERNIONS[name]
@@ -193,8 +190,9 @@ def _of_quaternions(path: Path, name: str, quaternions: np.ndarray) -> np.ndarra
     return np.where(whole[..., None], turns, np.nan)
 
 
-def _check_entries(path: Path, name: str, wrong: np.ndarray, words: str) -> None:
+def _check_entries(path: Path, name: str, wrong: np.ndarray, problem: str) -> None:
     for frame, joint in np.argwhere(wrong)[:1]:
         raise MotionError(
-            f"{path}: '{name}' of frame {frame}, joint {joint} {words}; give rotations relative to the parent"
+            f"{path}: '{name}' of frame {frame}, joint {joint} {problem}; give rotations relative to "
+            "the parent"
         )

@@ -1,4 +1,4 @@
-"""Which axis of a recording is vertical: found from the body that stands along it."""
+"""Vertical axis of a recording: found from the body that stands along it."""
 
 from __future__ import annotations
 
@@ -16,45 +16,54 @@ TO_Y_UP = {
     "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
 }
 _SIGNED_AXES = ("x", "y", "z", "-x", "-y", "-z")
-LYING = 0.3  # cosine between the vertical and the way from ankles to head, below which a body lies or crawls
-RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
+MAX_LYING_COSINE = (
+    0.3  # cosine between the vertical and the way from ankles to head, below which a body lies or crawls
+)
+MAX_RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
 
 
-def turned_upright(recording: RawMotion, up: str) -> RawMotion:
-    """The recording with y up. up: its vertical axis, "y" or "z"; empty: the one along which the body stands.
+def turn_y_up(raw: RawMotion, up: str) -> RawMotion:
+    """Turn a raw motion so that y is up.
 
-    In a frame the body stands along the axis that is nearest to the way from its ankles to its head. The
-    axis of more than half of the frames is taken; a body that lies in the others, as after a fall, is fine.
-    Raises MotionError where no axis is that, where the given one is not, and where a body that was to stand
-    along the axis found travels along it: it may be crawling.
+    In a frame the body stands along the axis that is nearest to the direction from its ankles to its head.
+    The axis of more than half of the frames is taken; a body that lies in the others, as after a fall, is
+    fine.
+
+    Args:
+        raw: in the axes of its file.
+        up: its vertical axis, "y" or "z"; empty: the one along which the body stands.
+
+    Raises:
+        MotionError: no axis is that, the given one is not, or a body that should stand along the axis found
+            travels along it: it may be crawling.
     """
-    joints = joint_positions(recording.poses, recording.translations)
+    joints = joint_positions(raw.poses, raw.translations)
     ankles = joints[:, [JOINT["left_ankle"], JOINT["right_ankle"]]].mean(axis=1)
-    ways = joints[:, JOINT["head"]] - ankles
-    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
-    signed = np.concatenate([ways, -ways], axis=1)
-    shares = np.bincount(signed.argmax(axis=1), minlength=6) / len(ways)
+    directions = joints[:, JOINT["head"]] - ankles
+    directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-9)
+    signed = np.concatenate([directions, -directions], axis=1)
+    shares = np.bincount(signed.argmax(axis=1), minlength=6) / len(directions)
     likely = _SIGNED_AXES[int(shares.argmax())]
     share = f"{100 * shares.max():.0f} % of the frames"
     if up:
-        if (ways[:, _SIGNED_AXES.index(up)] > LYING).mean() <= 0.5:
+        if (directions[:, _SIGNED_AXES.index(up)] > MAX_LYING_COSINE).mean() <= 0.5:
             raise MotionError(
-                f"{recording.path}: with {up} up the body lies on its back or side: it stands along {likely} "
+                f"{raw.path}: with {up} up the body lies on its back or side: it stands along {likely} "
                 f"in {share}; {_remedy(likely)}"
             )
-        return _turned(recording, up, f"{up} up as given")
+        return _turn(raw, up, f"{up} up as given")
     if shares.max() <= 0.5 or likely not in TO_Y_UP:
         raise MotionError(
-            f"{recording.path}: the body stands neither along y nor along z: along {likely} in {share}; "
+            f"{raw.path}: the body stands neither along y nor along z: along {likely} in {share}; "
             f"{_remedy(likely)}"
         )
     lowest = joints[..., _SIGNED_AXES.index(likely)].min(axis=1)
-    if (rise := float(np.ptp(lowest))) > RISE:
+    if (rise := float(np.ptp(lowest))) > MAX_RISE:
         raise MotionError(
-            f"{recording.path}: the body points along {likely} in {share}, and its lowest joint moves by "
+            f"{raw.path}: the body points along {likely} in {share}, and its lowest joint moves by "
             f"{rise:.3g} m along it; if {likely} is up and the path in metres give --motion-up {likely}"
         )
-    return _turned(recording, likely, f"{likely} up, as the body stands in {share}")
+    return _turn(raw, likely, f"{likely} up, as the body stands in {share}")
 
 
 def _remedy(likely: str) -> str:
@@ -63,11 +72,11 @@ def _remedy(likely: str) -> str:
     return "turn the root's rotation and path so that y or z is up, or give a clip that stands"
 
 
-def _turned(recording: RawMotion, up: str, note: str) -> RawMotion:
+def _turn(raw: RawMotion, up: str, note: str) -> RawMotion:
     turn = TO_Y_UP[up]
-    poses = recording.poses.copy()
+    poses = raw.poses.copy()
     poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
     return replace(
-        recording, poses=poses, translations=recording.translations @ turn.T,
-        source=f"{recording.source}; {note}",
+        raw, poses=poses, translations=raw.translations @ turn.T,
+        source=f"{raw.source}; {note}",
     )  # fmt: skip

@@ -35,7 +35,7 @@ class Action:
         return round(self.seconds * self.cycles * RATE)
 
     def angles(self) -> tuple[dict[str, np.ndarray], list[tuple[float, float]]]:
-        """Angle name -> (T,) [degrees] at RATE, and the flights [s]."""
+        """Return angles by name, (T,) [degrees] at RATE, and the flights [s]."""
         within = (np.arange(self.frames) / RATE) % self.seconds
         angles = {}
         for name, keys in self.keys.items():

@@ -65,14 +65,14 @@ RUN = Stride(
 
 
 def stride_phase(stride: Stride, pace: np.ndarray) -> np.ndarray:
-    """Strides done so far, (T,), at a pace (T,) given as a share of the stride's normal rate."""
+    """Return the strides done so far (T,) at a pace (T,), a share of the stride's normal rate."""
     return np.cumsum(pace) / RATE / stride.seconds
 
 
 def gait_angles(stride: Stride, phase: np.ndarray, size: np.ndarray) -> dict[str, np.ndarray]:
-    """Joint angles of a gait: phase (T,) [strides], size (T,) 0 standing to 1 the full curves.
+    """Return joint angles by name, (T,) [degrees].
 
-    -> angle name -> (T,) [degrees].
+    phase: (T,) [strides]. size: (T,), 0 standing to 1 the full curves.
     """
     swing = 2.0 * np.pi * phase
     angles = {
@@ -101,7 +101,7 @@ def gait_angles(stride: Stride, phase: np.ndarray, size: np.ndarray) -> dict[str
 
 
 def gait_support(phase: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Share of the load on the left and right foot, (T, 2): passed on while both feet are down."""
+    """Return the share of the load on the left and right foot, (T, 2): passed on while both are down."""
     at = phase % 1.0
     right = np.interp(at, (0.0, 0.10, 0.50, 0.60, 1.0), (0.0, 1.0, 1.0, 0.0, 0.0))
     right = 0.5 + size * (right - 0.5)
@@ -109,7 +109,7 @@ def gait_support(phase: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def gait_flights(stride: Stride, phase: np.ndarray, size: np.ndarray) -> list[tuple[float, float]]:
-    """From each toe-off to the other foot's contact, (start, end) [s], where the gait is nearly full size."""
+    """Return (start, end) [s] from each toe-off to the other foot's contact, where `size` is nearly 1."""
     time = np.arange(len(phase)) / RATE
     flights: list[tuple[float, float]] = []
     if stride.toe_off >= 50.0:

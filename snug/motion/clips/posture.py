@@ -1,4 +1,4 @@
-"""From clinical joint angles to poses, and from poses to where the body is.
+"""Poses from clinical joint angles, and root paths from poses.
 
 Angles are in degrees and named as in gait analysis: flexion moves a limb forward, abduction away from the
 midline. Both legs and arms have the same names with `left_` or `right_` in front.
@@ -36,9 +36,9 @@ CONTACT_DEPTH = 0.01  # [m] a sole point this much higher than the lowest carrie
 
 
 def poses_from_angles(angles: Mapping[str, np.ndarray], frames: int) -> np.ndarray:
-    """angles: name -> (frames,) [degrees], absent names standing at ease -> poses (frames, 24, 3) [rad].
+    """Return poses (frames, 24, 3) [rad] of angles by name, (frames,) [degrees].
 
-    Raises KeyError for an angle that does not exist.
+    Absent names stand at ease. Raises KeyError for an angle that does not exist.
     """
     unknown = sorted(set(angles) - set(STANDING))
     if unknown:
@@ -83,14 +83,21 @@ def root_path(
     speed_smoothing: float = 0.06,
     rises: bool = False,
 ) -> np.ndarray:
-    """Root translations (T, 3) [m] of poses (T, 24, 3) at RATE whose standing foot stays where it is.
+    """Return root translations (T, 3) [m] of poses (T, 24, 3) at RATE whose standing foot stays in place.
 
-    Height: the lowest sole point is on the floor; in a flight (start, end) [s] the pelvis follows the
-    parabola of free fall between its heights at take-off and landing. Forward and sideways: the sole points
-    that carry the body do not move over the floor; in a flight the speed goes over from one to the other.
-    support: (T, 2) shares in [0, 1] of the left and right foot where they are known (a swinging foot may come
-    as low as the standing one); else the lowest points carry. Both smoothings: [s], of a Gaussian over time.
-    rises: the floor is steps: from the first frame on the height, too, is such that what carries stays.
+    Height: the lowest sole point is on the floor; in a flight the pelvis follows the parabola of free fall
+    between its heights at take-off and landing. Forward and sideways: the sole points that carry the body do
+    not move over the floor; in a flight the speed goes over from one to the other.
+
+    Args:
+        poses: (T, 24, 3) [rad] at RATE.
+        flights: (start, end) [s] of each.
+        support: (T, 2) shares in [0, 1] of the left and right foot where they are known (a swinging foot may
+            come as low as the standing one); else the lowest points carry.
+        height_smoothing: [s], of a Gaussian over time.
+        speed_smoothing: [s], of a Gaussian over time.
+        rises: the floor is steps: from the first frame on the height, too, is such that the carrying points
+            stay.
     """
     soles = sole_points(poses, np.zeros((len(poses), 3)))
     weights = np.exp((soles[..., 1].min(axis=1, keepdims=True) - soles[..., 1]) / CONTACT_DEPTH)
@@ -120,6 +127,6 @@ def root_path(
 
 
 def smoothstep(s: np.ndarray) -> np.ndarray:
-    """0 below 0, 1 above 1, and in between a quintic with neither slope nor curvature at its ends."""
+    """Return 0 below 0, 1 above 1, between them a quintic with neither slope nor curvature at its ends."""
     s = np.clip(s, 0.0, 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

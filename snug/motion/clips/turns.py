@@ -1,7 +1,7 @@
-"""Twists and turning walks that end within one frame: what sets a wide hem swinging, and lets it ring.
+"""Twists and turning walks that end within one frame: they set a wide hem swinging, and let it ring.
 
-A body cannot stop within a frame. That is the point: the cloth then moves by itself, and what it does cannot
-be told from the pose. Test and training differ in amplitude, frequency and the phase of the stop.
+A body cannot stop within a frame. That is the point: the cloth then moves by itself, and its motion cannot be
+told from the pose. Test and training differ in amplitude, frequency and the phase of the stop.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Twist:
     stop: float
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS, feet on the floor."""
+        """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS, feet on the floor."""
         time = np.arange(round(self.stop * FPS) + 1 + HELD) / FPS
         time = np.minimum(time, round(self.stop * FPS) / FPS)
         yaw = self.degrees * np.sin(2 * np.pi * self.hertz * time) * smoothstep(time / ONSET)
@@ -63,7 +63,7 @@ class TurningWalk:
     stop: float
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS."""
+        """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS."""
         time = np.arange(round(self.stop * RATE) + 1) / RATE
         size = smoothstep(time / 0.7)
         phase = stride_phase(WALK, self.pace * size)
@@ -83,7 +83,7 @@ class TurningWalk:
 
 
 def _turn(poses: np.ndarray, joint: str, degrees: np.ndarray) -> None:
-    """Yaw (T,) of one joint before the rotation that it has."""
+    """Yaw one joint by degrees (T,) before the rotation that it has."""
     yaw = Rotation.from_euler("y", degrees[:, None], degrees=True).as_matrix()
     poses[:, JOINT[joint]] = axis_angles(yaw @ rotation_matrices(poses[:, JOINT[joint]]))
 

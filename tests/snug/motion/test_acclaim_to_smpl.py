@@ -19,6 +19,7 @@ from snug.body.skeleton import (
 from snug.motion.acclaim import read_amc, read_asf
 from snug.motion.acclaim_to_smpl import CMU_RATE, JOINT_BONES, LIMBS, read_asf_amc
 from snug.motion.files import load_motions, read_motion
+from snug.motion.formats import READERS
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
 from tests.snug.motion.cmu_clips import amc_frame, write_clip
@@ -100,7 +101,7 @@ class TestRecordedClips:
         motions = {
             motion.name: motion for motion in load_motions(tmp_path, options=MotionFileOptions(repair=True))
         }
-        assert len(motions) == sum(path.suffix == ".amc" for path in chosen)
+        assert len(motions) == sum(path.suffix in READERS for path in chosen)
         for motion in motions.values():
             assert motion.fps == 30.0
             lowest = sole_points(motion.poses, motion.translations)[..., 1].min(axis=1)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, REST_JOINTS, joint_positions
 from snug.motion.bvh import read_clip
 from snug.motion.files import read_motion
-from snug.motion.joint_names import NEEDED, _side, find_joints
+from snug.motion.joint_names import NEEDED, _side, match_joints
 from snug.motion.library import make_motion
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
@@ -99,7 +99,7 @@ MIXAMORIG = ", ".join(f"mixamorig:{MIXAMO[name]} {PARENTS[k]}" for k, name in en
 
 def known(skeleton):
     names, parents = zip(*(joint.strip().rsplit(" ", 1) for joint in skeleton.split(",")), strict=True)
-    found = find_joints(Path("a.bvh"), names, [int(parent) for parent in parents], None)
+    found = match_joints(Path("a.bvh"), names, [int(parent) for parent in parents], None)
     return {ours: names[index] for ours, index in found.items()}
 
 
