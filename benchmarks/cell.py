@@ -9,10 +9,12 @@ from benchmarks.method import MethodEntry
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import Scene
 
+TaskId = tuple[str, str]  # kind and name of a task
+
 
 @dataclass(frozen=True)
 class Cell:
-    """One scene met by one method with one seed; `suites` are those that report it."""
+    """One scene computed by one method with one seed; `suites` are those that report it."""
 
     scene: Scene
     entry: MethodEntry
@@ -21,32 +23,60 @@ class Cell:
 
     @property
     def method(self) -> str:
+        """Name of the method."""
         return self.entry.name
 
     @property
     def label(self) -> str:
+        """Scene, method and seed for messages."""
         return f"{self.scene.name} x {self.method}" + (f" (seed {self.seed})" if self.seed else "")
 
     @property
     def name(self) -> str:
-        """<scene>/<method>, and the seed where it is not 0: as part of a path."""
+        """<scene>/<method>, and the seed where it is not 0: part of paths and of ids."""
         return f"{flat(self.scene.name)}/{flat(self.method)}" + (f"-seed{self.seed}" if self.seed else "")
 
     @property
+    def task_id(self) -> TaskId:
+        """Id of the task that runs the cell."""
+        return "cell", self.name
+
+    @property
+    def metrics_id(self) -> TaskId:
+        """Id of the task that measures the cell's trajectory."""
+        return "metrics", self.name
+
+    @property
+    def batch_id(self) -> TaskId:
+        """Id of the task that times many bodies at once."""
+        return "batch", self.name
+
+    def repeat_id(self, number: int) -> TaskId:
+        """Return the id of a repeat for its time alone; `number` counts from 1."""
+        return "repeat", f"{self.name}-{number}"
+
+    @property
     def timed(self) -> bool:
-        """Whether its costs are measured; others run side by side."""
+        """Whether its costs are measured; other cells run side by side."""
         return self.scene.timed and self.entry.timed
 
     def trajectory(self, folder: RunFolder) -> Path:
+        """Return the path of its trajectory."""
         return folder.trajectory_path(self.scene.name, self.method, self.seed)
 
     def curves(self, folder: RunFolder) -> Path:
+        """Return the path of its curves, metrics of every frame."""
         return folder.curves_path(self.scene.name, self.method, self.seed)
 
     def quasi_static(self, folder: RunFolder) -> Path:
+        """Return the path of the method's quasi-static solution."""
         return folder.quasi_static_path(self.scene.name, self.method, self.seed)
 
 
 def flat(name: str) -> str:
-    """A name as part of a path."""
+    """Return a name as part of a path.
+
+    >>> flat("tshirt/walk")
+    'tshirt-walk'
+    """
     return name.replace("/", "-")

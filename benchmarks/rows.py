@@ -8,14 +8,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from benchmarks.cell import Cell
+from benchmarks.cell import Cell, TaskId
 from benchmarks.methods import find_method
 from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
-from benchmarks.plan.plan import Plan, network_of
+from benchmarks.plan.plan import Plan
 from benchmarks.results.run_folder import REFERENCE_TOLERANCE, Row, as_right
-from benchmarks.runner.schedule import Schedule
-from benchmarks.tasks.task import Outcome, Task, TaskId
+from benchmarks.tasks.task import Outcome, Task
+from benchmarks.tasks.training import TrainNetwork
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
@@ -29,20 +29,21 @@ Outcomes = Mapping[TaskId, Outcome]
 
 def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
     """The rows of everything that has an outcome; cells first, with remarks where an error does not fall."""
-    schedule = Schedule(plan)
-    cells = [row for cell in plan.cells for row in rows_of_cell(cell, schedule, outcomes)]
+    by_id = {task.id: task for task in tasks}
+    cells = [row for cell in plan.cells for row in rows_of_cell(cell, plan, by_id, outcomes)]
     others = [row for task in tasks for row in _rows_of_task(task, outcomes)]
     return [*remarked(with_uncertainty(cells, plan.metrics)), *others]
 
 
-def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator[Row]:
-    """The rows of a cell in each of its suites; a cell without metrics is one row with its reason."""
-    outcome = outcomes.get(("cell", cell.name))
+def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes: Outcomes) -> Iterator[Row]:
+    """Yield the rows of a cell in each of its suites; a cell without metrics is one row with its reason."""
+    outcome = outcomes.get(cell.task_id)
     if outcome is None:
         return
-    measured = outcomes.get(("metrics", cell.name))
+    measured = outcomes.get(cell.metrics_id)
     if outcome.files and measured is None:
         return  # interrupted before it was measured
+    trained, taught_by = network_tasks(cell, tasks)
     metrics: dict[str, Any] = {}  # a number, or the parts of an Estimate
     status, reason = outcome.status, "; ".join(filter(None, (outcome.reason, outcome.remark)))
     if outcome.files:
@@ -56,20 +57,20 @@ def rows_of_cell(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> Iterator
                 status, reason = measured.status, measured.reason or reason
             metrics = dict(measured.result)
             if cell.timed:
-                costs, remark = clock_costs(cell, schedule.preset.repeats, outcomes)
+                costs, remark = clock_costs(cell, plan.preset.repeats, outcomes)
                 metrics |= costs
                 reason = reason or remark
             elif (declared_ms := cell.entry.declared_ms or outcome.result.get("declared_ms")) is not None:
                 metrics["cost/frame"] = declared_ms
             if cell.scene.timed:
-                metrics |= model_costs(cell, schedule, outcomes)
-            reason = reason or not_learned(cell, schedule, outcomes)
-    batch = outcomes.get(("batch", cell.name), Outcome())
+                metrics |= model_costs(trained, taught_by, outcomes)
+            reason = reason or not_learned(trained, outcomes)
+    batch = outcomes.get(cell.batch_id, Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
-    machines = machines_of(cell, schedule, outcomes)
+    machines = machines_of(trained, taught_by, outcomes)
     for suite in cell.suites:
-        for row in _rows(cell, suite, outcome, status, reason, metrics, schedule.plan.metrics):
+        for row in _rows(cell, suite, outcome, status, reason, metrics, plan.metrics):
             machine = machines.get(row.metric)
             yield row if machine is None else dataclasses.replace(row, hardware=machine)
 
@@ -126,13 +127,13 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
     Times are medians of the repeats, but for those of inputs; these and the peak are of the first run. A
     frame's time is that of the whole run over the frames computed.
     """
-    first, remark = outcomes["cell", cell.name], ""
-    batch = outcomes.get(("batch", cell.name), Outcome("skipped"))
+    first, remark = outcomes[cell.task_id], ""
+    batch = outcomes.get(cell.batch_id, Outcome("skipped"))
     if batch.status not in ("ok", "skipped"):
         remark = f"many at once: {batch.status}: {batch.reason}"
     results = [first.result]
     for number in range(1, repeats):
-        again = outcomes.get(("repeat", f"{cell.name}-{number}"), Outcome("skipped"))
+        again = outcomes.get(cell.repeat_id(number), Outcome("skipped"))
         if again.status == "ok":
             results.append(again.result)
         elif again.status != "skipped":
@@ -152,42 +153,49 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
     return costs, remark
 
 
-def model_costs(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str, float]:
-    """cost/data, cost/setup, cost/memory and cost/train* of the cell's network, where it has one."""
-    network = network_of(cell)
-    trained = outcomes.get(schedule.network(network).id) if network else None
-    if network is None or trained is None or not trained.result:
+def network_tasks(cell: Cell, tasks: Mapping[TaskId, Task]) -> tuple[TaskId | None, tuple[TaskId, ...]]:
+    """Return the id of the training of a cell's network, None without one, and of its simulated data."""
+    needs = tasks[cell.task_id].needs if cell.task_id in tasks else ()
+    trained = next((id for id in needs if id[0] == TrainNetwork.kind), None)
+    return trained, tasks[trained].reads if trained else ()
+
+
+def model_costs(
+    trained: TaskId | None, taught_by: tuple[TaskId, ...], outcomes: Outcomes
+) -> dict[str, float]:
+    """Return cost/data, cost/setup, cost/memory and cost/train* of a trained network."""
+    outcome = outcomes.get(trained) if trained else None
+    if outcome is None or not outcome.result:
         return {}
     names = {
         "cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes",
         "cost/train_steps": "steps", "cost/train_frames": "frames",
     }  # fmt: skip
-    costs = {metric: trained.result[name] for metric, name in names.items()}
-    data = [outcomes.get(task.id, Outcome()) for task in schedule.ground_truth(network)]
-    return {"cost/data": sum(outcome.seconds for outcome in data)} | costs
+    costs = {metric: outcome.result[name] for metric, name in names.items()}
+    return {"cost/data": sum(outcomes[id].seconds for id in taught_by if id in outcomes)} | costs
 
 
-def machines_of(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> dict[str, str]:
-    """Metric -> where its seconds were measured, of those that other tasks than the cell have taken."""
-    if (network := network_of(cell)) is None:
+def machines_of(trained: TaskId | None, taught_by: tuple[TaskId, ...], outcomes: Outcomes) -> dict[str, str]:
+    """Return metric -> hardware that measured its seconds, of tasks other than the cell."""
+    if trained is None:
         return {}
-    data, training = [task.id for task in schedule.ground_truth(network)], [schedule.network(network).id]
-    metrics = {"cost/data": data, "cost/setup": training, "cost/train": training}
-    found = {metric: [outcomes[id].origin for id in ids if id in outcomes] for metric, ids in metrics.items()}
+    metrics = {"cost/data": taught_by, "cost/setup": (trained,), "cost/train": (trained,)}
+    origins = {
+        metric: [outcomes[id].origin for id in ids if id in outcomes] for metric, ids in metrics.items()
+    }
     return {
-        metric: " and ".join(dict.fromkeys(origin["hardware"] for origin in origins if origin))
-        for metric, origins in found.items()
-        if any(origins)
+        metric: " and ".join(dict.fromkeys(origin["hardware"] for origin in of_metric if origin))
+        for metric, of_metric in origins.items()
+        if any(of_metric)
     }
 
 
-def not_learned(cell: Cell, schedule: Schedule, outcomes: Outcomes) -> str:
-    """A remark where the simulation of a motion failed, so that the cell's network learned without it."""
-    network = network_of(cell)
-    trained = outcomes.get(schedule.network(network).id) if network else None
-    if trained is None or not trained.result.get("left_out"):
+def not_learned(trained: TaskId | None, outcomes: Outcomes) -> str:
+    """Return a remark where a simulation failed, so that the cell's network learned without it."""
+    outcome = outcomes.get(trained) if trained else None
+    if outcome is None or not outcome.result.get("left_out"):
         return ""
-    return f"its network learned without {', '.join(trained.result['left_out'])}: no simulation is whole"
+    return f"its network learned without {', '.join(outcome.result['left_out'])}: no simulation is whole"
 
 
 def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
+from benchmarks.cell import TaskId
 from benchmarks.contract.findings import Findings
 from benchmarks.methods import find_method
 from benchmarks.registry import load
 from benchmarks.results.run_folder import STATUSES
 from benchmarks.scene import Scene
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId
+from benchmarks.tasks.task import Context, Outcome, Task
 
 SHIFT = 1e-3  # [m] by which the second roll-out is off
 

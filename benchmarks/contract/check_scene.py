@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from benchmarks.cell import TaskId
 from benchmarks.contract.findings import Findings, altered, fingerprints
 from benchmarks.methods import find_method
 from benchmarks.scene import BuiltScene, Scene
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId
+from benchmarks.tasks.task import Context, Outcome, Task
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.assets.inputs import Inputs
-from benchmarks.cell import Cell
+from benchmarks.cell import Cell, TaskId
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.presets import Preset
 from benchmarks.results.run_folder import LONGEST
@@ -47,6 +47,11 @@ class Network:
     @property
     def label(self) -> str:
         return f"{self.name} seed {self.seed} ({self.garment})"
+
+    @property
+    def task_id(self) -> TaskId:
+        """Id of the task that trains it."""
+        return "network", f"{self.garment}/{self.name}-seed{self.seed}"
 
     @property
     def training(self) -> Training | None:

@@ -16,12 +16,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from benchmarks.cell import TaskId
 from benchmarks.fingerprint.dependencies import software
 from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.results.json_file import ResultsError, read_json
 from benchmarks.results.run_folder import FORMAT, RunFolder, replacing
-from benchmarks.tasks.task import Outcome, Task, TaskId
+from benchmarks.tasks.task import Outcome, Task
 
 NOWHERE: Mapping[str, Any] = {}
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 from benchmarks.assets.assets import Assets
+from benchmarks.cell import TaskId
 from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.process.errors import one_line
 from benchmarks.process.scheduler import connect
@@ -29,7 +30,7 @@ from benchmarks.runner import cluster_worker
 from benchmarks.runner.cache import damaged
 from benchmarks.runner.cluster_worker import ASSETS, PIECE, Gone, Unfit
 from benchmarks.runner.local_executor import POLL, Done, LocalExecutor, Needed, Ready
-from benchmarks.tasks.task import Outcome, RunStopped, Task, TaskId, failure
+from benchmarks.tasks.task import Outcome, RunStopped, Task, failure
 
 ATTEMPTS = 3  # workers that may die of a task
 LOOK = 2.0  # [s] between looks at which workers there are and how far they are

@@ -16,11 +16,12 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from benchmarks.assets.assets import Assets
+from benchmarks.cell import TaskId
 from benchmarks.process.isolated_process import IsolatedProcess, WorkerDied, new_processes
 from benchmarks.process.memory import give_back
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import damaged
-from benchmarks.tasks.task import Context, Outcome, RunStopped, Task, TaskId, failure, tell_nobody
+from benchmarks.tasks.task import Context, Outcome, RunStopped, Task, failure, tell_nobody
 
 POLL = 0.2  # [s] between looks at the progress
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel

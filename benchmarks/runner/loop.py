@@ -12,9 +12,10 @@ from contextlib import AbstractContextManager, nullcontext
 from itertools import groupby
 from typing import Any, Protocol
 
+from benchmarks.cell import TaskId
 from benchmarks.runner.cache import Cache, Found
 from benchmarks.runner.local_executor import Batch, Executor
-from benchmarks.tasks.task import Outcome, Task, TaskId, failure
+from benchmarks.tasks.task import Outcome, Task, failure
 
 BLOCKED = "blocked"  # in the result of a task whose needs had failed
 AHEAD = 8  # timed tasks that begin together: each holds its scene in memory until its turn

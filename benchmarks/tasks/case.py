@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from benchmarks.cell import TaskId
 from benchmarks.results.run_folder import Row
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId
+from benchmarks.tasks.task import Context, Outcome, Task
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case

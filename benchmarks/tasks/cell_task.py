@@ -12,12 +12,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.cell import Cell
+from benchmarks.cell import Cell, TaskId
 from benchmarks.method import Method
 from benchmarks.process.memory import peak_memory
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import BuiltScene, Scene
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId, failure
+from benchmarks.tasks.task import Context, Outcome, Task, failure
 from benchmarks.timing import Reading, clocked
 
 if TYPE_CHECKING:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.cell import TaskId, flat
 from benchmarks.method import MethodEntry
 from benchmarks.results.run_folder import RunFolder, replacing
 from benchmarks.scene import BuiltScene, Scene
 from benchmarks.tasks.cell_task import built
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId
+from benchmarks.tasks.task import Context, Outcome, Task
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,6 +35,11 @@ class SettleStart(Task):
     stage = "ground truth"
     unit_seconds = 0.07
     scene: Scene
+
+    @classmethod
+    def id_of(cls, scene: Scene) -> TaskId:
+        """Return the id of the task of a scene."""
+        return cls.kind, flat(scene.name)
 
     def clear(self, folder: RunFolder) -> None:
         for path in self._paths(folder):
@@ -192,6 +198,11 @@ class SimulateQuasiStatic(Task):
     stage = "quasi-static answers"
     unit_seconds = 0.07
     scene: Scene
+
+    @classmethod
+    def id_of(cls, scene: Scene) -> TaskId:
+        """Return the id of the task of a scene."""
+        return cls.kind, flat(scene.name)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import numpy as np

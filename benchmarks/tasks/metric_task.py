@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.cell import Cell
+from benchmarks.cell import Cell, TaskId
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import find_metric, modules, names_of
 from benchmarks.process.errors import one_line
@@ -18,7 +18,7 @@ from benchmarks.registry import load
 from benchmarks.results.frame_energies import SECONDS
 from benchmarks.results.run_folder import USABLE, RunFolder, replacing
 from benchmarks.tasks.cell_task import built
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId
+from benchmarks.tasks.task import Context, Outcome, Task
 
 if TYPE_CHECKING:
     from benchmarks.tasks.training import TrainNetwork
@@ -54,7 +54,7 @@ class MeasureCell(Task):
             context.memo["roll-outs"] = self._roll_outs(context, needed)
         roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
         if self.counterpart is not None:
-            there = needed.get(("cell", self.counterpart.name))
+            there = needed.get(self.counterpart.task_id)
             if there is not None and there.status in USABLE:
                 roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
         if self.training is not None:
@@ -78,7 +78,7 @@ class MeasureCell(Task):
             group.quasi_static = _positions(folder.quasi_static_path(self.cell.scene.name))
         found = {}
         for cell in self.cells:
-            outcome = needed.get(("cell", cell.name))
+            outcome = needed.get(cell.task_id)
             if outcome is not None and outcome.files:
                 found[cell] = RollOut(
                     group, cell.entry, Trajectory.load(cell.trajectory(folder)), status=outcome.status,

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from benchmarks.cell import TaskId
 from benchmarks.method import MethodEntry
 from benchmarks.performance.microbenchmark import SUITE, Settings
 from benchmarks.process.memory import peak_memory
 from benchmarks.results.run_folder import Row, RunFolder
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId, failure
+from benchmarks.tasks.task import Context, Outcome, Task, failure
 
 if TYPE_CHECKING:
     from benchmarks.performance.microbenchmark import Microbenchmark

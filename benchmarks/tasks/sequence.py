@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from benchmarks.cell import TaskId
 from benchmarks.tasks.ground_truth import SimulateMotion
-from benchmarks.tasks.task import Context, Outcome, TaskId
+from benchmarks.tasks.task import Context, Outcome
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,14 +10,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from benchmarks.cell import TaskId
 from benchmarks.process.errors import one_line
 from benchmarks.process.isolated_process import WorkerDied
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
     from benchmarks.results.run_folder import Row, RunFolder
-
-TaskId = tuple[str, str]  # kind and name
 
 
 @dataclass(frozen=True)

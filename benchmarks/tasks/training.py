@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.cell import TaskId
 from benchmarks.fingerprint.digest import digest
 from benchmarks.registry import load
 from benchmarks.results.run_folder import RunFolder, model_path
-from benchmarks.tasks.task import Context, Outcome, Task, TaskId
+from benchmarks.tasks.task import Context, Outcome, Task
 
 if TYPE_CHECKING:
     import numpy as np

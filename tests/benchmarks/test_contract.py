@@ -182,7 +182,7 @@ def test_the_check_catches_every_known_misbehaviour(how, words, tmp_path, monkey
 @pytest.mark.parametrize(("how", "words"), [("segfault", "SIGSEGV"), ("hang", "no answer within 4 s")])
 def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monkeypatch):
     entry = MethodEntry(
-        name=how, description="", module="misbehaving", options={"how": how}, declared_in="misbehaving",
+        name=how, description="", module="tests.benchmarks.runner.misbehaving", options={"how": how}, declared_in="tests.benchmarks.runner.misbehaving",
         needs_no_obstacle=True,
     )  # fmt: skip
     monkeypatch.setattr(check, "BARE", ("free_fall",))
@@ -191,7 +191,9 @@ def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monke
 
 
 def test_the_check_says_what_is_skipped_everywhere(tmp_path):
-    entry = MethodEntry(name="m", description="", module="misbehaving", package="nowhere")
+    entry = MethodEntry(
+        name="m", description="", module="tests.benchmarks.runner.misbehaving", package="nowhere"
+    )
     ((line, fine),) = check.check({"methods": [entry], "scenes": [], "metrics": []}, tmp_path)
     assert not fine and "is skipped in every scene: m needs the package nowhere" in line
 

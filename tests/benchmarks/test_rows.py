@@ -15,7 +15,7 @@ from benchmarks.plan.plan import Motions
 from benchmarks.results.run_folder import Row
 from benchmarks.rows import NOT_FALLING, clock_costs, rows_of
 from benchmarks.runner.console import remarks, summary
-from benchmarks.runner.schedule import Schedule
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.whole_run import RunLog, accepted
 from benchmarks.scenes import SCENES
 from benchmarks.tasks.cell_task import judge
@@ -232,18 +232,18 @@ def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_
     cell = Cell(dressed_scene("kick"), find_method(method), 0, ("garments",))
     motions = Motions(train=("walk", "run"), test=("kick",))
     plan = dataclasses.replace(plan_of(None), cells=(cell,), motions=motions)
-    schedule = Schedule(plan)
+    tasks, network = tasks_of(plan), plan.networks[0].task_id
     there = {"commit": "c", "preset": "p", "hardware": "there"}
     result = {"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0, "steps": 60, "frames": 90}
     trained = Outcome(result=result, origin=there)
     outcomes = {
         ("cell", cell.name): RAN, ("metrics", cell.name): Outcome(result={"energy/strain": 1.0}),
-        schedule.network(plan.networks[0]).id: trained,
+        network: trained,
         ("data", "tshirt-walk/simulation"): Outcome(seconds=3.0, origin=there | {"hardware": "elsewhere"}),
         ("data", "tshirt-run/simulation"): Outcome(seconds=4.0, origin=there),
         ("data", "tshirt-run/fast-lbfgs-10"): Outcome(seconds=5.0),
     }  # fmt: skip
-    rows = rows_of(plan, (), outcomes)
+    rows = rows_of(plan, tasks, outcomes)
     machines = {row.metric: row.hardware for row in rows}
     assert machines["cost/train"] == machines["cost/setup"] == "there" and machines["cost/frame"] == ""
     assert machines["cost/data"] == ("elsewhere and there" if data else "")
@@ -253,5 +253,5 @@ def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_
     assert costs["cost/setup"] == 20.0 and costs["cost/memory"] == 9.0
     assert costs["cost/train_steps"] == 60 and costs["cost/train_frames"] == 90
     lacking = dataclasses.replace(trained, result={**trained.result, "left_out": ["run"]})
-    rows = rows_of(plan, (), outcomes | {schedule.network(plan.networks[0]).id: lacking})
+    rows = rows_of(plan, tasks, outcomes | {network: lacking})
     assert all("learned without run" in row.reason for row in rows)

@@ -161,7 +161,7 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
 @pytest.fixture
 def misbehaving(monkeypatch):
     """newton-1 raises when it is made ready; the others are as they are."""
-    wrong = {"module": "misbehaving", "options": {"how": "raise"}}
+    wrong = {"module": "tests.benchmarks.runner.misbehaving", "options": {"how": "raise"}}
     entries = tuple(dataclasses.replace(m, **wrong) if m.name == "newton-1" else m for m in METHODS)
     monkeypatch.setattr(methods, "METHODS", entries)
     monkeypatch.setattr(choosing, "METHODS", entries)

@@ -16,7 +16,6 @@ from benchmarks.metrics.motion.conservation import law_series
 from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.rows import rows_of_cell
-from benchmarks.runner.schedule import Schedule
 from benchmarks.scene import Dressed
 from benchmarks.scenes import find_scene
 from benchmarks.tasks.task import Outcome
@@ -173,7 +172,7 @@ def rows(values, tmp_path):
         preset=SMOKE, suites=("garments",), cells=(cell,), cases=(), seeds=(0,), device="cpu",
         folder=tmp_path, command="",
     )  # fmt: skip
-    found = rows_of_cell(cell, Schedule(plan), outcomes)
+    found = rows_of_cell(cell, plan, {}, outcomes)
     return {row.metric: row for row in found if row.metric in WORST}
 
 

@@ -290,7 +290,9 @@ def test_what_a_killed_runner_had_begun_is_ended(two, folder, tmp_path):
 
 
 def start_runner(folder: Path, address: str, *, seconds: float, mark: Path) -> subprocess.Popen:
-    program = "import sys, cluster_by_hand; cluster_by_hand.main(*sys.argv[1:])"
+    program = (
+        "import sys; from tests.benchmarks.runner import cluster_by_hand; cluster_by_hand.main(*sys.argv[1:])"
+    )
     return subprocess.Popen(
         [sys.executable, "-c", program, str(folder), address, str(seconds), str(mark)],
         env=os.environ | {"PYTHONPATH": PATH}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,

@@ -20,7 +20,7 @@ from benchmarks.plan.suites import CHEAP
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.rows import rows_of_cell
-from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import find_scene, out_of_distribution
 from benchmarks.scenes.variations import FEW, FEWEST, ORDINARY, OUT_OF_DISTRIBUTION
 from benchmarks.tasks.metric_task import measured
@@ -214,7 +214,7 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(assets, models, tmp_pa
         preset=SMOKE, suites=("extremes",), cells=(cell,), cases=(), seeds=(0,), device="cpu",
         folder=tmp_path, command="",
     )  # fmt: skip
-    rows = list(rows_of_cell(cell, Schedule(plan), outcomes))
+    rows = list(rows_of_cell(cell, plan, {}, outcomes))
     assert {row.status for row in rows} == {expected} and len(rows) == len(values) >= 4
     lost = "a vertex came 0.7 m away from the skinned shirt"
     assert {row.reason for row in rows} == {own[1] or (lost if expected == "diverged" else "")}

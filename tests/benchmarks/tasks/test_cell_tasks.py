@@ -40,7 +40,12 @@ def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", 
 
     def entry(name):
         found = find_method(name)
-        wrong = {"module": "misbehaving", "options": {"how": how}, "batched": True, "gives_first_frame": True}
+        wrong = {
+            "module": "tests.benchmarks.runner.misbehaving",
+            "options": {"how": how},
+            "batched": True,
+            "gives_first_frame": True,
+        }
         return dataclasses.replace(found, **wrong) if how and name != "simulation" else found
 
     cells = tuple(Cell(SCENES[scene].at(preset), entry(name), 0, ("speed",)) for name in names)
@@ -106,7 +111,7 @@ def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_pat
     assert "reference_sim.energies.stretch_stvk" in result["modules"] and "numba" in result["modules"]
     snug = {name for name in result["modules"] if name.startswith("snug")}
     # Names of trainings, which the list of methods holds.
-    assert snug <= {"snug", "snug.recipes.recipe", "snug.recipes.named", "snug.recipes.deviations"}
+    assert snug <= {"snug", *(f"snug.recipes{name}" for name in ("", ".recipe", ".named", ".deviations"))}
     for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
         assert name not in result["modules"], f"{name} was loaded"
     costs, remark = clock_costs(plan.cells[0], 1, {("cell", plan.cells[0].name): outcome})
