@@ -123,7 +123,7 @@ def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str,
     """Return name -> motion of each sequence. Raises ValueError for names that come twice, and for none."""
     from snug.motion import library
     from snug.motion.files import load_motions
-    from snug.training.motion_augmentation import FRAMES, SHARED_SEED, mixed_motions
+    from snug.training.augmentation.mixed_clips import FRAMES, SHARED_SEED, mixed_motions
 
     reading, given = parse_motion_options(options), list[Any]()
     for path in options.motions or ["library"]:

@@ -26,27 +26,27 @@ COLUMNS = ("step", "seconds", "loss", "validation", "strain", "bending", "gravit
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Train; when the value on the held-out motion came close to its last one, and for good."""
-    from snug.training.run import Saving
-    from snug.training.train import train
+    from snug.training.checkpoint import Checkpoint
+    from snug.training.train_network import train_network
     from snug.training.validation import Validation
 
     curve_path, path = settings.files
     path.parent.mkdir(parents=True, exist_ok=True)
     checkpoint = path.with_name(f".{path.stem}.checkpoint.safetensors")
-    saving = Saving(path=checkpoint, resume=True, key=settings.key)
+    checkpoint = Checkpoint(path=checkpoint, resume=True, key=settings.key)
     chosen, every = settings.chosen, max(1, settings.steps // POINTS)
     dressed, motions = dressed_body(vertices), training_motions()
     held_out = [motion for motion in motions if motion.name == HELD_OUT]
-    model = train(
+    model = train_network(
         chosen.kind, dressed, [motion for motion in motions if motion not in held_out],
         steps=settings.steps, seed=0, recipe=chosen.recipe, every=every, device=settings.device,
-        saving=saving, validation=Validation(motions=held_out, every=every, patience=0),
+        checkpoint=checkpoint, validation=Validation(motions=held_out, every=every, patience=0),
     )  # fmt: skip
     model.save(path)
     points = curve(model.history)
     with replacing(curve_path) as temporary:
         pd.DataFrame(points, columns=COLUMNS).to_csv(temporary, index=False)
-    saving.done()
+    checkpoint.delete()
     return {
         "vertices": dressed.vertices,
         "training_frames": model.summary["training_frames"],

@@ -28,7 +28,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Median, 95 % and least time over all frames of roll-outs, and the median of a cold one; memory and file
     of the network.
     """
-    from snug.training.train import untrained_model
+    from snug.training.train_network import untrained_model
 
     chosen = settings.chosen
     dressed, motions = dressed_body(vertices), training_motions()
@@ -58,10 +58,10 @@ def _frame_seconds(
 
     swept: [MB] read and written before each frame, off the clock.
     """
-    from snug.networks.roll_out import predictions
+    from snug.networks.roll_out import prepare_frames
 
     other = np.zeros(swept * 125_000)
-    frames, seconds = predictions(model, dressed, motion)(), []
+    frames, seconds = prepare_frames(model, dressed, motion)(), []
     for _ in range(motion.frames):
         other += 1.0
         start = time.perf_counter()

@@ -17,7 +17,7 @@ from benchmarks.performance.microbenchmark import Settings
 from benchmarks.presets import find_preset
 
 if TYPE_CHECKING:
-    from snug.training.trainer import Trainer
+    from snug.training.optimisation_step import Trainer
 
 WARM_UP, BLOCK = 20, 20  # steps before the clock starts, and of each block that is timed
 PAPER_STEPS = find_preset("paper").steps_of("snug", "snug")
@@ -28,7 +28,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     import torch
 
     from snug.training.device import find_device
-    from snug.training.trainer import Trainer
+    from snug.training.optimisation_step import Trainer
 
     chosen, device = settings.chosen, find_device(settings.device)
     dressed, motions = dressed_body(vertices), training_motions()

@@ -139,7 +139,7 @@ class SimulateClips(Task):
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import numpy as np
 
-        from snug.training.motion_augmentation import shared_clips
+        from snug.training.augmentation.mixed_clips import shared_clips
 
         assets, run, garment = context.assets, context.folder, self.scene.garment
         assert assets is not None

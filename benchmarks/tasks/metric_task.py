@@ -157,8 +157,8 @@ def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> N
 
 def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | None:
     """(N,24,3) [rad], mixed ones included; None of a network that was not trained. Kept within a batch."""
-    from snug.networks.trained_model import find_kind
-    from snug.training.motion_augmentation import mixed_for, shared_clips
+    from snug.training.augmentation.mixed_clips import mixed_for, shared_clips
+    from snug.training.kinds import find_kind
 
     assets, how = context.assets, training.chosen
     if how is None or assets is None:

@@ -66,8 +66,8 @@ class TrainNetwork(Task):
 
         from reference_sim.trajectory.trajectory import Trajectory
         from snug.networks.dressed_body import DressedBody
-        from snug.training.run import Saving
-        from snug.training.train import train, untrained_model
+        from snug.training.checkpoint import Checkpoint
+        from snug.training.train_network import train_network, untrained_model
         from snug.training.validation import Validation
 
         torch.set_num_threads(1)
@@ -90,7 +90,7 @@ class TrainNetwork(Task):
             every = max(1, self.steps // (LONGEST * VALIDATIONS))
             held_out = assets.named(self.held_out)
             validation = Validation(motions=held_out, every=every, patience=VALIDATIONS, trajectories=targets)
-        saving = Saving(
+        checkpoint = Checkpoint(
             path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
             resume=True, key=digest([self.key, targets]),
         )  # fmt: skip
@@ -104,16 +104,16 @@ class TrainNetwork(Task):
         if self.chosen is None:
             model = untrained_model("snug", dressed, assets.named(motions), seed=self.seed)
         else:
-            model = train(
+            model = train_network(
                 self.chosen.kind, dressed, [*assets.named(motions), *mixed], steps=self.steps,
                 seed=self.seed, trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False,
-                every=LOG_EVERY, device=self.device, saving=saving, validation=validation,
+                every=LOG_EVERY, device=self.device, checkpoint=checkpoint, validation=validation,
             )  # fmt: skip
         if told < self.steps:  # it ended early
             context.tell(self.steps - told)
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
-        saving.done()
+        checkpoint.delete()
         result = {
             "recipe": model.recipe.name,
             "left_out": [motion for motion in self.motions if motion not in motions],
@@ -133,7 +133,7 @@ class TrainNetwork(Task):
     ) -> tuple[list[Motion], dict[str, np.ndarray]]:
         """The mixed clips that were simulated, and their vertices by name."""
         from reference_sim.files.array_file import read_arrays
-        from snug.training.motion_augmentation import shared_clips
+        from snug.training.augmentation.mixed_clips import shared_clips
 
         found: dict[str, np.ndarray] = {}
         for id in self.clips:

@@ -1,8 +1,8 @@
-"""Network and skinning of one frame as one compiled call; what it runs is laid out by snug.networks.one_frame.
+"""Network and skinning of one frame as one compiled call, laid out by snug.networks.one_frame.
 
 A frame alone is one pass over all weights, matrix after matrix: its time is that of fetching them. So each
 matrix lies in one piece, in the order of use, float32, bf16 (the upper halves of float32, as uint16) or int8
-(a factor for each row). tests/snug/networks/test_one_frame.py holds the values to torch's own modules.
+(a factor for each row). tests/snug/networks/test_one_frame.py compares the values with torch's own modules.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from reference_sim.kernels.kernel_cache import njit
 # Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU).
 PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL = range(5)
 ROWS, COLUMNS = 4, 32  # a matrix has multiples of these: rows at once, and numbers in vector registers
-LANES = 64  # vertices that are skinned together
+VERTEX_BLOCK = 64  # vertices that are skinned together
 FAST = {"reassoc", "contract", "nsz"}  # a number that is not finite stays so
 _ZERO, _ONE, _TWO, _HALF = (np.float32(x) for x in (0.0, 1.0, 2.0, 0.5))
 _LOG2_E, _LN_2 = np.float32(np.log2(np.e)), np.float32(np.log(2.0))
@@ -38,31 +38,31 @@ def skin_frame(
     pelvis: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Linear blend skinning: world vertices into out (V, 3) [m], float64.
+    """Write world vertices into out (V, 3) [m], float64, by linear blend skinning.
 
     offsets (3 V',) and rest (3, V'), the unposed garment [m]: in this order (V,) of vertices and with others
-    behind them, in blocks of LANES; joints[first[b]:first[b + 1]] move block b, with shares (., LANES).
+    behind them, in blocks of VERTEX_BLOCK; joints[first[b]:first[b + 1]] move block b, with shares (., VERTEX_BLOCK).
     transforms (J, 3, 4), pelvis (3,) [m], float64; all other real numbers are float32.
     """
     count, padded = len(order), rest.shape[1]
-    u = np.empty(6 * LANES, np.float32)  # points and their images: nothing overlaps in one small array
+    u = np.empty(6 * VERTEX_BLOCK, np.float32)  # points and their images: nothing overlaps in one small array
     for b in range(len(first) - 1):
         for c in range(3):
-            for i in range(LANES):
-                at = b * LANES + i
-                u[c * LANES + i] = rest[c, at] + offsets[c * padded + at]
-                u[(3 + c) * LANES + i] = _ZERO
+            for i in range(VERTEX_BLOCK):
+                at = b * VERTEX_BLOCK + i
+                u[c * VERTEX_BLOCK + i] = rest[c, at] + offsets[c * padded + at]
+                u[(3 + c) * VERTEX_BLOCK + i] = _ZERO
         for e in range(first[b], first[b + 1]):
             t, share = transforms[joints[e]], shares[e]
             for c in range(3):
                 t0, t1, t2, t3 = t[c, 0], t[c, 1], t[c, 2], t[c, 3]
-                for i in range(LANES):
-                    moved = t0 * u[i] + t1 * u[LANES + i] + t2 * u[2 * LANES + i] + t3
-                    u[(3 + c) * LANES + i] += share[i] * moved
-        for i in range(min(LANES, count - b * LANES)):
-            v = order[b * LANES + i]
+                for i in range(VERTEX_BLOCK):
+                    moved = t0 * u[i] + t1 * u[VERTEX_BLOCK + i] + t2 * u[2 * VERTEX_BLOCK + i] + t3
+                    u[(3 + c) * VERTEX_BLOCK + i] += share[i] * moved
+        for i in range(min(VERTEX_BLOCK, count - b * VERTEX_BLOCK)):
+            v = order[b * VERTEX_BLOCK + i]
             for c in range(3):
-                out[v, c] = np.float64(u[(3 + c) * LANES + i]) + pelvis[c]
+                out[v, c] = np.float64(u[(3 + c) * VERTEX_BLOCK + i]) + pelvis[c]
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -81,7 +81,7 @@ def run_frame(
     work: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """World vertices into out (V, 3) [m], float64, and the next state into work.
+    """Write world vertices into out (V, 3) [m], float64, and the next state into work.
 
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes
     begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where its
@@ -98,13 +98,13 @@ def run_frame(
         if kind == CELL:
             _cell(source, work[columns:], y, rows)
         else:
-            matrix, own = weights[operations[i, 3] :], terms[operations[i, 4] :]
-            _multiply(kind, matrix, own, source, y, rows, columns)
+            matrix, affine = weights[operations[i, 3] :], terms[operations[i, 4] :]
+            _multiply(kind, matrix, affine, source, y, rows, columns)
     skin_frame(work[len(work) - rest.size :], rest, first, joints, shares, order, transforms, pelvis, out)
 
 
 def _value(weight: Any) -> Any:
-    """A stored weight as float32, but for its row's factor."""
+    """Return a stored weight as float32, without its row's factor."""
 
 
 def _expanded(weight: Any) -> Any:  # bf16 is the upper half of a float32
@@ -126,7 +126,7 @@ def _value_of(weight: Any) -> Any:
 def _multiply(
     kind: int, weights: np.ndarray, terms: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int
 ) -> None:
-    """Four rows at once, a quarter of the matrix apart: memory gives four streams sooner than one."""
+    """Multiply four rows at once, a quarter of the matrix apart: memory gives four streams sooner than one."""
     part = rows // ROWS
     for i in range(part):
         w0, w1 = weights[i * columns :], weights[(part + i) * columns :]
@@ -151,7 +151,7 @@ def _multiply(
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
 def _sigmoid(x: np.float32) -> np.float32:
-    """1 / (1 + exp(-x)), to 1e-7: exp = 2^k e^r, |r| <= ln(2) / 2, and e^r by its series."""
+    """Return 1 / (1 + exp(-x)), to 1e-7: exp = 2^k e^r, |r| <= ln(2) / 2, and e^r by its series."""
     y = -x * _LOG2_E
     y = _LOWEST if y < _LOWEST else y
     y = _HIGHEST if y > _HIGHEST else y
@@ -163,7 +163,7 @@ def _sigmoid(x: np.float32) -> np.float32:
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
 def _cell(inputs: np.ndarray, recurrent: np.ndarray, state: np.ndarray, size: int) -> None:
-    """torch.nn.GRU's gates, see snug.kernels.gru, of W_i x + b_i and W_h h + b_h, (3 size,) each."""
+    """Update a state by torch.nn.GRU's gates (snug.kernels.gru) of W_i x + b_i and W_h h + b_h, (3 size,) each."""
     for j in range(size):
         r = _sigmoid(inputs[j] + recurrent[j])
         z = _sigmoid(inputs[size + j] + recurrent[size + j])

@@ -7,35 +7,34 @@ the pelvis. World positions come back by adding the pelvis, in float64.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import torch
 from torch import Tensor
 
 from reference_sim.material import Material
-from snug.body.parametric_body import SHAPES
+from snug.body.parametric_body import SHAPES, Body
 from snug.body.skeleton import rotation_matrices
 from snug.body.skinning import skin
-from snug.networks.inputs import HISTORY, motion_history
+from snug.garments.garment import Garment, smooth_weights
+from snug.motion.motion import Motion
+from snug.networks.motion_features import HISTORY, motion_history
 from snug.recipes.recipe import Recipe
 
-if TYPE_CHECKING:
-    from snug.body.parametric_body import Body
-    from snug.garments.garment import Garment
-    from snug.motion.motion import Motion
-
-# Which inputs there are, and the frames before one that they are made from: rates are first and second
+# The sets of inputs, and the number of earlier frames that each is made from: rates are first and second
 # differences.
 FEATURE_SETS = {"motion": 1, "pose": 0, "pose_shape": 0, "history": HISTORY + 1}
 
 
 class DressedBody:
-    """What is fixed when a garment is put on a body; every motion is given to its methods.
+    """A garment on a body; every motion is given to the methods.
 
-    body: snug.body.parametric_body.Body; garment: snug.garments.garment.Garment; material: in place of the garment's own. The rest
-    state of all energies is the garment's, for every body shape: the same shirt on a larger body is a
-    stretched shirt.
+    The rest state of all energies is the garment's, for every body shape: the same shirt on a larger body is
+    a stretched shirt.
+
+    Args:
+        body: the body.
+        garment: tailored to that body.
+        material: in place of the garment's own.
     """
 
     def __init__(self, body: Body, garment: Garment, *, material: Material | None = None) -> None:
@@ -47,28 +46,29 @@ class DressedBody:
         self._rest_directions: Tensor | None = None
 
     def weights(self, smoothing: int) -> Tensor:
-        """Skinning weights (V, 24), borrowed from the body and averaged over neighbours; as they are where
-        somebody made them for this garment.
+        """Return skinning weights (V, 24), borrowed from the body and averaged over neighbours.
 
-        smoothing: sweeps on a garment of 1000 vertices. A sweep reaches as far as an edge is long, so other
-        garments get sweeps in proportion to their vertices and are smoothed over the same length: with 20
-        for all, a shirt of 300 vertices is drawn into the body and one of 4400 keeps half of its skinning
-        noise.
+        Weights that somebody made for this garment stay as they are.
+
+        Args:
+            smoothing: sweeps on a garment of 1000 vertices. A sweep reaches as far as an edge is long, so
+                other garments get sweeps in proportion to their vertices and are smoothed over the same
+                length: with 20 for all, a shirt of 300 vertices is drawn into the body and one of 4400 keeps
+                half of its skinning noise.
         """
         if smoothing not in self._weights:
-            own = weights = np.asarray(self.garment.skinning_weights)
+            borrowed = weights = np.asarray(self.garment.skinning_weights)
             if smoothing and not self.garment.authored_weights:
-                from snug.garments.garment import smooth_weights
-
                 sweeps = max(1, round(smoothing * self.vertices / 1000))
                 weights = smooth_weights(weights, self.garment.faces, sweeps)
-                weights[self.garment.pins] = own[self.garment.pins]  # where the simulator's handles are
+                weights[self.garment.pins] = borrowed[self.garment.pins]  # where the simulator's handles are
             self._weights[smoothing] = torch.as_tensor(np.asarray(weights), dtype=torch.float32)
         return self._weights[smoothing]
 
     def rest(self, betas: np.ndarray | None = None) -> Tensor:
-        """The unposed garment (V, 3) [m] on the body of that shape, before any offset; (N, 10) -> (N, V,
-        3).
+        """Return the unposed garment without offsets, (V, 3) [m], on the body of shape (10,).
+
+        Shapes (N, 10) give (N, V, 3); None is the mean body.
         """
         mean = torch.as_tensor(self.garment.rest_positions, dtype=torch.float32)
         if betas is None:
@@ -77,7 +77,7 @@ class DressedBody:
         return mean + torch.einsum("...s,svi->...vi", shapes, self.rest_directions())
 
     def rest_directions(self) -> Tensor:
-        """What one unit of each shape number adds to the unposed garment, (10, V, 3) [m]."""
+        """Return the displacement of the unposed garment by one unit of each shape number, (10, V, 3) [m]."""
         if self._rest_directions is None:
             # The garment follows the body linearly, so one call for each direction tells all shapes.
             units = np.eye(self.body.shape_count)
@@ -86,12 +86,13 @@ class DressedBody:
         return self._rest_directions
 
     def pelvis(self, motion: Motion, betas: np.ndarray | None = None) -> np.ndarray:
-        """World position of the pelvis in each frame, (T, 3) [m] float64."""
+        """Return the world position of the pelvis in each frame, (T, 3) [m] float64."""
         return self.body.joints(betas)[0] + motion.translations
 
     def transforms(self, poses: np.ndarray, betas: np.ndarray | None = None) -> Tensor:
-        """Rest-to-posed transforms of the joints relative to the pelvis: (T, 24, 3) [rad] -> (T, 24, 3,
-        4).
+        """Return rest-to-posed transforms (T, 24, 3, 4) of the joints, relative to the pelvis.
+
+        poses: (T, 24, 3) [rad].
         """
         home = np.tile(-self.body.joints(betas)[0], (len(poses), 1))
         return torch.from_numpy(self.body.transforms(poses, home, betas)).float()
@@ -102,27 +103,35 @@ class DressedBody:
         recipe: Recipe,
         betas: np.ndarray | None = None,
         *,
-        kind: str = "motion",
+        feature_set: str = "motion",
         still: bool = False,
     ) -> Tensor:
-        """Inputs of a network, (T, D) float32: the pose; for `motion` the root velocity and the shape too,
-        for `pose_shape` the shape, with zeros behind it up to SHAPES numbers, for `history` how root and
-        joints move and moved (snug.networks.inputs).
+        """Return the inputs (T, D) of a network, float32.
 
-        still: as if each pose were held, whatever came before it.
+        Args:
+            motion: its poses, translations and frame rate.
+            recipe: gives the form of the pose and the axes of the velocity.
+            betas: shape numbers; None is the mean body.
+            feature_set: `pose`; `motion`: pose, root velocity and shape; `pose_shape`: pose and shape, with
+                zeros behind it up to SHAPES numbers; `history`: pose and the rates of root and joints, now
+                and before (snug.networks.motion_features).
+            still: as if each pose were held, whatever came before it.
+
+        Raises:
+            ValueError: for an unknown feature set.
         """
-        if kind not in FEATURE_SETS:
-            raise ValueError(f"unknown features {kind!r}: use one of {tuple(FEATURE_SETS)}")
+        if feature_set not in FEATURE_SETS:
+            raise ValueError(f"unknown features {feature_set!r}: use one of {tuple(FEATURE_SETS)}")
         rotations = rotation_matrices(motion.poses)
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
-        if kind == "motion":
+        if feature_set == "motion":
             velocity = _root_velocity(motion, rotations[:, 0], recipe.velocity_frame)
             parts.append(velocity * (not still))
-        if kind == "history":
+        if feature_set == "history":
             parts.append(motion_history(motion) * (not still))
-        if kind in ("motion", "pose_shape"):
+        if feature_set in ("motion", "pose_shape"):
             shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
-            if kind == "pose_shape":
+            if feature_set == "pose_shape":
                 shape = np.pad(shape, (0, SHAPES - len(shape)))
             parts.append(np.broadcast_to(shape, (len(motion.poses), len(shape))))
         return torch.from_numpy(np.concatenate(parts, axis=1).astype(np.float32))
@@ -135,14 +144,14 @@ class DressedBody:
         smoothing: int = 0,
         offsets: Tensor | None = None,
     ) -> np.ndarray:
-        """World vertices (T, V, 3) [m] float64 of the unposed garment plus offsets (T, V, 3), skinned."""
+        """Return world vertices (T, V, 3) [m], float64: the unposed garment plus offsets (T, V, 3), skinned."""
         unposed = self.rest(betas) if offsets is None else self.rest(betas) + offsets
         posed = skin(unposed, self.weights(smoothing), self.transforms(motion.poses, betas))
         return posed.double().numpy() + self.pelvis(motion, betas)[:, None]
 
 
 def _pose_numbers(poses: np.ndarray, rotations: np.ndarray, pose_input: str) -> np.ndarray:
-    """(T, 72) axis-angle numbers, or (T, 141): up direction in the root's axes and 6 numbers a joint.
+    """Return (T, 72) axis-angle numbers, or (T, 141): up in the root's axes and 6 numbers a joint.
 
     Those are the first two columns of its rotation (Zhou et al. 2019, "On the continuity of rotation
     representations in neural networks").
@@ -155,6 +164,6 @@ def _pose_numbers(poses: np.ndarray, rotations: np.ndarray, pose_input: str) -> 
 
 
 def _root_velocity(motion: Motion, root: np.ndarray, frame: str) -> np.ndarray:
-    """Velocity of the root joint, (T, 3) [m/s]; zero in the first frame, which has no past."""
+    """Return the velocity of the root joint, (T, 3) [m/s]; zero in the first frame, which has no past."""
     velocity = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * motion.fps
     return velocity if frame == "world" else np.einsum("tji,tj->ti", root, velocity)

@@ -1,14 +1,13 @@
-"""What a network does in one frame, laid out for the compiled call of snug.kernels.one_frame.
+"""One frame of a network and skinning, laid out for the compiled call of snug.kernels.one_frame.
 
-Each network says it by a method `lay_out(plan)`, in terms of its own modules: its `forward` for one frame.
-All numbers of a frame, the state included, lie in one array. tests/snug/networks/test_one_frame.py holds every kind to
-its `forward`.
+Each network adds its operations by `lay_out(plan)`, in terms of its own modules: its `forward` for one frame.
+All numbers of a frame, the state included, lie in one array. tests/snug/networks/test_one_frame.py compares
+every kind with its `forward`.
 """
 
 from __future__ import annotations
 
 import copy
-from typing import Any
 
 import numpy as np
 import torch
@@ -18,41 +17,51 @@ from snug.kernels.one_frame import (
     ADDED,
     CELL,
     COLUMNS,
-    LANES,
     PRODUCT,
     RECTIFIED,
     ROWS,
     SMOOTH,
+    VERTEX_BLOCK,
     run_frame,
     skin_frame,
 )
+from snug.networks.garment_network import GarmentNetwork
 
 ACTIVATIONS = {nn.Identity: PRODUCT, nn.ReLU: RECTIFIED, nn.SiLU: SMOOTH}
 PRECISIONS = ("float32", "bf16", "int8")  # in which matrices are stored; all else is float32
 
 
 class CompiledFrame:
-    """Skinning of an unposed garment, rest (V, 3) [m], weights (V, J), and before it a network's offsets.
+    """A compiled call that skins an unposed garment, with a network's offsets if there is a network.
 
-    precision: that of the network's matrices in memory, one of PRECISIONS.
+    Args:
+        rest: unposed garment (V, 3) [m].
+        weights: skinning weights (V, J).
+        network: gives the offsets; None skins alone.
+        precision: of the network's matrices in memory, one of PRECISIONS.
     """
 
     def __init__(
-        self, rest: Tensor, weights: Tensor, network: Any = None, *, precision: str = "float32"
+        self,
+        rest: Tensor,
+        weights: Tensor,
+        network: GarmentNetwork | None = None,
+        *,
+        precision: str = "float32",
     ) -> None:
-        order, *moved = _blocks(weights.numpy())
-        unposed = np.zeros((3, LANES * (len(moved[0]) - 1)), np.float32)
+        order, *joints = _blocks(weights.numpy())
+        unposed = np.zeros((3, VERTEX_BLOCK * (len(joints[0]) - 1)), np.float32)
         unposed[:, : len(order)] = rest.numpy()[order].T
         plan = FramePlan(order, unposed.shape[1], precision)
         if network is not None:
             network.lay_out(plan)
-        self._laid = None if network is None else plan.laid()
-        self._skinned = unposed, *moved, order
-        self._numbers = plan.numbers
+        self._operations = None if network is None else plan.operations()
+        self._skinning = unposed, *joints, order
+        self._size = plan.size
 
     def start(self) -> np.ndarray:
-        """What a roll-out works on and keeps its state in, which is zero."""
-        return np.zeros(self._numbers, np.float32)
+        """Return a fresh working array, whose state is zero."""
+        return np.zeros(self._size, np.float32)
 
     def __call__(
         self,
@@ -62,25 +71,34 @@ class CompiledFrame:
         work: np.ndarray,
         out: np.ndarray,
     ) -> None:
-        """World vertices into `out` (V, 3) [m], float64, and the state after this frame into `work`.
+        """Write the world vertices into `out`, and the state after this frame into `work`.
 
-        features (D,), none without a network, and transforms (J, 3, 4) are float32, pelvis (3,) [m] is
-        float64.
+        Args:
+            features: (D,) float32; unused without a network.
+            transforms: of the joints, (J, 3, 4) float32.
+            pelvis: (3,) [m] float64.
+            work: array of `start`, or as the frame before left it.
+            out: (V, 3) [m] float64.
         """
-        if self._laid is None:  # who skins alone compiles no more than that
-            skin_frame(work, *self._skinned, transforms, pelvis, out)
+        if self._operations is None:  # without a network no more than skinning is compiled
+            skin_frame(work, *self._skinning, transforms, pelvis, out)
         else:
-            run_frame(*self._laid, features, *self._skinned, transforms, pelvis, work, out)
+            run_frame(*self._operations, features, *self._skinning, transforms, pelvis, work, out)
 
 
 class FramePlan:
-    """The operations of one frame. order (V,): vertices as they are skinned; padded: places for them.
+    """The operations of one frame, and the array of all its numbers.
 
-    Places of numbers are slices of the one array. Matrices are stored in the order in which they are named.
+    Places of numbers are slices of that array. Matrices are stored in the order in which they are named.
+
+    Args:
+        order: vertices (V,) as they are skinned.
+        padded: number of vertices, filled up to whole blocks.
+        precision: of the matrices, one of PRECISIONS.
     """
 
     def __init__(self, order: np.ndarray, padded: int, precision: str) -> None:
-        self._precision, self._room = precision, 0
+        self._precision, self._used = precision, 0
         self._places = np.full(padded, len(order))
         self._places[: len(order)] = order
         self._operations: list[tuple[int, ...]] = []
@@ -88,28 +106,28 @@ class FramePlan:
         self._terms: list[np.ndarray] = []
 
     @property
-    def numbers(self) -> int:
-        """Of a frame: all that was given a place, and the offsets behind."""
-        return self._room + 3 * len(self._places)
+    def size(self) -> int:
+        """Length of the array: all numbers that have a place, and the offsets behind them."""
+        return self._used + 3 * len(self._places)
 
-    def laid(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Operations, weights and terms as snug.kernels.one_frame.run_frame takes them."""
+    def operations(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return operations, weights and terms as snug.kernels.one_frame.run_frame takes them."""
         operations = np.array(self._operations, np.int64)
         return operations, np.concatenate(self._matrices), np.concatenate(self._terms)
 
-    def normalised(self, network: Any) -> slice:
-        """The features by the network's mean and spread. It comes first."""
+    def normalised(self, network: GarmentNetwork) -> slice:
+        """Add the features less the network's mean, over its spread; to be called first."""
         self._terms += [network.input_mean.numpy(), network.input_std.numpy()]
         return self._place(len(network.input_mean))
 
-    def linear(self, layer: Any, x: slice, activation: type[nn.Module] = nn.Identity) -> slice:
-        """A torch.nn.Linear of the numbers at x, and of that one of ACTIVATIONS."""
+    def linear(self, layer: nn.Linear, x: slice, activation: type[nn.Module] = nn.Identity) -> slice:
+        """Add a linear layer of the numbers at x, followed by one of ACTIVATIONS."""
         target = self._place(layer.out_features)
         self._product(ACTIVATIONS[activation], *_numbers_of(layer), x, target.start)
         return target
 
     def gru(self, gru: nn.GRU, x: slice) -> slice:
-        """Recurrent units of the numbers at x: the new state of the last layer."""
+        """Add recurrent units of the numbers at x; return the place of the last layer's new state."""
         size = gru.hidden_size
         inputs, recurrent = self._place(3 * size), self._place(3 * size)
         for layer in gru.all_weights:
@@ -121,20 +139,20 @@ class FramePlan:
             x = state
         return x
 
-    def offsets(self, network: Any, *parts: tuple[Any, slice]) -> None:
-        """The network's answer, (3 V,) by these layers of the numbers there, summed. It comes last."""
+    def offsets(self, network: GarmentNetwork, *parts: tuple[nn.Linear, slice]) -> None:
+        """Add the offsets (3 V,), the sum of these layers of the numbers at their places; to be called last."""
         places, vertices = self._places.copy(), network.vertices
         places[np.isin(places, network.pins)] = vertices  # as those behind: without offset
         rows = (3 * places + np.arange(3)[:, None]).ravel()
         for kind, (layer, x) in zip((PRODUCT, *[ADDED] * len(parts)), parts):
             matrix, bias = _numbers_of(layer)
             matrix, bias = np.pad(matrix, ((0, 3), (0, 0)))[rows], np.pad(bias, (0, 3))[rows]
-            self._product(kind, matrix, bias, x, self._room, scale=network.output_scale)
+            self._product(kind, matrix, bias, x, self._used, scale=network.output_scale)
 
     def _place(self, size: int) -> slice:
-        """For so many numbers. Those behind them stay zero: matrices are read in whole vectors."""
-        start = self._room
-        self._room += _up(size + ROWS, COLUMNS)
+        """Reserve a place for `size` numbers; those behind stay zero, as matrices are read in whole vectors."""
+        start = self._used
+        self._used += _up(size + ROWS, COLUMNS)
         return slice(start, start + size)
 
     def _product(
@@ -151,9 +169,9 @@ class FramePlan:
 
 
 def stored(matrix: np.ndarray, precision: str) -> tuple[np.ndarray, np.ndarray]:
-    """A matrix (m, n) of float32 as it lies in memory, and the factor of each row (m,).
+    """Return a float32 matrix (m, n) in its stored form, and the factor of each row (m,).
 
-    Raises ValueError for none of PRECISIONS.
+    Raises ValueError for an unknown precision.
     """
     if precision not in PRECISIONS:
         raise ValueError(f"unknown precision {precision!r}: use one of {', '.join(PRECISIONS)}")
@@ -167,8 +185,8 @@ def stored(matrix: np.ndarray, precision: str) -> tuple[np.ndarray, np.ndarray]:
     return np.rint(matrix / factors[:, None]).astype(np.int8), factors
 
 
-def rounded(network: Any, precision: str) -> Any:
-    """A copy of the network whose matrices are what is `stored` of its own."""
+def rounded(network: GarmentNetwork, precision: str) -> GarmentNetwork:
+    """Return a copy of the network with its matrices rounded to a precision."""
     network = copy.deepcopy(network)
     for parameter in network.parameters():
         if parameter.ndim == 2 and precision != "float32":
@@ -179,21 +197,23 @@ def rounded(network: Any, precision: str) -> Any:
     return network
 
 
-def _numbers_of(layer: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Matrix (m, n) and bias (m,) of a torch.nn.Linear."""
+def _numbers_of(layer: nn.Linear) -> tuple[np.ndarray, np.ndarray]:
+    """Return matrix (m, n) and bias (m,) of a linear layer."""
     bias = torch.zeros(layer.out_features) if layer.bias is None else layer.bias.detach()
     return layer.weight.detach().numpy(), bias.numpy()
 
 
 def _blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Skinning by blocks of LANES vertices and the joints that move any of them, weights (V, J): order (V,)
-    of the vertices, first of the joints of each block (B + 1,), joints (E,), their shares (E, LANES).
+    """Sort vertices into blocks of VERTEX_BLOCK, and find the joints that move any vertex of a block.
+
+    weights (V, J) -> order (V,) of the vertices, first of the joints of each block (B + 1,), joints (E,),
+    their shares (E, VERTEX_BLOCK).
     """
     main = np.argsort(-weights, axis=1, kind="stable")
     order = np.lexsort((main[:, 1], main[:, 0]))  # so that a block has few joints
-    padded = np.zeros((_up(len(order), LANES), weights.shape[1]), np.float32)
+    padded = np.zeros((_up(len(order), VERTEX_BLOCK), weights.shape[1]), np.float32)
     padded[: len(order)] = weights[order]
-    blocks = padded.reshape(-1, LANES, weights.shape[1])
+    blocks = padded.reshape(-1, VERTEX_BLOCK, weights.shape[1])
     block, joints = np.nonzero(blocks.any(axis=1))
     first = np.searchsorted(block, np.arange(len(blocks) + 1))
     return order, first, joints, np.ascontiguousarray(blocks[block, :, joints])

@@ -11,57 +11,46 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-import torch
 from torch import Tensor, nn
 
 from snug.kernels.gru import run_linear
-from snug.networks.regressor import Regressor
+from snug.networks.garment_network import GarmentNetwork, zero
 
 if TYPE_CHECKING:
     from snug.networks.one_frame import FramePlan
 
 
-class PoseSpaceDeformation(nn.Module):
-    """features (N, T, D) -> offsets (N, T, V, 3) [m]; the state is always None. Called as a Regressor is."""
+class PoseSpaceDeformation(GarmentNetwork):
+    """A perceptron and a matrix of deformations, without a state."""
 
+    feature_set = "pose"
+    sequential = False
     widths: tuple[int, ...] = (32,) * 4
     activation: type[nn.Module] = nn.ReLU
     constant = False  # whether there is a deformation in every pose
-    closed_form = False
 
     def __init__(
         self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
     ) -> None:
-        super().__init__()
-        self.vertices, self.output_scale = vertices, output_scale
-        self.input_mean: Tensor
-        self.input_std: Tensor
-        self.register_buffer("input_mean", torch.zeros(inputs))
-        self.register_buffer("input_std", torch.ones(inputs))
+        super().__init__(inputs, vertices, output_scale=output_scale)
         sizes = pairwise((inputs, *self.widths))
         layers = [layer for a, b in sizes for layer in (nn.Linear(a, b), self.activation())]
         self.activations = nn.Sequential(*layers)
         # The deformation matrix, (width, V, 3) flattened.
         self.offsets = nn.Linear(self.widths[-1], 3 * vertices, bias=self.constant)
         if zero_last_layer:
-            for parameter in self.offsets.parameters():
-                nn.init.zeros_(parameter)
-
-    normalise_by = Regressor.normalise_by
+            zero(self.offsets)
 
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
-        normalised = (features - self.input_mean) / self.input_std  # (N, T, D)
-        hidden = self.activations(normalised)
+        """Return offsets (N, T, V, 3) [m] and no state."""
+        hidden = self.activations(self.normalise(features))
         flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), None
 
     def lay_out(self, plan: FramePlan) -> None:
-        """`forward` for one frame."""
+        """Add the operations of `forward` for one frame to the plan."""
         x = plan.normalised(self)
         for layer in self.activations:
             if isinstance(layer, nn.Linear):
                 x = plan.linear(layer, x, self.activation)
         plan.offsets(self, (self.offsets, x))
-
-    def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> None:
-        """A static network has no state."""

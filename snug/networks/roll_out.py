@@ -1,14 +1,14 @@
-"""Run a trained network over a motion, one frame at a time, as an application would.
+"""Roll-outs: a trained network run over a motion, one frame at a time, as an application would.
 
-Times of frames are those of network and skinning, one compiled call each (snug.networks.one_frame); `frame_inputs`
-makes what they take as ready. Many bodies at once go through torch.
+Times of frames are those of network and skinning, one compiled call each (snug.networks.one_frame); their
+inputs come from `prepare_frame_inputs`. Many bodies at once go through torch.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from itertools import count
 
 import numpy as np
 import torch
@@ -16,14 +16,12 @@ from torch import Tensor
 
 from reference_sim.trajectory.trajectory import Trajectory
 from snug.body.skinning import skin
+from snug.motion.motion import Motion
 from snug.networks.dressed_body import FEATURE_SETS, DressedBody
 from snug.networks.one_frame import CompiledFrame
-from snug.networks.trained_model import TrainedModel, find_kind
+from snug.networks.trained_model import TrainedModel
 
-if TYPE_CHECKING:
-    from snug.motion.motion import Motion
-
-WARM_UP = 10  # frames run and thrown away, before whoever times the rest starts a clock
+WARM_UP = 10  # frames computed and thrown away, before the caller starts a clock
 QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
 
 
@@ -39,14 +37,27 @@ def roll_out(
     *,
     quasi_static: bool = False,
 ) -> Trajectory:
-    """Positions (T, V, 3) [m], world, float64; the state starts at zero and is carried from frame to frame.
+    """Compute the garment's positions in each frame of a motion.
 
-    Inputs and joint transforms are ready before the first frame. quasi_static gives instead, for each frame,
-    the output after that pose was held still for a second: what the network thinks is static; nothing of it
-    is timed. Raises RollOutError.
+    The state starts at zero and is carried from frame to frame. Inputs and joint transforms are ready before
+    the first frame, so that the frames' times are those of network and skinning.
+
+    Args:
+        model: a trained network.
+        dressed: the body and the garment that the model was trained for.
+        motion: T frames.
+        betas: shape numbers of the body; None is the mean body.
+        quasi_static: give instead, for each frame, the output after that pose was held still for a second:
+            the network's static answer. Nothing of it is timed.
+
+    Returns:
+        World positions (T, V, 3) [m], float64; status `diverged` if one is not finite.
+
+    Raises:
+        RollOutError: if the model does not fit the garment or the motion.
     """
     if not quasi_static:
-        return ready_to_roll_out(model, dressed, motion, betas)()
+        return prepare_roll_out(model, dressed, motion, betas)()
     features = _features(model, dressed, motion, betas, still=True)
     rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
     posed = _quasi_static(model, features, rest, weights, dressed.transforms(motion.poses, betas))
@@ -54,38 +65,49 @@ def roll_out(
     return _trajectory(model, dressed, motion, positions, np.arange(motion.frames))
 
 
-def ready_to_roll_out(
+def prepare_roll_out(
     model: TrainedModel,
     dressed: DressedBody,
     motion: Motion,
     betas: np.ndarray | None = None,
     *,
     kept: np.ndarray | None = None,
-    before: Any = None,
-    then: Callable[[np.ndarray, int], np.ndarray] | None = None,
+    earlier: Motion | None = None,
+    postprocess: Callable[[np.ndarray, int], np.ndarray] | None = None,
 ) -> Callable[[], Trajectory]:
-    """What gives the trajectory of `roll_out` whenever it is called: all that comes before is done here.
+    """Do all that comes before the first frame; return a function that gives the trajectory of `roll_out`.
 
-    kept: the frames that the trajectory holds, or None for all; every one is computed. before: as in
-    `predictions`. then: what is done with each frame, (V, 3) [m], and its number. Raises RollOutError.
+    Args:
+        model: a trained network.
+        dressed: body and garment.
+        motion: T frames.
+        betas: shape numbers of the body.
+        kept: numbers of the frames that the trajectory holds, or None for all; every one is computed.
+        earlier: the motion before this one, see `prepare_frames`.
+        postprocess: applied to each frame's positions (V, 3) [m] and number.
+
+    Raises:
+        RollOutError: if the model does not fit.
     """
-    frames = predictions(model, dressed, motion, betas, before=before)
+    frames = prepare_frames(model, dressed, motion, betas, earlier=earlier)
     held = np.arange(motion.frames) if kept is None else kept
 
     def run() -> Trajectory:
-        given = frames() if then is None else (then(x, frame) for frame, x in enumerate(frames()))
-        positions, seconds = collected(given, held)
+        answers = frames()
+        if postprocess is not None:
+            answers = map(postprocess, answers, count())
+        positions, seconds = collect_frames(answers, held)
         return _trajectory(model, dressed, motion, positions, held, seconds)
 
     return run
 
 
-def ready_for_many(
+def prepare_batch(
     model: TrainedModel, dressed: DressedBody, motion: Motion, *, copies: int
 ) -> Callable[[], np.ndarray]:
-    """What computes, when called, `copies` bodies in that motion at once: (T, copies, V, 3) [m], float32.
+    """Return a function that computes `copies` bodies in that motion at once, (T, copies, V, 3) [m], float32.
 
-    About the pelvis. Frame follows frame, as the state is carried. Raises RollOutError.
+    Positions are relative to the pelvis. Frame follows frame, as the state is carried. Raises RollOutError.
     """
     features = _features(model, dressed, motion, None)[:, None, None].expand(-1, copies, -1, -1)
     rest, weights = dressed.rest(), dressed.weights(model.recipe.smoothing)
@@ -103,15 +125,13 @@ def ready_for_many(
     return run
 
 
-def collected(frames: Iterator[np.ndarray], held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of frames (V, 3) computed when asked for, those that `held` (T,) names, (T, V, 3), and the time of each
-    (T,) [s]; every one is computed.
-    """
-    places, seconds = {int(frame): place for place, frame in enumerate(held)}, np.empty(len(held))
+def collect_frames(frames: Iterator[np.ndarray], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute all frames (V, 3); return those with numbers `kept` (T,), (T, V, 3), and their times (T,) [s]."""
+    places, seconds = {int(frame): place for place, frame in enumerate(kept)}, np.empty(len(kept))
     positions, clock = np.empty(0), time.perf_counter()
     for frame, x in enumerate(frames):
         if not len(positions):
-            positions = np.empty((len(held), *x.shape))
+            positions = np.empty((len(kept), *x.shape))
         before, clock = clock, time.perf_counter()
         if frame in places:
             positions[places[frame]], seconds[places[frame]] = x, clock - before
@@ -126,7 +146,7 @@ def _trajectory(
     held: np.ndarray,
     seconds: np.ndarray | None = None,
 ) -> Trajectory:
-    """World positions (T, V, 3) [m] of those frames of the motion."""
+    """Return the trajectory of world positions (T, V, 3) [m] of the frames `held` of the motion."""
     finite = bool(np.isfinite(positions).all())
     return Trajectory(
         positions=positions,
@@ -145,54 +165,62 @@ def _trajectory(
     )
 
 
-def predictions(
+def prepare_frames(
     model: TrainedModel,
     dressed: DressedBody,
     motion: Motion,
     betas: np.ndarray | None = None,
     *,
-    before: Any = None,
+    earlier: Motion | None = None,
 ) -> Callable[[], Iterator[np.ndarray]]:
-    """What begins `roll_out` anew whenever it is called: its frames one at a time, (V, 3) [m], world,
-    float64, each computed when asked for.
+    """Return a function that starts the frames of `roll_out`, each (V, 3) [m], computed when asked for.
 
-    before: the motion until then, or None; it is known to the inputs, and the state that it leaves is the
-    first one. That, inputs and joint transforms are made, and the network warmed up, before this returns.
-    Raises RollOutError.
+    Inputs and joint transforms are made, and the network warmed up, before this returns.
+
+    Args:
+        model: a trained network.
+        dressed: body and garment.
+        motion: T frames.
+        betas: shape numbers of the body.
+        earlier: the motion before this one, or None. The inputs know it, and the roll-out starts from the
+            state that it leaves.
+
+    Raises:
+        RollOutError: if the model does not fit.
     """
-    whole = _joined(before, motion)
-    features = _features(model, dressed, whole, betas).numpy()
+    features = _features(model, dressed, _joined(earlier, motion), betas).numpy()
     frame = CompiledFrame(
         dressed.rest(betas), dressed.weights(model.recipe.smoothing), model.network, precision=model.precision
     )
     return _one_by_one(frame, features, dressed, motion, betas)
 
 
-def skinned_frames(
+def prepare_skinned_frames(
     dressed: DressedBody, motion: Motion, smoothing: int, betas: np.ndarray | None = None
 ) -> Callable[[], Iterator[np.ndarray]]:
-    """As `predictions`, of skinning alone, with weights smoothed by that many sweeps."""
+    """Prepare frames as `prepare_frames`, of skinning alone, with weights smoothed by that many sweeps."""
     nothing = np.empty((motion.frames, 0), np.float32)
     frame = CompiledFrame(dressed.rest(betas), dressed.weights(smoothing))
     return _one_by_one(frame, nothing, dressed, motion, betas)
 
 
-def frame_inputs(
+def prepare_frame_inputs(
     model: TrainedModel | None,
     dressed: DressedBody,
     motion: Motion,
     betas: np.ndarray | None = None,
     *,
-    before: Any = None,
+    earlier: Motion | None = None,
 ) -> Callable[[int], tuple[Tensor | None, Tensor, np.ndarray]]:
-    """What makes the inputs of one frame, as an application does, which has its pose and those before it.
+    """Return a function that makes one frame's inputs from its pose and those before, as an application does.
 
-    Features (D,), none without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: those of the frame
-    that `predictions` and `skinned_frames` make for all frames at once. Raises RollOutError.
+    It gives features (D,), or None without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: the same
+    numbers that `prepare_frames` and `prepare_skinned_frames` make for all frames at once. Raises
+    RollOutError.
     """
-    whole = _joined(before, motion)
+    whole = _joined(earlier, motion)
     first = whole.frames - motion.frames
-    past = 0 if model is None else FEATURE_SETS[find_kind(model.kind).features]
+    past = 0 if model is None else FEATURE_SETS[model.network.feature_set]
 
     def inputs(frame: int) -> tuple[Tensor | None, Tensor, np.ndarray]:
         now = motion.cut(frame, frame + 1)
@@ -205,8 +233,8 @@ def frame_inputs(
     return inputs
 
 
-def _joined(before: Motion | None, motion: Motion) -> Motion:
-    return motion if before is None else before.followed_by(motion)
+def _joined(earlier: Motion | None, motion: Motion) -> Motion:
+    return motion if earlier is None else earlier.followed_by(motion)
 
 
 def _features(
@@ -217,11 +245,12 @@ def _features(
     *,
     still: bool = False,
 ) -> Tensor:
-    """The network's inputs (T, D). Raises RollOutError where the model does not fit."""
+    """Return the network's inputs (T, D). Raises RollOutError if the model does not fit."""
     if model.vertices != dressed.vertices:
         raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
-    kind = find_kind(model.kind)
-    features = dressed.features(motion, model.recipe, betas, kind=kind.features, still=still)
+    features = dressed.features(
+        motion, model.recipe, betas, feature_set=model.network.feature_set, still=still
+    )
     inputs = model.network.input_mean.shape[0]
     if features.shape[1] != inputs:
         raise RollOutError(
@@ -231,11 +260,13 @@ def _features(
 
 
 def _one_by_one(
-    frame: CompiledFrame, features: np.ndarray, dressed: DressedBody, motion: Motion, betas: np.ndarray | None
+    frame: CompiledFrame,
+    features: np.ndarray,
+    dressed: DressedBody,
+    motion: Motion,
+    betas: np.ndarray | None,
 ) -> Callable[[], Iterator[np.ndarray]]:
-    """What begins the frames of the motion anew, from the state that earlier features leave; it is compiled
-    and warmed up at once.
-    """
+    """Compile and warm up; return a function that starts the frames from the state of earlier features."""
     transforms, pelvis = dressed.transforms(motion.poses, betas).numpy(), dressed.pelvis(motion, betas)
     past, features = features[: -motion.frames], features[-motion.frames :]
     start, out = frame.start(), np.empty((dressed.vertices, 3))
@@ -258,8 +289,8 @@ def _one_by_one(
 def _quasi_static(
     model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
 ) -> np.ndarray:
-    """All frames as a batch, each pose repeated."""
+    """Return the last output of all frames as a batch, each pose repeated."""
     state = None
-    for _ in range(QUASI_STATIC_FRAMES if find_kind(model.kind).sequences else 1):
+    for _ in range(QUASI_STATIC_FRAMES if model.network.sequential else 1):
         offsets, state = model.network(features[:, None], state)
     return skin(rest + offsets[:, 0], weights, transforms).numpy()

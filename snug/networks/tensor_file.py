@@ -13,7 +13,7 @@ from torch import Tensor
 from reference_sim.files.atomic_files import replacing
 
 HEADER = "snug"  # name of our entry in the file's header
-DIGEST = "digest"  # in it: of everything else in the file
+DIGEST = "digest"  # entry of the header: of everything else in the file
 
 
 class TensorFileError(ValueError):
@@ -21,7 +21,10 @@ class TensorFileError(ValueError):
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> Path:
-    """Write beside the place and move there: a reader, or a kill at any moment, finds a whole file."""
+    """Write the file beside its place and move it there; return its path.
+
+    A reader, or a kill at any moment, finds a whole file.
+    """
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     with replacing(path) as unfinished:
         # By Python: what the library raises on a full disk does not say that it was that.
@@ -30,7 +33,7 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Tensors and header. Raises TensorFileError for a missing, broken, changed or foreign file."""
+    """Read tensors and header. Raises TensorFileError for a missing, broken, changed or foreign file."""
     from safetensors import SafetensorError, safe_open
 
     if not path.is_file():

@@ -49,17 +49,17 @@ class Recipe:
     contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
     contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most one
         of each window; in between anchors walk with the cloth.
-    mixed: frames of mixed motions (snug.training.motion_augmentation) for each frame of a training motion, up to
+    mixed: frames of mixed motions (snug.training.augmentation.mixed_clips) for each frame of a training motion, up to
         20,000; not for what learns simulated vertices. mixed_turn [rad], mixed_lift: see there.
     terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
         snug.recipes.energies. Leaving one out is an ablation, and it is then never evaluated.
     material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
-        (edges, hinges, uniform mass and squared contact of PBNS, see snug.training.pbns_material; it has its own
+        (edges, hinges, uniform mass and squared contact of PBNS, see snug.training.losses.pbns_material; it has its own
         stiffness and margin of contact).
     bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints them; of
         no account with material `pbns`.
     pretraining: updates before those by the energies, for a network that learns from a simulated past, see
-        snug.training.simulated_past.
+        snug.training.losses.simulated_past.
     spike: a window above this many joules a frame is named and counted, and its step's gradient clipped; what
         else is done about such batches: see snug.training.divergence_guard.
     gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.

@@ -24,7 +24,7 @@ from snug.motion.motion import Motion
 if TYPE_CHECKING:
     from snug.body.parametric_body import Body
     from snug.garments.garment import Garment
-    from snug.training.vertex_targets import StoredVertices
+    from snug.training.losses.vertex_targets import StoredVertices
 
 INDEX, FORMAT = "dataset.json", 1
 MISSING = "missing"  # status of a sequence that was asked for and is not there yet
@@ -116,7 +116,7 @@ class DataSet:
 
     def targets(self) -> dict[str, StoredVertices]:
         """Name -> the vertices of each usable sequence; they stay in their files."""
-        from snug.training.vertex_targets import StoredVertices
+        from snug.training.losses.vertex_targets import StoredVertices
 
         count = int(self.settings["vertices"])
         return {

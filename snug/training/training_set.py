@@ -72,7 +72,7 @@ class TrainingSet:
         self.first = np.cumsum([0, *(len(motion.poses) for motion in motions)])
         self.shapes = shapes
         worn = list(zip(motions, [None] * len(motions) if shapes is None else shapes))
-        inputs = [dressed.features(motion, recipe, betas, kind=features) for motion, betas in worn]
+        inputs = [dressed.features(motion, recipe, betas, feature_set=features) for motion, betas in worn]
         self.features = torch.cat(inputs).to(device)
         self.transforms = torch.cat([dressed.transforms(m.poses, betas) for m, betas in worn]).to(device)
         self.ahead = torch.cat([_ahead(dressed.pelvis(m)) for m in motions]).to(device)

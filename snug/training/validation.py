@@ -1,9 +1,9 @@
-"""How well a network does on motions held out of its training: full roll-outs from a state of zero.
+"""Validation on motions held out of training: full roll-outs from a state of zero.
 
-Windows see three frames at a time; what a user sees is a roll-out. So held-out motions are
-rolled out whole, and their mean energy a frame is the value that early stopping watches. Contact anchors are
-searched anew at every validation: those of an earlier one claim contacts that are none, by up to a fifth of
-the value, and the first validation, which has none, would look best. Nothing is random.
+Windows see three frames at a time; a user sees roll-outs. So held-out motions are rolled out whole, and their
+mean energy a frame is the value that early stopping watches. Contact anchors are searched anew at every
+validation: those of an earlier one claim contacts that are none, by up to a fifth of the value, and the first
+validation, which has none, would look best. Nothing is random.
 """
 
 from __future__ import annotations
@@ -17,19 +17,23 @@ import torch
 from torch import Tensor
 
 from snug.body.skinning import skin
+from snug.motion.motion import Motion
 from snug.training.training_set import Batch, TrainingError, TrainingSet
 
 if TYPE_CHECKING:
-    from snug.motion.motion import Motion
-    from snug.training.trainer import Trainer
-    from snug.training.vertex_targets import Targets
+    from snug.training.losses.vertex_targets import Targets
+    from snug.training.optimisation_step import Trainer
 
 
 @dataclass(frozen=True, kw_only=True)
 class Validation:
-    """motions: none of them may be a training motion, and none a test motion. every: steps between two
-    validations. patience: validations without a better value, after which training stops; 0 never stops.
-    trajectories: as for training, for the kinds that simulated vertices teach.
+    """When to validate, and with which motions.
+
+    Attributes:
+        motions: none of them may be a training motion, and none a test motion.
+        every: steps between two validations.
+        patience: validations without a better value, after which training stops; 0 never stops.
+        trajectories: as for training, for the kinds that learn simulated vertices.
     """
 
     motions: Sequence[Motion]
@@ -39,7 +43,7 @@ class Validation:
 
 
 class Validator:
-    """Values of one trainer's network. Raises TrainingError where the motions are of no use for it."""
+    """The validation of one trainer's network. Raises TrainingError for motions that do not fit it."""
 
     def __init__(self, trainer: Trainer, validation: Validation) -> None:
         names = {motion.name for motion in validation.motions} & set(trainer.data.names)
@@ -50,7 +54,7 @@ class Validator:
         self.trainer = trainer
         how, motions = trainer.how, validation.motions
         self.data = TrainingSet(
-            trainer.dressed, motions, trainer.recipe, features=how.features, sequences=how.sequences,
+            trainer.dressed, motions, trainer.recipe, features=how.network.feature_set, sequences=how.network.sequential,
             device=trainer.device,
         )  # fmt: skip
         if self.data.dt != trainer.data.dt:
@@ -65,11 +69,11 @@ class Validator:
 
     @torch.no_grad()
     def value(self) -> float:
-        """Mean over all frames of the sum of the loss's terms [J], or what the simulated vertices give."""
+        """Return the loss, mean over all frames, in the unit of the kind."""
         total = 0.0
         for first, end in zip(self.data.first[:-1], self.data.first[1:]):
             # One long window, or, for a static network, windows of one frame: it has no inertia.
-            rows = np.arange(first, end).reshape((1, -1) if self.trainer.how.sequences else (-1, 1))
+            rows = np.arange(first, end).reshape((1, -1) if self.trainer.how.network.sequential else (-1, 1))
             total += float(torch.stack(list(self._terms(self.data.at(rows)).values())).sum())
         return self.trainer.group.agreed(total / self.data.frames)
 

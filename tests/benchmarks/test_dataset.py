@@ -23,10 +23,11 @@ from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.tensor_file import TensorFileError
 from snug.recipes.named import RECIPE_OF_KIND
-from snug.training.run import Interrupted, Saving
+from snug.training.checkpoint import Checkpoint
+from snug.training.losses.vertex_targets import TargetError
 from snug.training.simulated_data import INDEX, MISSING, DataSet, DataSetError, settings_of
-from snug.training.train import train
-from snug.training.vertex_targets import TargetError
+from snug.training.train_network import train_network
+from snug.training.training_loop import Interrupted
 from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.project.own_memory import children, needs_proc, own_memory
 from tests.snug.training.dressing import tube_dress
@@ -322,7 +323,7 @@ def taught(built: Path, kind: str, *, stored: bool, steps: int = 3, **options):
         trajectories = {
             line.name: Trajectory.load(built / line.trajectory).positions for line in found.sequences
         }
-    return train(
+    return train_network(
         kind, tube_dress(), found.motions(), steps=steps, seed=0, recipe=RECIPE_OF_KIND[kind],
         trajectories=trajectories, progress=False, every=1, **options,
     )  # fmt: skip
@@ -337,15 +338,17 @@ def test_files_teach_the_same_as_memory_to_the_last_bit(built, kind):
 
 
 def test_a_training_from_files_goes_on_only_with_the_same_files(built, mine, tmp_path):
-    saving = Saving(path=tmp_path / "c.safetensors", resume=True)
+    checkpoint = Checkpoint(path=tmp_path / "c.safetensors", resume=True)
     count = iter(range(10))
     with pytest.raises(Interrupted):
-        taught(built, "supervised", stored=True, steps=4, saving=saving, stop=lambda: next(count) == 1)
+        taught(
+            built, "supervised", stored=True, steps=4, checkpoint=checkpoint, stop=lambda: next(count) == 1
+        )
     whole, resumed = taught(built, "supervised", stored=True, steps=4), None
     _index(mine, lambda i: i["sequences"][0]["digests"].update({i["sequences"][0]["vertices"]: "0"}))
     with pytest.raises(TensorFileError, match="another data"):
-        taught(mine, "supervised", stored=True, steps=4, saving=saving)
-    resumed = taught(built, "supervised", stored=True, steps=4, saving=saving)
+        taught(mine, "supervised", stored=True, steps=4, checkpoint=checkpoint)
+    resumed = taught(built, "supervised", stored=True, steps=4, checkpoint=checkpoint)
     for name, tensor in whole.network.state_dict().items():
         assert tensor.equal(resumed.network.state_dict()[name]), name
 
@@ -379,7 +382,7 @@ def test_the_command_learns_from_a_data_set(built, tube, tmp_path, capsys):
         assert train_command.main([*given, "--vertices", "300"]) == 2
         assert "another garment: tube there, tshirt here" in capsys.readouterr().err
     for words, said in (
-        (["--model", "supervised"], "is taught by simulations; add --dataset DIR"),
+        (["--model", "supervised"], "learns from simulations; add --dataset DIR"),
         (["--dataset", "x", "--motions", "y"], "leave out --motions"),
         (["--dataset", "x", "--model", "tailornet", "--recipe", "paper"], "leave out --recipe"),
         (["--dataset", str(tmp_path)], "no such file"),

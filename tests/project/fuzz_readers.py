@@ -40,8 +40,9 @@ from snug.body.skeleton import BodyError
 from snug.body.smpl_files import read_body
 from snug.motion.files import load_motions
 from snug.motion.motion import MotionError
+from snug.networks.architectures import make_network
 from snug.networks.tensor_file import read_tensors, write_tensors
-from snug.networks.trained_model import ModelFileError, TrainedModel, make_network
+from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipes.recipe import DEFAULT
 from tests.reports.report_folder import SCENES, all_rows, declaration
 from tests.snug.motion.cmu_clips import amc_frame, cmu_like

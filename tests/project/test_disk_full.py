@@ -27,8 +27,8 @@ from reference_sim.files.array_file import write_array
 from reference_sim.files.atomic_files import disk_full, new_folder, replacing
 from reference_sim.trajectory.writer import ROOM
 from snug.networks.tensor_file import read_tensors, write_tensors
-from snug.training import run as training_run
-from snug.training.run import Saving
+from snug.training import checkpoint as checkpoints
+from snug.training.checkpoint import Checkpoint
 from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.reference_sim.meshes import grid
 from tests.reference_sim.trajectory.test_trajectory import wave
@@ -129,7 +129,7 @@ def test_a_simulation_stops_in_one_line_and_resumes_to_the_same_bits(tmp_path, m
 
 def test_a_training_keeps_its_last_checkpoint(tmp_path, monkeypatch):
     whole, path = short(steps=12), tmp_path / "run.safetensors"
-    write, saved = training_run.write_tensors, []
+    write, saved = checkpoints.write_tensors, []
 
     def second_is_too_large(place, tensors, header):
         saved.append(header["done"])
@@ -137,12 +137,12 @@ def test_a_training_keeps_its_last_checkpoint(tmp_path, monkeypatch):
             return write(place, tensors, header)
 
     with monkeypatch.context() as patch:
-        patch.setattr(training_run, "write_tensors", second_is_too_large)
+        patch.setattr(checkpoints, "write_tensors", second_is_too_large)
         with pytest.raises(OSError, match="File too large") as full:
-            short(steps=12, saving=Saving(path=path, steps=4))
+            short(steps=12, checkpoint=Checkpoint(path=path, steps=4))
     assert saved == [4, 8] and disk_full(full.value).startswith(f"{path}: ")
     assert os.listdir(tmp_path) == ["run.safetensors"] and read_tensors(path)[1]["done"] == 4
-    same_model(short(steps=12, saving=Saving(path=path, steps=4, resume=True)), whole)
+    same_model(short(steps=12, checkpoint=Checkpoint(path=path, steps=4, resume=True)), whole)
 
 
 def in_process(folder, assets, workers) -> InProcess:

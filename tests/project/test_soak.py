@@ -10,8 +10,8 @@ import pytest
 from reference_sim import Cloth, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Gravity, StretchStVK
 from snug.recipes.recipe import DEFAULT
-from snug.training.run import Saving
-from snug.training.train import train
+from snug.training.checkpoint import Checkpoint
+from snug.training.train_network import train_network
 from tests.project.own_memory import needs_proc, own_memory, slope
 from tests.reference_sim.meshes import grid, sphere
 from tests.snug.training.dressing import swaying, tube_dress
@@ -67,9 +67,9 @@ def test_a_training_of_many_steps_keeps_its_history_alone(tmp_path):
         return False
 
     recipe = replace(DEFAULT, mixed=0.0, batch=4)
-    saving = Saving(path=tmp_path / "checkpoint.safetensors", steps=1000)
-    train("snug", tube_dress(), [swaying(60)], steps=STEPS, seed=0, recipe=recipe,
-          progress=False, every=100, saving=saving, stop=look)  # fmt: skip
+    checkpoint = Checkpoint(path=tmp_path / "checkpoint.safetensors", steps=1000)
+    train_network("snug", tube_dress(), [swaying(60)], steps=STEPS, seed=0, recipe=recipe,
+          progress=False, every=100, checkpoint=checkpoint, stop=look)  # fmt: skip
     assert len(samples) == STEPS
     found, _ = growth(samples[::400], "step")
     assert found < 1000  # positions of one frame, kept in each, would be 1800

@@ -27,16 +27,16 @@ class Network(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         from snug.networks.dressed_body import DressedBody
-        from snug.networks.roll_out import ready_to_roll_out
+        from snug.networks.roll_out import prepare_roll_out
         from snug.networks.trained_model import TrainedModel
 
         assert scene.dressed is not None
         self.model = TrainedModel.load(self.path).rounded(self.precision)
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.frames = ready_to_roll_out(
+        self.frames = prepare_roll_out(
             self.model, self.dressed, self.motion, self.betas, kept=scene.kept,
-            before=scene.dressed.before, then=self.then,
+            earlier=scene.dressed.before, postprocess=self.then,
         )  # fmt: skip
 
     def run(self) -> Trajectory:
@@ -44,16 +44,18 @@ class Network(Method):
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Features and joint transforms."""
-        from snug.networks.roll_out import frame_inputs
+        from snug.networks.roll_out import prepare_frame_inputs
 
         assert scene.dressed is not None
-        return frame_inputs(self.model, self.dressed, self.motion, self.betas, before=scene.dressed.before)
+        return prepare_frame_inputs(
+            self.model, self.dressed, self.motion, self.betas, earlier=scene.dressed.before
+        )
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
         """What computes so many bodies in this motion at once when called: (T, copies, V, 3) [m]."""
-        from snug.networks.roll_out import ready_for_many
+        from snug.networks.roll_out import prepare_batch
 
-        return ready_for_many(self.model, self.dressed, self.motion, copies=copies)
+        return prepare_batch(self.model, self.dressed, self.motion, copies=copies)
 
     def quasi_static(self) -> Trajectory:
         """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""

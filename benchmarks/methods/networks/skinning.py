@@ -21,19 +21,19 @@ class Skinning(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         from snug.networks.dressed_body import DressedBody
-        from snug.networks.roll_out import skinned_frames
+        from snug.networks.roll_out import prepare_skinned_frames
         from snug.recipes.recipe import DEFAULT
 
         assert scene.dressed is not None
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.frames = skinned_frames(self.dressed, self.motion, DEFAULT.smoothing, self.betas)
+        self.frames = prepare_skinned_frames(self.dressed, self.motion, DEFAULT.smoothing, self.betas)
         self.faces = np.asarray(scene.cloth.faces)
 
     def run(self) -> Trajectory:
-        from snug.networks.roll_out import collected
+        from snug.networks.roll_out import collect_frames
 
-        positions, seconds = collected(self.frames(), np.arange(self.motion.frames))
+        positions, seconds = collect_frames(self.frames(), np.arange(self.motion.frames))
         return Trajectory(
             positions=positions,
             faces=self.faces,
@@ -44,9 +44,9 @@ class Skinning(Method):
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Joint transforms."""
-        from snug.networks.roll_out import frame_inputs
+        from snug.networks.roll_out import prepare_frame_inputs
 
-        return frame_inputs(None, self.dressed, self.motion, self.betas)
+        return prepare_frame_inputs(None, self.dressed, self.motion, self.betas)
 
     def quasi_static(self) -> Trajectory:
         """Its answer to poses held still: the same."""

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.scene import BuiltScene
 from reference_sim.energies import BendHinge, Energy, StretchSpring, StretchStVK
-from snug.training.pbns_material import BENDING
+from snug.training.losses.pbns_material import BENDING
 
 
 @dataclass(kw_only=True)

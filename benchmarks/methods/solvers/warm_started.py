@@ -111,7 +111,7 @@ class WarmStarted(Method):
     def _frames(self, scene: BuiltScene) -> Callable[[], Iterator[np.ndarray]]:
         """What gives world positions (V, 3) [m] frame after frame, from the first one on, at each call."""
         from snug.networks.dressed_body import DressedBody
-        from snug.networks.roll_out import frame_inputs, predictions, skinned_frames
+        from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
         from snug.networks.trained_model import TrainedModel
         from snug.recipes.recipe import DEFAULT
 
@@ -119,10 +119,10 @@ class WarmStarted(Method):
         motion, betas, before = scene.dressed.motion, scene.dressed.betas, scene.dressed.before
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         model = None if self.guess == SKINNING else TrainedModel.load(self.path)
-        self.of_guess = frame_inputs(model, dressed, motion, betas, before=before)
+        self.of_guess = prepare_frame_inputs(model, dressed, motion, betas, earlier=before)
         if model is None:
-            return skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
-        return predictions(model, dressed, motion, betas, before=before)
+            return prepare_skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
+        return prepare_frames(model, dressed, motion, betas, earlier=before)
 
     def _carry(self, scene: BuiltScene) -> ResidualTransport:
         from benchmarks.methods.solvers.residual_transport import ResidualTransport

@@ -20,7 +20,7 @@ from reference_sim.energies import ContactPenalty
 from snug.body.skinning import add_pose_correctives, skin
 from snug.training.contact.cache import ContactCache, Patch
 from snug.training.contact.cache_torch import TensorContactCache
-from snug.training.loss import Planes
+from snug.training.losses.physics_loss import Planes
 from snug.training.process_group import ALONE, Group
 from snug.training.training_set import Batch, TrainingSet
 

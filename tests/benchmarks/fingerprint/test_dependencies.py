@@ -139,7 +139,7 @@ def test_a_scene_without_obstacle_or_body_depends_on_neither():
 
 def test_training_does_not_hang_on_the_solver():
     code = code_of("benchmarks.tasks.training")
-    assert "snug/training/loss.py" in code and "reference_sim/energies/bend_hinge.py" in code
+    assert "snug/training/losses/physics_loss.py" in code and "reference_sim/energies/bend_hinge.py" in code
     assert [path for path in code if path.startswith("reference_sim/minimise")] == []
 
 

@@ -29,7 +29,7 @@ from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays
 from snug.recipes.named import RECIPES
-from snug.training.loss import static_terms
+from snug.training.losses.physics_loss import static_terms
 from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, small_scene
 from tests.benchmarks.tasks.test_cell_tasks import NoLog, plan_of
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import snug.training.train
+import snug.training.train_network
 from benchmarks import provenance, run
 from benchmarks.methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
@@ -301,14 +301,16 @@ def test_a_killed_convergence_goes_on_to_the_same_curve(small, monkeypatch):
     curve.unlink()
     model_path.with_name(".snug-150.checkpoint.safetensors").write_text("of other code")
     asked = iter([False, False, False, True])
-    stopped = functools.partial(snug.training.train.train, stop=lambda: next(asked))
+    stopped = functools.partial(snug.training.train_network.train_network, stop=lambda: next(asked))
     with monkeypatch.context() as patch:
-        patch.setattr(snug.training.train, "train", stopped)
+        patch.setattr(snug.training.train_network, "train_network", stopped)
         with pytest.raises(Exception, match="stopped after step 4"):
             convergence.measure(small, vertices=150)
     begun = []
-    step_of = snug.training.train.train
-    monkeypatch.setattr(snug.training.train, "train", lambda *a, **k: step_of(*a, log=begun.append, **k))
+    step_of = snug.training.train_network.train_network
+    monkeypatch.setattr(
+        snug.training.train_network, "train_network", lambda *a, **k: step_of(*a, log=begun.append, **k)
+    )
     convergence.measure(small, vertices=150)
     assert [row["step"] for row in begun] == [6]  # only what was left
     again = lines(curve)

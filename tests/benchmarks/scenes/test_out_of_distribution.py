@@ -33,7 +33,7 @@ from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.training.train import untrained_model
+from snug.training.train_network import untrained_model
 
 SMOKE = find_preset("smoke")
 CASES = [scene for scene in OUT_OF_DISTRIBUTION if not scene.networks_only and scene.name != ORDINARY]

@@ -20,7 +20,7 @@ from benchmarks.training import Simulated
 from reference_sim import Trajectory, simulate
 from reference_sim.files.array_file import read_arrays
 from snug.recipes.recipe import DEFAULT
-from snug.training.motion_augmentation import FRAMES, mixed_for, shared_clips
+from snug.training.augmentation.mixed_clips import FRAMES, mixed_for, shared_clips
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene, training
 from tests.benchmarks.tasks.test_cell_tasks import plan_of
 from tests.snug.training.dressing import swaying, tube_dress

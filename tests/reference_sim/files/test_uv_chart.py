@@ -12,7 +12,7 @@ from reference_sim.energies import BendHinge, Gravity, Inertia, StretchSpring, S
 from reference_sim.files.mesh_files import Surface
 from reference_sim.files.uv_chart import join_seams, rest_chart, stretches
 from snug.recipes.recipe import DEFAULT
-from snug.training.loss import PhysicsLoss
+from snug.training.losses.physics_loss import PhysicsLoss
 from tests.reference_sim.meshes import grid, patch
 from tests.snug.garments.garment_files import doubled_along, own_chart
 

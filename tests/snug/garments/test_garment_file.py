@@ -30,7 +30,7 @@ from snug.garments.reading import read_garment
 from snug.garments.templates import tailor_skirt, tailor_tshirt
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.training import train as training
+from snug.training.command import train_to_file
 from tests.snug.body.other_bodies import lowered, plain_arrays, read_again
 from tests.snug.garments.garment_files import doubled_along, own_chart, write_obj, z_up
 from tests.snug.training.dressing import tube_dress
@@ -295,7 +295,7 @@ def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_pa
         seen.append(dressed)
         raise ValueError("seen enough")
 
-    monkeypatch.setattr(training, "train", stop)
+    monkeypatch.setattr(train_to_file, "train_network", stop)
     words = ["--garment", str(path), "--garment-rest", "uv", "--garment-uv-scale", "0.01"]
     words += ["--garment-material", str(tmp_path / "silk.toml"), "-o", str(tmp_path / "a.safetensors")]
     assert train_command.main(words) == 2

@@ -20,7 +20,7 @@ from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.recipe import DEFAULT
-from snug.training.train import train, untrained_model
+from snug.training.train_network import train_network, untrained_model
 from tests.benchmarks.runner.tasks_by_hand import context, dressed_scene
 from tests.reference_sim.meshes import edge_counts, girth
 
@@ -124,7 +124,7 @@ def test_no_network_moves_the_waistband(scene, kind, tmp_path):
     motion, pins = scene.dressed.motion, scene.cloth.pins
     assert dressed.skinned(motion, smoothing=20)[:, pins] == pytest.approx(handles(scene), abs=1e-5)
     recipe = dataclasses.replace(DEFAULT, mixed=0.0)
-    trained = train(kind, dressed, [motion], steps=20, seed=0, recipe=recipe, progress=False)
+    trained = train_network(kind, dressed, [motion], steps=20, seed=0, recipe=recipe, progress=False)
     untrained = untrained_model(kind, dressed, [motion], seed=0)
     read = TrainedModel.load(untrained.save(tmp_path / "m.safetensors"))  # weights at the waistband: not zero
     free = np.setdiff1d(np.arange(dressed.vertices), pins)

@@ -10,15 +10,17 @@ import torch
 
 from reference_sim.energies.energy import Energy
 from snug.body.skinning import skin, unskin
+from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
-from snug.networks.tailornet import DROPOUT, FrequencyMixture, smoothed
-from snug.networks.trained_model import TrainedModel, make_network
+from snug.networks.tailornet import DROPOUT, FrequencyMixture
+from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import ABLATIONS, RECIPE_OF_KIND
 from snug.recipes.recipe import DEFAULT
-from snug.training.loss import PhysicsLoss
-from snug.training.pbns_material import SquaredContact, spring_terms
-from snug.training.train import train
+from snug.training.losses.pbns_material import SquaredContact, spring_terms
+from snug.training.losses.physics_loss import PhysicsLoss
+from snug.training.losses.vertex_targets import smooth_offsets
+from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
 
 TAUGHT = ("supervised", "santesteban2019", "tailornet")
@@ -35,7 +37,7 @@ def puffed(motion):
 def taught(kind, steps, **changes):
     motion = swaying(24)
     recipe = replace(RECIPE_OF_KIND[kind], **changes)
-    model = train(
+    model = train_network(
         kind, tube_dress(), [motion], steps=steps, seed=0, trajectories={motion.name: puffed(motion)},
         recipe=recipe, progress=False, every=10,
     )  # fmt: skip
@@ -90,8 +92,10 @@ def test_a_body_of_fewer_shapes_has_zeros_for_the_rest(shapes):
     few = replace(dressed.body, shape_directions=dressed.body.shape_directions[..., :shapes],
                   joint_directions=dressed.body.joint_directions[..., :shapes])  # fmt: skip
     betas = np.arange(1.0, 1 + shapes)
-    features = DressedBody(few, dressed.garment).features(motion, DEFAULT, betas, kind="pose_shape")
-    whole = dressed.features(motion, DEFAULT, np.append(betas, np.zeros(10 - shapes)), kind="pose_shape")
+    features = DressedBody(few, dressed.garment).features(motion, DEFAULT, betas, feature_set="pose_shape")
+    whole = dressed.features(
+        motion, DEFAULT, np.append(betas, np.zeros(10 - shapes)), feature_set="pose_shape"
+    )
     assert torch.equal(features, whole) and features.shape == (5, 151)
 
 
@@ -124,13 +128,13 @@ def test_smoothing_keeps_what_is_constant_and_takes_out_what_is_rough():
     garment = tube_dress().garment
     count = len(garment.rest_positions)
     constant = np.tile([0.01, -0.02, 0.03], (2, count, 1))
-    assert np.abs(smoothed(constant, garment.faces) - constant).max() < 1e-12
+    assert np.abs(smooth_offsets(constant, garment.faces) - constant).max() < 1e-12
     rough = np.random.default_rng(0).normal(size=(2, count, 3))
-    assert smoothed(rough, garment.faces).std() < 0.5 * rough.std()
+    assert smooth_offsets(rough, garment.faces).std() < 0.5 * rough.std()
     # The rims are smoothed along themselves: what happens inside does not reach them.
     inside = rough.copy()
     inside[:, :15] = inside[:, -15:] = 0.0
-    low = smoothed(inside, garment.faces)
+    low = smooth_offsets(inside, garment.faces)
     assert np.abs(low[:, :15]).max() == 0.0 and np.abs(low[:, 15:-15]).max() > 0.0
 
 
@@ -169,7 +173,7 @@ def test_the_springs_of_pbns_by_hand():
 
 @pytest.mark.parametrize("recipe", ABLATIONS, ids=lambda recipe: recipe.name)
 def test_an_ablation_leaves_out_what_it_says_and_never_evaluates_it(recipe, monkeypatch):
-    from snug.training import loss as module
+    from snug.training.losses import physics_loss as module
 
     asked = []
     plain = module.summed

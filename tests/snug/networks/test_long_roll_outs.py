@@ -22,7 +22,7 @@ from benchmarks.timing import Reading
 from reference_sim import Trajectory
 from snug.motion.library import make_motion
 from snug.networks.roll_out import roll_out
-from snug.training.train import untrained_model
+from snug.training.train_network import untrained_model
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMOKE = PRESETS[0]

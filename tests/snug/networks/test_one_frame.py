@@ -6,10 +6,11 @@ import torch
 
 from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
+from snug.networks.architectures import ARCHITECTURES, make_network
 from snug.networks.one_frame import PRECISIONS, CompiledFrame, FramePlan, rounded, stored
-from snug.networks.roll_out import predictions, roll_out, skinned_frames
+from snug.networks.roll_out import prepare_frames, prepare_skinned_frames, roll_out
 from snug.networks.tailornet import FrequencyMixture
-from snug.networks.trained_model import KINDS, TrainedModel, find_kind, make_network
+from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import RECIPE_OF_KIND
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -19,7 +20,7 @@ PINS = (3, 77)
 def random_model(kind: str) -> TrainedModel:
     """Nothing in it is zero or one: weights, biases, statistics of the inputs; two vertices are held."""
     dressed, recipe = tube_dress(), RECIPE_OF_KIND[kind]
-    inputs = dressed.features(swaying(2), recipe, kind=find_kind(kind).features).shape[1]
+    inputs = dressed.features(swaying(2), recipe, feature_set=ARCHITECTURES[kind].feature_set).shape[1]
     network = make_network(kind, inputs, dressed.vertices, recipe, seed=0, pins=PINS)
     generator = torch.Generator().manual_seed(1)
     with torch.no_grad():
@@ -34,14 +35,14 @@ def random_model(kind: str) -> TrainedModel:
 def by_torch(model: TrainedModel, motion) -> tuple[np.ndarray, np.ndarray]:
     """World vertices (T, V, 3) and offsets, of the whole motion in one call of the modules."""
     dressed = tube_dress()
-    features = dressed.features(motion, model.recipe, kind=find_kind(model.kind).features)
+    features = dressed.features(motion, model.recipe, feature_set=model.network.feature_set)
     with torch.no_grad():
         offsets = model.network(features[None])[0][0]
     posed = dressed.skinned(motion, smoothing=model.recipe.smoothing, offsets=offsets)
     return posed, offsets.numpy()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ARCHITECTURES)
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_a_compiled_frame_is_the_modules_own(kind, precision):
     model, motion = random_model(kind), swaying(8)
@@ -97,11 +98,11 @@ def test_skinning_by_blocks_is_skinning(vertices, joints):
 
 def test_two_roll_outs_at_once_keep_their_own_states():
     model, motion = random_model("snug"), swaying(6)
-    begin = predictions(model, tube_dress(), motion)
+    begin = prepare_frames(model, tube_dress(), motion)
     alone = np.array(list(begin()))
     together = np.array(list(zip(begin(), begin())))
     assert np.array_equal(together[:, 0], alone) and np.array_equal(together[:, 1], alone)
-    assert np.abs(alone - np.array(list(skinned_frames(tube_dress(), motion, 20)()))).max() > 1e-3
+    assert np.abs(alone - np.array(list(prepare_skinned_frames(tube_dress(), motion, 20)()))).max() > 1e-3
 
 
 def test_gates_are_torchs_gates_and_not_a_number_stays_so():

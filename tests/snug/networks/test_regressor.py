@@ -9,11 +9,11 @@ from snug.body.skeleton import axis_angles, rotation_matrices
 from snug.garments.garment import smooth_weights
 from snug.kernels import gru as fast_network
 from snug.motion.motion import Motion
+from snug.networks.architectures import make_network
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.pbns import PoseSpaceDeformation
-from snug.networks.regressor import Regressor, parameter_megabytes
+from snug.networks.regressor import Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles
-from snug.networks.trained_model import make_network
 from snug.recipes.named import PAPER, RECIPES, find_recipe
 from snug.recipes.recipe import DEFAULT, Recipe, RecipeError
 from snug.training.training_set import TrainingSet
@@ -34,13 +34,13 @@ def test_paper_scale_network_has_the_papers_size():
     # 3 gates x 256 x (inputs + 256 + 2 biases), first layer on 85 inputs and three on 256.
     assert gru == 3 * 256 * (85 + 256 + 2) + 3 * 3 * 256 * (256 + 256 + 2)
     assert sum(p.numel() for p in network.offsets.parameters()) == (256 + 1) * 3 * 4424
-    assert 18.0 < parameter_megabytes(network) < 20.0  # the paper prints 19 MB
+    assert 18.0 < network.megabytes < 20.0  # the paper prints 19 MB
 
 
 def test_the_default_network_is_below_twenty_megabytes_at_paper_scale():
     data = TrainingSet(tube_dress(), [swaying(12)], DEFAULT, features="motion", sequences=True)
     network = make_network("snug", data.features.shape[1], 4400, DEFAULT, seed=0)
-    assert data.features.shape[1] > 85 and 19.0 < parameter_megabytes(network) < 20.0
+    assert data.features.shape[1] > 85 and 19.0 < network.megabytes < 20.0
 
 
 def test_state_carries_a_sequence_over_a_cut():
@@ -122,7 +122,7 @@ def test_default_inputs_know_lean_speed_and_shape():
     assert (velocity[0] == 0).all() and np.allclose(velocity[1:, 2], 1.2, atol=1e-5)
     betas = np.linspace(-1, 1, 10)
     assert np.allclose(dressed.features(motion, DEFAULT, betas)[:, -10:], betas, atol=1e-6)
-    assert dressed.features(motion, PAPER, kind="pose").shape == (motion.frames, 72)
+    assert dressed.features(motion, PAPER, feature_set="pose").shape == (motion.frames, 72)
 
 
 def test_dresser_agrees_with_the_body_in_the_world():

@@ -7,11 +7,18 @@ import numpy as np
 import pytest
 import torch
 
-from snug.networks.roll_out import RollOutError, collected, frame_inputs, predictions, roll_out
-from snug.networks.trained_model import TrainedModel, find_kind, make_network
+from snug.networks.architectures import make_network
+from snug.networks.roll_out import (
+    RollOutError,
+    collect_frames,
+    prepare_frame_inputs,
+    prepare_frames,
+    roll_out,
+)
+from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import PAPER, RECIPE_OF_KIND
 from snug.recipes.recipe import DEFAULT
-from snug.training.train import untrained_model
+from snug.training.train_network import untrained_model
 from tests.snug.training.dressing import swaying, tube_dress
 
 
@@ -29,7 +36,7 @@ def test_zero_offsets_give_skinning_alone():
 def test_frame_by_frame_equals_the_whole_sequence(kind):
     dressed, motion = tube_dress(), swaying()
     model = untrained_model(kind, dressed, [motion], seed=2)
-    features = dressed.features(motion, model.recipe, kind="motion" if kind == "snug" else "pose")
+    features = dressed.features(motion, model.recipe, feature_set="motion" if kind == "snug" else "pose")
     with torch.no_grad():
         offsets, _ = model.network(features[None])
     whole = dressed.skinned(motion, smoothing=model.recipe.smoothing, offsets=offsets[0])
@@ -45,7 +52,7 @@ def test_predictions_are_the_roll_out_a_frame_when_it_is_asked_for():
     run = roll_out(model, dressed, motion)
     assert run.frame_seconds.shape == (motion.frames,) and (run.frame_seconds > 0.0).all()
     assert run.frame_seconds.sum() < time.perf_counter() - start
-    begin = predictions(model, dressed, motion)
+    begin = prepare_frames(model, dressed, motion)
     for _ in range(2):  # the state begins at zero again
         frames, start = begin(), time.perf_counter()
         first = next(frames)
@@ -59,12 +66,15 @@ def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
     model = untrained_model(kind, dressed, [motion], seed=2)
     whole = roll_out(model, dressed, motion).positions[5:]
     before, rest = motion.cut(0, 5), motion.cut(5, motion.frames)
-    begin = predictions(model, dressed, rest, before=before)
+    begin = prepare_frames(model, dressed, rest, earlier=before)
     for _ in range(2):
         assert np.abs(np.array(list(begin())) - whole).max() < 1e-6
-    forgetful = np.array(list(predictions(model, dressed, rest)()))
+    forgetful = np.array(list(prepare_frames(model, dressed, rest)()))
     assert kind == "pbns" or np.abs(forgetful - whole).max() > 1e-5
-    make, known = frame_inputs(model, dressed, motion), frame_inputs(model, dressed, rest, before=before)
+    make, known = (
+        prepare_frame_inputs(model, dressed, motion),
+        prepare_frame_inputs(model, dressed, rest, earlier=before),
+    )
     assert torch.allclose(known(0)[0], make(5)[0], atol=1e-6)
 
 
@@ -77,7 +87,7 @@ def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_com
             computed.append(frame)
             yield np.full((2, 3), float(frame))
 
-    positions, seconds = collected(frames(), np.array([1, 4]))
+    positions, seconds = collect_frames(frames(), np.array([1, 4]))
     assert computed == list(range(6)) and positions[:, 0, 0].tolist() == [1.0, 4.0]
     assert seconds[1] > 0.03 > 3 * seconds[0]
 
@@ -86,9 +96,9 @@ def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_com
 def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind):
     dressed, motion = tube_dress(), swaying()
     model = untrained_model(kind, dressed, [motion], seed=0, recipe=RECIPE_OF_KIND[kind])
-    features = dressed.features(motion, model.recipe, kind=find_kind(model.kind).features)
+    features = dressed.features(motion, model.recipe, feature_set=model.network.feature_set)
     transforms, pelvis = dressed.transforms(motion.poses), dressed.pelvis(motion)
-    make = frame_inputs(model, dressed, motion)
+    make = prepare_frame_inputs(model, dressed, motion)
     for frame in reversed(range(motion.frames)):
         made = make(frame)
         assert made[0].shape == features[frame].shape
@@ -96,7 +106,7 @@ def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind):
         assert torch.allclose(made[1], transforms[frame], rtol=1e-6, atol=1e-7)
         assert np.array_equal(made[2], pelvis[frame])
     assert features.diff(dim=0).abs().max() > 1e-2
-    assert frame_inputs(None, dressed, motion)(3)[0] is None
+    assert prepare_frame_inputs(None, dressed, motion)(3)[0] is None
 
 
 def test_a_quasi_static_frame_forgets_the_past_and_the_velocity():

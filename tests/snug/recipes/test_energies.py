@@ -12,8 +12,8 @@ import torch
 from reference_sim import energies
 from snug.recipes.energies import find_energy
 from snug.recipes.recipe import TERMS, Recipe, RecipeError
-from snug.training.loss import PhysicsLoss, has_kernel
-from snug.training.train import train
+from snug.training.losses.physics_loss import PhysicsLoss, has_kernel
+from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
 
 # What a user writes: a definition, and no derivative.
@@ -53,7 +53,7 @@ def own(tmp_path, monkeypatch):
 
 
 def trained(recipe, steps=6, **options):
-    return train(
+    return train_network(
         "snug", tube_dress(), [swaying(20)], steps=steps, seed=1, recipe=recipe, progress=False, every=2,
         **options,
     )  # fmt: skip

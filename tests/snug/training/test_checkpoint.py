@@ -19,9 +19,12 @@ from snug.networks.tensor_file import TensorFileError, read_tensors
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import DYNAMIC, PAPER, SANTESTEBAN2019, SUPERVISED, TAILORNET
 from snug.recipes.recipe import DEFAULT
-from snug.training import run as training_run
-from snug.training.run import Interrupted, Saving
-from snug.training.train import train
+from snug.training import checkpoint as checkpoints
+from snug.training.checkpoint import Checkpoint
+from snug.training.command import choices
+from snug.training.command.train_to_file import digest_inputs
+from snug.training.train_network import train_network
+from snug.training.training_loop import Interrupted
 from snug.training.validation import Validation
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -40,7 +43,7 @@ def short(kind="snug", *, steps=24, seed=0, recipe=PLAIN, clips=CLIPS, **options
     options = {"progress": False, "every": 5, **options}
     if kind not in ("snug", "pbns") and "trajectories" not in options:
         options["trajectories"] = {clip.name: shaken(clip) for clip in clips}
-    return train(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
+    return train_network(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
 
 
 def same_model(a, b):
@@ -77,24 +80,24 @@ def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path):
     whole = short(kind, recipe=recipe)
     path = tmp_path / "run.safetensors"
     for number, steps in enumerate((3, 13)):  # twice, the second time on a resumed run
-        saving = Saving(path=path, resume=number > 0)
+        checkpoint = Checkpoint(path=path, resume=number > 0)
         with pytest.raises(Interrupted, match=f"after step {(3, 16)[number]} of 24"):
-            short(kind, recipe=recipe, saving=saving, stop=asked_after(steps))
-    saving = Saving(path=path, resume=True)
-    resumed = short(kind, recipe=recipe, saving=saving)
+            short(kind, recipe=recipe, checkpoint=checkpoint, stop=asked_after(steps))
+    checkpoint = Checkpoint(path=path, resume=True)
+    resumed = short(kind, recipe=recipe, checkpoint=checkpoint)
     same_model(whole, resumed)
     assert resumed.history[-1]["step"] == 24 and list(tmp_path.iterdir()) == [path]
-    saving.done()
+    checkpoint.delete()
     assert not list(tmp_path.iterdir())
 
 
 def test_validation_resumes_bit_for_bit(tmp_path):
     validation = Validation(motions=[swaying(20, name="other", degrees=30.0)], every=4, patience=5)
     whole = short(validation=validation)
-    saving = Saving(path=tmp_path / "run.safetensors", resume=True)
+    checkpoint = Checkpoint(path=tmp_path / "run.safetensors", resume=True)
     with pytest.raises(Interrupted):
-        short(validation=validation, saving=saving, stop=asked_after(14))
-    same_model(whole, short(validation=validation, saving=saving))
+        short(validation=validation, checkpoint=checkpoint, stop=asked_after(14))
+    same_model(whole, short(validation=validation, checkpoint=checkpoint))
     assert whole.summary["validation"]["motions"] == ["other"]
 
 
@@ -104,9 +107,9 @@ import torch
 torch.set_num_threads(int(sys.argv[3]))
 sys.path.insert(0, sys.argv[1])
 from tests.snug.training.test_checkpoint import short
-from snug.training.run import Saving
+from snug.training.checkpoint import Checkpoint
 from pathlib import Path
-short(steps=4000, saving=Saving(path=Path(sys.argv[2]), steps=3, minutes=0))
+short(steps=4000, checkpoint=Checkpoint(path=Path(sys.argv[2]), steps=3, minutes=0))
 """
 
 
@@ -129,11 +132,11 @@ def test_a_killed_run_resumes_bit_for_bit(tmp_path):
     runs = []
     # Steps of the schedule must agree, so both go a little further and stop at the same step.
     for resume in (True, False):
-        saving = Saving(path=path if resume else tmp_path / "whole.safetensors", resume=resume)
+        checkpoint = Checkpoint(path=path if resume else tmp_path / "whole.safetensors", resume=resume)
         stop = asked_after(7 if resume else done + 7)
         with pytest.raises(Interrupted, match=f"after step {done + 7} of"):
-            short(steps=4000, saving=saving, stop=stop)
-        runs.append(read_tensors(saving.path)[0])
+            short(steps=4000, checkpoint=checkpoint, stop=stop)
+        runs.append(read_tensors(checkpoint.path)[0])
     assert runs[0].keys() == runs[1].keys()
     assert all(torch.equal(runs[0][name], runs[1][name]) for name in runs[0])
 
@@ -141,7 +144,7 @@ def test_a_killed_run_resumes_bit_for_bit(tmp_path):
 def test_a_kill_while_writing_leaves_the_older_checkpoint(tmp_path, monkeypatch):
     path = tmp_path / "run.safetensors"
     with pytest.raises(Interrupted):
-        short(saving=Saving(path=path), stop=asked_after(6))
+        short(checkpoint=Checkpoint(path=path), stop=asked_after(6))
     before = path.read_bytes()
 
     def killed(*_):
@@ -149,10 +152,10 @@ def test_a_kill_while_writing_leaves_the_older_checkpoint(tmp_path, monkeypatch)
 
     monkeypatch.setattr(whole_file.os, "replace", killed)
     with pytest.raises(KeyboardInterrupt):
-        short(saving=Saving(path=path, resume=True, steps=2))
+        short(checkpoint=Checkpoint(path=path, resume=True, steps=2))
     assert path.read_bytes() == before
     monkeypatch.undo()
-    same_model(short(), short(saving=Saving(path=path, resume=True)))
+    same_model(short(), short(checkpoint=Checkpoint(path=path, resume=True)))
 
 
 def test_files_are_the_users_own(tmp_path):
@@ -164,66 +167,86 @@ def test_files_are_the_users_own(tmp_path):
 def test_a_checkpoint_of_another_run_is_refused(tmp_path):
     path = tmp_path / "run.safetensors"
     with pytest.raises(Interrupted):
-        short(saving=Saving(path=path), stop=asked_after(2))
-    again = Saving(path=path, resume=True)
+        short(checkpoint=Checkpoint(path=path), stop=asked_after(2))
+    again = Checkpoint(path=path, resume=True)
     with pytest.raises(TensorFileError, match="seed 0 there, 1 here"):
-        short(saving=again, seed=1)
+        short(checkpoint=again, seed=1)
     with pytest.raises(TensorFileError, match="another recipe"):
-        short(saving=again, recipe=replace(PLAIN, h0_sigma=0.1))
+        short(checkpoint=again, recipe=replace(PLAIN, h0_sigma=0.1))
     with pytest.raises(TensorFileError, match="another data"):
-        short(saving=again, clips=[swaying(31)])
+        short(checkpoint=again, clips=[swaying(31)])
     threads = torch.get_num_threads()
     torch.set_num_threads(threads + 1)
     try:
         with pytest.raises(TensorFileError, match=f"threads {threads} there, {threads + 1} here"):
-            short(saving=again)
+            short(checkpoint=again)
     finally:
         torch.set_num_threads(threads)
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(TensorFileError, match=r"run\.safetensors"):
-        short(saving=again)
+        short(checkpoint=again)
     path.unlink()
-    same_model(short(), short(saving=again))  # killed before its first checkpoint: from the beginning
+    same_model(short(), short(checkpoint=again))  # killed before its first checkpoint: from the beginning
 
 
 def test_a_checkpoint_of_an_older_version_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "run.safetensors"
-    monkeypatch.setattr(training_run, "FORMAT", "snug-checkpoint-6")
+    monkeypatch.setattr(checkpoints, "CHECKPOINT_FORMAT", "snug-checkpoint-6")
     with pytest.raises(Interrupted):
-        short(saving=Saving(path=path), stop=asked_after(2))
+        short(checkpoint=Checkpoint(path=path), stop=asked_after(2))
     monkeypatch.undo()
     with pytest.raises(TensorFileError, match=r"run\.safetensors: no checkpoint of this version"):
-        short(saving=Saving(path=path, resume=True))
+        short(checkpoint=Checkpoint(path=path, resume=True))
 
 
 def test_a_checkpoint_of_other_targets_or_cloth_is_refused(tmp_path):
     dressed = tube_dress()
     simulated = {"sway": dressed.skinned(CLIPS[0], smoothing=20)}
-    saving = Saving(path=tmp_path / "run.safetensors", resume=True)
+    checkpoint = Checkpoint(path=tmp_path / "run.safetensors", resume=True)
     with pytest.raises(Interrupted):
-        short("supervised", trajectories=simulated, saving=saving, stop=asked_after(2))
+        short("supervised", trajectories=simulated, checkpoint=checkpoint, stop=asked_after(2))
     with pytest.raises(TensorFileError, match="another data"):
-        short("supervised", trajectories={"sway": simulated["sway"] + 0.01}, saving=saving)
-    saving.done()
+        short("supervised", trajectories={"sway": simulated["sway"] + 0.01}, checkpoint=checkpoint)
+    checkpoint.delete()
     with pytest.raises(Interrupted):
-        short(saving=saving, stop=asked_after(2))
+        short(checkpoint=checkpoint, stop=asked_after(2))
     stiff = DressedBody(dressed.body, dressed.garment, material=Material(young_modulus=1e6))
-    saving.done()
+    checkpoint.delete()
     clip = swaying(16, name="held")
     with pytest.raises(Interrupted):
-        short(saving=saving, stop=asked_after(2), validation=Validation(motions=[clip]))
+        short(checkpoint=checkpoint, stop=asked_after(2), validation=Validation(motions=[clip]))
     shaken_clip = replace(clip, poses=1.1 * clip.poses)
     with pytest.raises(TensorFileError, match="another data"):
-        short(saving=saving, validation=Validation(motions=[shaken_clip]))
-    saving.done()
+        short(checkpoint=checkpoint, validation=Validation(motions=[shaken_clip]))
+    checkpoint.delete()
     with pytest.raises(Interrupted):
-        short(saving=saving, stop=asked_after(2))
+        short(checkpoint=checkpoint, stop=asked_after(2))
     body = replace(dressed.body, template=1.01 * dressed.body.template)
     with pytest.raises(TensorFileError, match="another data"):
         other = DressedBody(body, dressed.garment)
-        train("snug", other, CLIPS, steps=24, seed=0, recipe=PLAIN, every=5, progress=False, saving=saving)
+        train_network(
+            "snug",
+            other,
+            CLIPS,
+            steps=24,
+            seed=0,
+            recipe=PLAIN,
+            every=5,
+            progress=False,
+            checkpoint=checkpoint,
+        )
     with pytest.raises(TensorFileError, match="another material"):
-        train("snug", stiff, CLIPS, steps=24, seed=0, recipe=PLAIN, every=5, progress=False, saving=saving)
+        train_network(
+            "snug",
+            stiff,
+            CLIPS,
+            steps=24,
+            seed=0,
+            recipe=PLAIN,
+            every=5,
+            progress=False,
+            checkpoint=checkpoint,
+        )
 
 
 def no_space(*_):
@@ -236,7 +259,7 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     out = tmp_path / "small.safetensors"
     words = ["--vertices", "200", "--steps", "8", "-o", str(out), "--resume"]
     library = [swaying(20), swaying(16, name="held")]
-    monkeypatch.setattr(module, "_motions", lambda options, data: (library[:1], library[1:]))
+    monkeypatch.setattr(choices, "choose_motions", lambda options, data: (library[:1], library[1:]))
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
     assert module.main(words) == 130
     assert "step 1 of 8" in capsys.readouterr().err
@@ -258,7 +281,7 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     heavier = replace(dressed.garment, skinning_weights=np.roll(dressed.garment.skinning_weights, 1, axis=1))
     rounder = replace(dressed.body, shape_directions=2 * dressed.body.shape_directions)
     others = (dressed, DressedBody(dressed.body, heavier), DressedBody(rounder, dressed.garment))
-    assert len({module._digest(other, library, (), {}) for other in others}) == 3
+    assert len({digest_inputs(other, library, [], {}) for other in others}) == 3
     before = out.read_bytes()
     others = {"seed": "1", "recipe": "paper", "steps": "9", "vertices": "300", "model": "pbns"}
     for name, value in others.items():
@@ -268,9 +291,9 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
             "number of ", ""
         )
     for other in ([swaying(21)], [swaying(16, name="held")]), ([swaying(20)], []):
-        monkeypatch.setattr(module, "_motions", lambda options, data, other=other: other)
+        monkeypatch.setattr(choices, "choose_motions", lambda options, data, other=other: other)
         assert module.main(words) == 2 and "of another body, garment or motions" in capsys.readouterr().err
-    monkeypatch.setattr(module, "_motions", lambda options, data: (library[:1], library[1:]))
+    monkeypatch.setattr(choices, "choose_motions", lambda options, data: (library[:1], library[1:]))
     assert out.read_bytes() == before
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
     assert module.main([*words[:-1], "--seed", "1"]) == 130
@@ -281,7 +304,7 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
 def test_garments_are_trained_one_after_another_and_those_that_ended_stay(tmp_path, monkeypatch, capsys):
     from snug import train as module
 
-    monkeypatch.setattr(module, "_motions", lambda options, data: ([swaying(20)], []))
+    monkeypatch.setattr(choices, "choose_motions", lambda options, data: ([swaying(20)], []))
     words = ["--vertices", "200", "--steps", "3", "-o", str(tmp_path / "mine.safetensors"), "--resume"]
     words += ["--garment", "tshirt", "--garment", "tunic"]
     asked = iter([False, False, False, True])  # in the first step of the second

@@ -18,8 +18,8 @@ from snug.recipes.recipe import DEFAULT
 from snug.training.contact.cache import PARTS, ContactCache, Patch
 from snug.training.contact.cache_torch import TensorContactCache
 from snug.training.device import CPU, DeviceError, find_device
-from snug.training.loss import STATIC, on_device
-from snug.training.trainer import Trainer
+from snug.training.losses.physics_loss import STATIC, on_device
+from snug.training.optimisation_step import Trainer
 from snug.training.training_set import TrainingSet
 from tests.snug.training.dressing import swaying, tube_dress
 

@@ -9,8 +9,8 @@ import torch
 from snug.recipes.named import PAPER
 from snug.recipes.recipe import DEFAULT
 from snug.training.divergence_guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
-from snug.training.run import TrainingRun
-from snug.training.trainer import Trainer
+from snug.training.optimisation_step import Trainer
+from snug.training.training_loop import TrainingLoop
 from snug.training.training_set import TrainingError
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -45,7 +45,7 @@ def test_training_gives_up_with_a_reason():
     trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=200, seed=0, recipe=PLAIN)
     trainer.data.features[:] = float("nan")
     with pytest.raises(TrainingError, match=r"diverged.*motion 'sway' frame"):
-        TrainingRun(trainer, every=10).go()
+        TrainingLoop(trainer, every=10).run()
 
 
 def made(recipe=PLAIN, frames=30):

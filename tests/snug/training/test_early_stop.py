@@ -12,11 +12,11 @@ from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, 
 from snug.networks.roll_out import roll_out
 from snug.recipes.named import SUPERVISED
 from snug.recipes.recipe import DEFAULT
-from snug.training.run import TrainingRun
+from snug.training.command.tensorboard_log import TensorBoardError, TensorBoardLog
+from snug.training.optimisation_step import Trainer
 from snug.training.stopwatch import PARTS
-from snug.training.tensorboard_log import TensorBoardError, TensorBoardLog
-from snug.training.train import train
-from snug.training.trainer import Trainer
+from snug.training.train_network import train_network
+from snug.training.training_loop import TrainingLoop
 from snug.training.training_set import TrainingError
 from snug.training.validation import Validation, Validator
 from tests.snug.training.dressing import swaying, tube_dress
@@ -70,7 +70,7 @@ def test_a_later_value_is_as_exact_as_the_first():
 
 def test_best_weights_are_kept_and_patience_ends_training():
     made = trainer(steps=60)
-    run = TrainingRun(made, every=4, validation=Validation(motions=[HELD], every=4, patience=3))
+    run = TrainingLoop(made, every=4, validation=Validation(motions=[HELD], every=4, patience=3))
     values = iter([5.0, 3.0, 4.0, 3.0, 3.5, 1.0, 1.0, 1.0])
     kept = []
 
@@ -79,7 +79,7 @@ def test_best_weights_are_kept_and_patience_ends_training():
         return next(values)
 
     run.validator.value = value
-    model = run.go()
+    model = run.run()
     # Best at the second validation; three without a better one end it at the fifth.
     assert model.steps == 20 and [row["validation"] for row in model.history] == [5.0, 3.0, 4.0, 3.0, 3.5]
     found = model.summary["validation"]
@@ -88,10 +88,10 @@ def test_best_weights_are_kept_and_patience_ends_training():
 
 
 def test_validation_does_not_change_training():
-    plain = train("snug", tube_dress(), [swaying(30)], steps=9, seed=0, recipe=PLAIN, progress=False)
+    plain = train_network("snug", tube_dress(), [swaying(30)], steps=9, seed=0, recipe=PLAIN, progress=False)
     watched = trainer(steps=9)
-    run = TrainingRun(watched, every=50, validation=Validation(motions=[HELD], every=2))
-    run.go()
+    run = TrainingLoop(watched, every=50, validation=Validation(motions=[HELD], every=2))
+    run.run()
     last = watched.network.state_dict()
     if run.best_step == 9:
         assert all(torch.equal(a, last[name]) for name, a in plain.network.state_dict().items())
@@ -105,7 +105,7 @@ def test_supervised_validates_against_its_own_targets():
     target[..., 1] += 0.02
     validation = Validation(motions=[HELD], every=5, trajectories={"held": target})
     still = replace(SUPERVISED, learning_rate=1e-9)  # Adam takes whole steps along rounding errors too
-    model = train(
+    model = train_network(
         "supervised", dressed, [motion], steps=5, seed=0, trajectories=trajectories, validation=validation,
         progress=False, recipe=still,
     )  # fmt: skip
@@ -141,7 +141,9 @@ def test_a_static_network_is_validated_by_what_it_is_taught():
 
 
 def test_history_says_where_the_time_goes():
-    model = train("snug", tube_dress(), [swaying(30)], steps=6, seed=0, recipe=PLAIN, progress=False, every=3)
+    model = train_network(
+        "snug", tube_dress(), [swaying(30)], steps=6, seed=0, recipe=PLAIN, progress=False, every=3
+    )
     for row in model.history:
         parts = {name.removeprefix("seconds/"): s for name, s in row.items() if name.startswith("seconds/")}
         assert set(parts) == set(PARTS)
@@ -157,7 +159,7 @@ def test_curves_are_written(tmp_path):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
     logbook = TensorBoardLog(tmp_path / "run")
-    model = train(
+    model = train_network(
         "snug", tube_dress(), [swaying(30)], steps=6, seed=0, recipe=PLAIN, progress=False, every=2,
         log=logbook.write,
     )  # fmt: skip
@@ -173,8 +175,9 @@ def test_curves_are_written(tmp_path):
 def test_the_command_writes_curves_of_every_garment(tmp_path, monkeypatch):
     pytest.importorskip("tensorboard")
     from snug import train as module
+    from snug.training.command import choices
 
-    monkeypatch.setattr(module, "_motions", lambda options, data: ([swaying(20)], []))
+    monkeypatch.setattr(choices, "choose_motions", lambda options, data: ([swaying(20)], []))
     words = ["--vertices", "200", "--steps", "2", "-o", str(tmp_path / "mine.safetensors")]
     words += ["--garment", "tshirt", "--garment", "tunic", "--tensorboard", str(tmp_path / "curves")]
     assert module.main(words) == 0

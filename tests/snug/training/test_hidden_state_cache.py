@@ -11,7 +11,7 @@ import torch
 from snug.recipes.named import SUPERVISED
 from snug.recipes.recipe import DEFAULT
 from snug.training.hidden_state_cache import HiddenStateCache
-from snug.training.trainer import Trainer
+from snug.training.optimisation_step import Trainer
 from tests.snug.training.dressing import swaying, tube_dress
 
 RECIPE = replace(DEFAULT, mixed=0.0, h0_sigma=0.0)

@@ -15,7 +15,7 @@ from snug.kernels.lanes import laid, unlaid
 from snug.recipes.named import PAPER, PBNS_SPRINGS, RECIPES
 from snug.recipes.recipe import DEFAULT, Recipe
 from snug.training.contact.cache import EXACT, PARTS, ContactCache, Patch, quantised
-from snug.training.loss import PhysicsLoss, make_contact, static_terms, summed
+from snug.training.losses.physics_loss import PhysicsLoss, make_contact, static_terms, summed
 from tests.snug.training.dressing import swaying, tube_dress
 
 DT = 1 / 30

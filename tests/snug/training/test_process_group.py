@@ -13,8 +13,8 @@ from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.recipes.named import PAPER
 from snug.recipes.recipe import DEFAULT
 from snug.training.device import find_device
+from snug.training.optimisation_step import Trainer
 from snug.training.process_group import ALONE, Group, GroupError, join_group
-from snug.training.trainer import Trainer
 from tests.snug.training.dressing import swaying, tube_dress
 
 RECIPES = {

@@ -10,17 +10,17 @@ import torch
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
 from snug.motion.motion import Motion, joint_speeds, turn_about_vertical
-from snug.networks.inputs import HISTORY, RATED, motion_history, motion_rates
+from snug.networks.motion_features import HISTORY, RATED_JOINTS, motion_history, motion_rates
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import DYNAMIC
-from snug.training.motion_augmentation import mixed_motions, shared_clips
-from snug.training.simulated_past import NEARNESS, SimulatedPast
-from snug.training.swinging_clips import BETWEEN, FASTEST, HELD, SPEEDS, swinging_motion
-from snug.training.train import train
-from snug.training.trainer import Trainer
+from snug.training.augmentation.mixed_clips import mixed_motions, shared_clips
+from snug.training.augmentation.swinging_clips import BETWEEN, FASTEST, HELD, SPEEDS, swinging_motion
+from snug.training.losses.simulated_past import NEARNESS, SimulatedPast
+from snug.training.losses.vertex_targets import TargetError
+from snug.training.optimisation_step import Trainer
+from snug.training.train_network import train_network
 from snug.training.training_set import TrainingSet
-from snug.training.vertex_targets import TargetError
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMALL = replace(DYNAMIC, pretraining=0)
@@ -85,7 +85,7 @@ def turning(rate=1.5, frames=20, heading=0.0):
 
 def test_rates_tell_of_turning_and_of_a_stop():
     rates = motion_rates(turning())
-    assert rates.shape == (20, 6 + 3 * len(RATED) + 12)
+    assert rates.shape == (20, 6 + 3 * len(RATED_JOINTS) + 12)
     np.testing.assert_allclose(rates[1:, 7], 1.5, rtol=1e-9)  # the pelvis' turn about y [rad/s]
     speeds = np.linalg.norm(rates[:, :3], axis=1)
     np.testing.assert_allclose(np.diff(speeds)[2:], 4.0 / 30.0, rtol=1e-6)
@@ -122,7 +122,7 @@ def test_training_brings_the_swing_into_the_file(tmp_path):
     motions = [swaying(30), swaying(26, name="other", degrees=15.0)]
     trajectories = {motion.name: thrown(motion, 0.05) for motion in motions}
     rows: list[dict[str, float]] = []
-    model = train(
+    model = train_network(
         "dynamic", tube_dress(), motions, steps=16, seed=1, recipe=SMALL, trajectories=trajectories,
         log=rows.append, progress=False, every=4,
     )  # fmt: skip
@@ -200,7 +200,7 @@ def test_a_pretraining_brings_the_network_to_the_simulated_offsets():
     dressed, random = tube_dress(), np.random.default_rng(0)
     way, made = 0.03 * random.normal(size=(dressed.vertices, 3)), []
     for motion in motions:
-        turn = torch.as_tensor(motion_rates(motion)[:, 6 + 3 * RATED.index("spine1") + 2])  # [rad/s]
+        turn = torch.as_tensor(motion_rates(motion)[:, 6 + 3 * RATED_JOINTS.index("spine1") + 2])  # [rad/s]
         made.append(torch.einsum("t,vi->tvi", turn, torch.as_tensor(way)).float())
     known = {m.name: dressed.skinned(m, smoothing=SMALL.smoothing, offsets=o) for m, o in zip(motions, made)}
     apart = []

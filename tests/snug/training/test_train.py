@@ -14,16 +14,17 @@ from snug.body.skinning import skin
 from snug.motion.library import TRAIN, make_motion
 from snug.motion.motion import Motion, arm_clearance, mirror_motion
 from snug.networks import trained_model
+from snug.networks.architectures import ARCHITECTURES
 from snug.networks.roll_out import roll_out
 from snug.networks.tensor_file import read_tensors
-from snug.networks.trained_model import KINDS, ModelFileError, TrainedModel
+from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipes.named import PAPER, SUPERVISED
 from snug.recipes.recipe import DEFAULT, Recipe, RecipeError
-from snug.training.motion_augmentation import hung_arms, lap_clearance, mixed_for, mixed_motions
-from snug.training.train import train, untrained_model
-from snug.training.trainer import Trainer
+from snug.training.augmentation.mixed_clips import hung_arms, lap_clearance, mixed_for, mixed_motions
+from snug.training.losses.vertex_targets import TargetError, vertex_loss
+from snug.training.optimisation_step import Trainer
+from snug.training.train_network import train_network, untrained_model
 from snug.training.training_set import TrainingError, TrainingSet
-from snug.training.vertex_targets import TargetError, vertex_loss
 from tests.snug.training.dressing import leaning, swaying, tube_dress
 
 PLAIN = replace(DEFAULT, mixed=0.0)
@@ -32,7 +33,7 @@ PLAIN = replace(DEFAULT, mixed=0.0)
 def short(kind="snug", *, steps=60, seed=0, recipe=PLAIN, motions=None, **options):
     clips = motions or [swaying(30)]
     options = {"progress": False, "every": 10, **options}
-    return train(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
+    return train_network(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +123,7 @@ def test_broken_model_files_are_named(tmp_path, trained, monkeypatch):
     with pytest.raises(ModelFileError, match="no model of this project"):
         TrainedModel.load(foreign)
     with monkeypatch.context() as version:  # one that knows more
-        version.setitem(KINDS, "later-kind", KINDS["snug"])
+        version.setitem(ARCHITECTURES, "later-kind", ARCHITECTURES["snug"])
         later = replace(trained, kind="later-kind").save(tmp_path / "later.safetensors")
     with pytest.raises(
         ModelFileError, match=r"later\.safetensors: broken model file \(unknown model 'later-kind'"
@@ -131,7 +132,7 @@ def test_broken_model_files_are_named(tmp_path, trained, monkeypatch):
 
 
 def test_a_model_file_of_an_older_version_is_refused_before_it_is_read(tmp_path, trained, monkeypatch):
-    monkeypatch.setattr(trained_model, "FORMAT", "snug-model-5")
+    monkeypatch.setattr(trained_model, "MODEL_FORMAT", "snug-model-5")
     path = trained.save(tmp_path / "old.safetensors")
     monkeypatch.undo()
     with pytest.raises(ModelFileError, match=r"old\.safetensors: format 'snug-model-5', this version reads"):
@@ -273,7 +274,7 @@ def test_impossible_trainings_are_refused():
     with pytest.raises(ValueError, match=r"'gnn'.*snug, .*supervised, pbns"):
         short("gnn")
     with pytest.raises(TrainingError, match="no motions"):
-        train("snug", tube_dress(), [], steps=1, seed=0)
+        train_network("snug", tube_dress(), [], steps=1, seed=0)
 
 
 def test_untrained_is_not_skinning_alone():
@@ -378,8 +379,9 @@ def test_command_line_answers_without_torch():
 
 
 def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
-    from snug.train import _motions, main
-    from snug.training.options import parse
+    from snug.train import main
+    from snug.training.command.choices import choose_motions
+    from snug.training.command.options import parse_options
 
     out = tmp_path / "model.safetensors"
     assert main(["--motions", str(tmp_path / "nowhere"), "-o", str(out)]) == 2
@@ -389,7 +391,7 @@ def test_command_line_refuses_a_wrong_path(capsys, tmp_path):
     assert "say of which files by --motions" in capsys.readouterr().err
     np.savez(tmp_path / "a.npz", poses=np.zeros((9, 72)), trans=np.zeros((9, 3)))
     validating = ["--validation", "kick", "--validation", "bow"]
-    training, validation = _motions(parse(validating), None)
+    training, validation = choose_motions(parse_options(validating), None)
     assert [motion.name for motion in validation] == ["bow", "kick"]
     assert {motion.name for motion in training} == set(TRAIN) - {"bow"}
     assert main(["--validation", "dance_turn", "-o", str(out)]) == 2  # a test motion
@@ -423,10 +425,11 @@ def test_command_line_refuses_what_it_could_not_do_before_any_work(capsys, tmp_p
 
 
 def test_each_model_has_a_file_of_its_own():
-    from snug.training.options import parse
+    from snug.training.command.options import parse_options
 
-    assert parse([]).out == "snug.safetensors" and parse(["--model", "pbns"]).out == "pbns.safetensors"
-    assert parse(["--model", "pbns", "-o", "mine.safetensors"]).out == "mine.safetensors"
+    assert parse_options([]).out == "snug.safetensors"
+    assert parse_options(["--model", "pbns"]).out == "pbns.safetensors"
+    assert parse_options(["--model", "pbns", "-o", "mine.safetensors"]).out == "mine.safetensors"
 
 
 def test_a_neck_that_hardly_moved_in_training_does_not_drown_the_other_inputs_when_it_bends():
@@ -435,7 +438,7 @@ def test_a_neck_that_hardly_moved_in_training_does_not_drown_the_other_inputs_wh
     bent[:, JOINT["neck"], 0] = np.deg2rad(40.0)
     dressed = tube_dress()
     mean, std = TrainingSet(dressed, [trained], PLAIN, features="pose", sequences=False).input_statistics()
-    unseen = dressed.features(Motion("bent", bent, np.zeros((1, 3))), PLAIN, kind="pose").numpy()
+    unseen = dressed.features(Motion("bent", bent, np.zeros((1, 3))), PLAIN, feature_set="pose").numpy()
     assert np.abs((unseen - mean) / std).max() < 4.0
 
 

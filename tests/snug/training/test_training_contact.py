@@ -12,10 +12,10 @@ from reference_sim.contact.anchor_walk import triangle_adjacency
 from snug.body.skeleton import JOINT
 from snug.body.skinning import skin
 from snug.recipes.recipe import DEFAULT
+from snug.training.augmentation.mixed_clips import mixed_for
 from snug.training.contact.cache import ContactCache, Patch
 from snug.training.contact.planes import FIRST_NEAR, FIRST_PROPAGATED, MARKED, NEAR, PROPAGATED
-from snug.training.motion_augmentation import mixed_for
-from snug.training.trainer import Trainer
+from snug.training.optimisation_step import Trainer
 from tests.reference_sim.meshes import sphere
 from tests.snug.training.dressing import swaying, tube_dress
 

@@ -1,9 +1,10 @@
-"""What a simulation teaches a network that learns from the energies: where the cloth was, and where it went.
+"""Inertia and distance with respect to a simulation, for a network that learns from the energies.
 
-Inertia asks where the cloth would be if nothing but its own velocity moved it, x_hat = 2 x_{t-1} - x_{t-2}. A
-network that gives the frames t-1 and t-2 itself makes them agree with a still present: what costs no energy
-is to hang still. So the two frames are those of a simulation, s, and the loss of frame t is what the
-simulator minimised in that frame, and a distance that weighs NEARNESS times as much as inertia,
+Inertia measures the distance from where the cloth would be if nothing but its own velocity moved it,
+x_hat = 2 x_{t-1} - x_{t-2}. A network that predicts the frames t-1 and t-2 itself makes them agree with a still
+present: to hang still costs no energy. So the two frames are those of a simulation, s, and the loss of frame t
+is the function that the simulator minimised in that frame, and a distance that weighs NEARNESS times as much
+as inertia,
 
     E(x) = strain + bending + gravity + collision + |x - x_hat|^2 + NEARNESS |x - s_t|^2,
     |y|^2 = 1/(2 dt^2) y^T M y                                                                      [J]
@@ -21,45 +22,42 @@ update costs a fifth of one by the energies.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from snug.body.skinning import unskin
+from snug.motion.motion import Motion
 from snug.networks.motion_perceptron import MotionPerceptron
+from snug.training.losses.vertex_targets import Targets, load_relative, match_targets
 from snug.training.training_set import Batch, TrainingSet
-from snug.training.vertex_targets import Targets, all_relative, matched_targets
 
-if TYPE_CHECKING:
-    from snug.motion.motion import Motion
-
-NEARNESS = 1.0
+NEARNESS = 1.0  # weight of the distance, relative to that of inertia
 COMPONENTS = 96  # of the pretraining: they hold 98.7 % of the variance
-RATE, FRAMES = 2e-3, 128  # of Adam in the pretraining, and of one update
+PRETRAINING_RATE, PRETRAINING_FRAMES = 2e-3, 128  # rate of Adam, frames of one update
 
 
 class SimulatedPast:
     """The simulated frames (F', V, 3) [m] of a training set's first motions, relative to the pelvis.
 
-    Of frames that were not simulated nothing is asked. Raises TargetError for a motion without a fitting
-    trajectory.
+    Frames that were not simulated, those of augmented clips, have neither term. Raises TargetError for a
+    motion without a fitting trajectory.
     """
 
     def __init__(
         self, data: TrainingSet, motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None
     ) -> None:
         self.data, dressed = data, data.dressed
-        targets = matched_targets(motions, trajectories, dressed.vertices)
-        self.frames = all_relative(dressed, motions, targets).to(data.device)
+        targets = match_targets(motions, trajectories, dressed.vertices)
+        self.frames = load_relative(dressed, motions, targets).to(data.device)
         third = [torch.arange(motion.frames) >= 2 for motion in motions]  # with two before it in its motion
         self.third = torch.cat(third).to(data.device)
         masses = torch.as_tensor(dressed.cloth.masses, dtype=torch.float32, device=data.device)
         self.stiffness = masses[:, None] / data.dt**2  # (V, 1) [N/m]
 
     def terms(self, x: Tensor, batch: Batch) -> dict[str, Tensor]:
-        """Joules (N, T) of vertices x (N, T, V, 3) [m] relative to the pelvis: inertia and the distance."""
+        """Return inertia and distance (N, T) [J] of vertices x (N, T, V, 3) [m] relative to the pelvis."""
         rows = torch.as_tensor(batch.frames, device=x.device)
         known = rows < len(self.frames)
         rows = rows.clamp(max=len(self.frames) - 1)
@@ -69,32 +67,34 @@ class SimulatedPast:
         return {"inertia": inertia * (known & self.third[rows]), "distance": NEARNESS * distance * known}
 
     def pretrain(self, network: MotionPerceptron, weights: Tensor, *, steps: int, seed: int) -> None:
-        """Fit the network to the simulated offsets by so many updates. weights (V, J): of the skinning."""
+        """Fit the network to the simulated offsets by `steps` updates. weights (V, J): of the skinning."""
         data, count = self.data, len(self.frames)
         offsets = (unskin(self.frames, weights, data.transforms[:count]) - data.rest).flatten(1)
         offsets /= network.output_scale
-        mean, most = offsets.mean(0), min(COMPONENTS, *offsets.shape)
+        mean, components = offsets.mean(0), min(COMPONENTS, *offsets.shape)
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            directions = torch.pca_lowrank(offsets, most)[2]  # (3V, K)
-            answers = nn.Linear(network.widths[-1], most).to(offsets.device)
-        wanted = (offsets - mean) @ directions
-        spread = wanted.std(0, correction=0)
+            directions = torch.pca_lowrank(offsets, components)[2]  # (3V, K)
+            head = nn.Linear(network.widths[-1], components).to(offsets.device)
+        coefficients = (offsets - mean) @ directions
+        spread = coefficients.std(0, correction=0)
         spread.clamp_(min=1e-4 * float(spread.max()))
-        wanted, share = wanted / spread, spread / spread.norm()
+        coefficients, share = coefficients / spread, spread / spread.norm()
         features = (data.features[:count] - network.input_mean) / network.input_std
-        learned = [*network.activations.parameters(), *answers.parameters()]
-        optimiser = torch.optim.AdamW(learned, lr=RATE, weight_decay=data.recipe.weight_decay, fused=True)
+        parameters = [*network.activations.parameters(), *head.parameters()]
+        optimiser = torch.optim.AdamW(
+            parameters, lr=PRETRAINING_RATE, weight_decay=data.recipe.weight_decay, fused=True
+        )
         rate = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, max(steps, 1))
         random = np.random.default_rng(seed)
         for _ in range(steps):
-            rows = torch.as_tensor(random.integers(count, size=FRAMES), device=offsets.device)
-            away = (answers(network.activations(features[rows])) - wanted[rows]) * share
+            rows = torch.as_tensor(random.integers(count, size=PRETRAINING_FRAMES), device=offsets.device)
+            error = (head(network.activations(features[rows])) - coefficients[rows]) * share
             optimiser.zero_grad(set_to_none=True)
-            away.square().sum(-1).mean().backward()
+            error.square().sum(-1).mean().backward()
             optimiser.step()
             rate.step()
         with torch.no_grad():
-            network.offsets.weight.copy_(directions @ (spread[:, None] * answers.weight))
-            network.offsets.bias.copy_(mean + directions @ (spread * answers.bias))
+            network.offsets.weight.copy_(directions @ (spread[:, None] * head.weight))
+            network.offsets.bias.copy_(mean + directions @ (spread * head.bias))
         optimiser.zero_grad(set_to_none=True)

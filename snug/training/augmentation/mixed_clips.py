@@ -68,9 +68,9 @@ def shared_clips(
 ) -> list[Motion]:
     """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
     recipe does. Fewer are the first of more. swinging: those of each share, and pieces of the given motions,
-    as one snug.training.swinging_clips.
+    as one snug.training.augmentation.swinging_clips.
     """
-    from snug.training.swinging_clips import swinging_motion
+    from snug.training.augmentation.swinging_clips import swinging_motion
 
     clips = mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
     if not swinging:

@@ -1,6 +1,6 @@
-"""One step of training: draw sub-sequences, predict, sum energies, update, requery contact anchors.
+"""One optimisation step: draw sub-sequences, predict, sum energies, update, search contact anchors anew.
 
-`snug.training.run` repeats it, and writes down what happens between steps.
+snug.training.training_loop repeats it.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -16,31 +16,33 @@ from torch import Tensor, nn
 
 from snug.body.skinning import skin
 from snug.kernels.skinning import FastSkin
+from snug.motion.motion import Motion
+from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
-from snug.networks.trained_model import find_kind, make_network
 from snug.recipes.recipe import Recipe
+from snug.training.augmentation.mixed_clips import mixed_for, shapes_of_mixed
 from snug.training.contact.planes import Posed, TrainingContact
 from snug.training.device import CPU
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.hidden_state_cache import HiddenStateCache
-from snug.training.loss import PhysicsLoss
-from snug.training.motion_augmentation import mixed_for, shapes_of_mixed
+from snug.training.kinds import find_kind
+from snug.training.losses.physics_loss import PhysicsLoss
+from snug.training.losses.simulated_past import SimulatedPast
+from snug.training.losses.vertex_targets import Targets, VertexTargets
 from snug.training.process_group import ALONE, Group, GroupError
-from snug.training.simulated_past import SimulatedPast
 from snug.training.stopwatch import Stopwatch
 from snug.training.training_set import Batch, TrainingError, TrainingSet
-from snug.training.vertex_targets import Targets, VertexTargets
 
-if TYPE_CHECKING:
-    from snug.motion.motion import Motion
-
-DROPPED, LEAST_SHARE = 0.1, 0.01  # of the learning rate, after the drop and at the end of the cosine
+DROP, COSINE_END = 0.1, 0.01  # factors on the learning rate, after the drop and at the end of the cosine
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
 class Trainer:
-    """See `snug.training.train.train` for the arguments. Everything random comes from `seed`; no decision from a
-    clock. Random numbers are drawn on the CPU whatever the device, so that every device sees the same.
+    """A network in training, and all that its next step depends on.
+
+    Everything random comes from `seed`; no decision comes from a clock. Random numbers are drawn on the CPU
+    whatever the device, so that every device sees the same. Arguments: see
+    snug.training.train_network.train_network.
     """
 
     def __init__(
@@ -69,7 +71,12 @@ class Trainer:
         self.kernels = device.type == "cpu" if kernels is None else kernels
         self.posed_by = FastSkin.apply if self.kernels else skin
         mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
-        drawn = recipe.shape_range and dressed.body.shape_count and how.features == "motion" and how.physics
+        drawn = (
+            recipe.shape_range
+            and dressed.body.shape_count
+            and how.network.feature_set == "motion"
+            and how.physics
+        )
         self.shaped = bool(drawn) and recipe.shape_of == "window"
         shapes = None
         if drawn and recipe.shape_of == "clip":
@@ -77,7 +84,7 @@ class Trainer:
             of_mixed = shapes_of_mixed(len(mixed), dressed.body.shape_count, recipe, seed=seed)
             shapes = np.concatenate([mean, of_mixed])
         self.data = TrainingSet(
-            dressed, [*motions, *mixed], recipe, features=how.features, sequences=how.sequences,
+            dressed, [*motions, *mixed], recipe, features=how.network.feature_set, sequences=how.network.sequential,
             device=device, shapes=shapes,
         )  # fmt: skip
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
@@ -94,7 +101,7 @@ class Trainer:
         )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
-        self.windows = recipe.batch if how.sequences else recipe.batch * recipe.window
+        self.windows = recipe.batch if how.network.sequential else recipe.batch * recipe.window
         self.order = np.empty(0, np.int64)
         self.epoch = 0
         self.loss: PhysicsLoss | None = None
@@ -110,7 +117,7 @@ class Trainer:
     def _set_up_supervision(
         self, motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None
     ) -> None:
-        """By simulated vertices, or by the energies, and then perhaps about a simulated past."""
+        """Prepare the loss: simulated vertices, or the energies, perhaps about a simulated past."""
         how, recipe, data = self.how, self.recipe, self.data
         if how.targets:
             if self.group.size > 1:
@@ -141,7 +148,7 @@ class Trainer:
         return HiddenStateCache(self.data.first, (start.shape[0], start.shape[-1]), self.device)
 
     def contact_of(self, data: TrainingSet) -> TrainingContact | None:
-        """Anchors for the frames of a set; None where the recipe has no collision."""
+        """Return contact anchors for the frames of a set; None if the recipe has no collision."""
         if self.loss is None or "collision" not in self.recipe.terms:
             return None
         return TrainingContact(
@@ -167,7 +174,7 @@ class Trainer:
         return drawn
 
     def step(self, number: int) -> dict[str, float]:
-        """One update; mean joules a frame by term (cm^2 or cm for what simulated vertices teach)."""
+        """Take step `number`; return the loss and its terms, mean over frames, in the unit of the kind."""
         self.clock.step_begins(number)
         with self.clock.part("draw"):
             self._set_rate(number)
@@ -192,7 +199,7 @@ class Trainer:
     def _physics_step(
         self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Any
     ) -> dict[str, float]:
-        """windows (N,), frames (N, T): of all processes; batch: of this one."""
+        """Take a step on the energies. windows (N,), frames (N, T): of all processes; batch: of this one."""
         assert self.loss is not None
         x, after = self.predict(batch, state)
         planes = posed = None
@@ -219,7 +226,7 @@ class Trainer:
     def _searched_for_high(
         self, number: int, frames: np.ndarray, posed: Posed, x: Tensor, terms: dict[str, Tensor]
     ) -> bool:
-        """Search the anchors of windows (N, T) above the spike limit at once; whether there were any.
+        """Search the anchors of windows (N, T) above the spike limit at once; return whether there are any.
 
         An anchor of another frame, or of a garment that has moved on, can claim a contact that is none; so
         can one that stood for being roughly right, hence the search is exact. Not where most windows are
@@ -237,8 +244,9 @@ class Trainer:
         return True
 
     def start_state(self, count: int, mine: slice, batch: Batch) -> Any:
-        """What the windows of a batch start from: noise of the recipe's sigma, added to the cached state,
-        or a network's own masks.
+        """Return the state before the windows of a batch: noise of the recipe's sigma, added to the cached state.
+
+        For TailorNet it is the dropout masks.
 
         Noise is drawn for all `count` windows of the step; only that of this process is kept.
         """
@@ -249,7 +257,7 @@ class Trainer:
         return state + self.hidden_states.at(batch.frames[:, 0]) if self.hidden_states else state
 
     def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Any]:
-        """Vertices relative to the pelvis (N, T, V, 3) [m], and the state after them."""
+        """Return vertices (N, T, V, 3) [m] relative to the pelvis, and the state after them."""
         with self.clock.part("forward"):
             offsets, after = self._callable(batch.features, state)
         with self.clock.part("skinning"):
@@ -257,20 +265,20 @@ class Trainer:
             return self.posed_by(offsets + batch.rest, self.weights, batch.transforms), after
 
     def _set_rate(self, number: int) -> None:
-        recipe, share = self.recipe, 1.0
+        recipe, factor = self.recipe, 1.0
         if recipe.schedule == "epochs" and self.epoch > recipe.drop_after_epochs:
-            share = DROPPED
+            factor = DROP
         elif recipe.schedule == "cosine":
-            share = LEAST_SHARE + (1 - LEAST_SHARE) * 0.5 * (1 + math.cos(math.pi * number / self.steps))
+            factor = COSINE_END + (1 - COSINE_END) * 0.5 * (1 + math.cos(math.pi * number / self.steps))
         for group in self.optimiser.param_groups:
-            group["lr"] = self.guard.rate * recipe.learning_rate * share
+            group["lr"] = self.guard.rate * recipe.learning_rate * factor
 
     def _update(
         self, number: int, windows: np.ndarray, terms: dict[str, Tensor]
     ) -> tuple[dict[str, float], bool]:
         """Descend by the mean joules a frame, unless the guard leaves it out.
 
-        Means by term; whether the prediction is good enough to search contact anchors with.
+        Returns the means by term, and whether the prediction is good enough to search contact anchors with.
         """
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
         whole = self.group.gathered(stacked.detach())
@@ -297,7 +305,7 @@ class Trainer:
         return means, verdict != "distrust"
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
-        """Everything that the next step depends on: tensors, and plain facts for a JSON header."""
+        """Return everything that the next step depends on: tensors, and plain facts for a JSON header."""
         tensors = {name: tensor.detach() for name, tensor in live_tensors(self.network, self.optimiser)}
         tensors["order"], tensors["noise"] = torch.as_tensor(self.order.copy()), self.noise.get_state()
         if self.hidden_states:
@@ -310,22 +318,22 @@ class Trainer:
         return tensors, facts
 
     def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-        """The inverse of `state`."""
+        """Continue from a `state`."""
         self.epoch, self.random.bit_generator.state = facts["epoch"], facts["random"]
         self.order = tensors["order"].numpy()
         self.noise.set_state(tensors["noise"])
         for name, parameter in self.network.named_parameters():
             prefix = f"adam.{name}."
-            found = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
-            self.optimiser.state[parameter] = {key: tensor.to(self.device) for key, tensor in found.items()}
-        self.network.load_state_dict(part_of(tensors, "network"))
+            moments = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
+            self.optimiser.state[parameter] = {key: tensor.to(self.device) for key, tensor in moments.items()}
+        self.network.load_state_dict(select_tensors(tensors, "network"))
         if self.hidden_states:
             self.hidden_states.states.copy_(tensors["hidden_states"])
-        self.guard.resume(part_of(tensors, "guard"), facts["guard"])
+        self.guard.resume(select_tensors(tensors, "guard"), facts["guard"])
         if self.contact is not None:
-            self.contact.resume(part_of(tensors, "contact"), facts["contact"])
+            self.contact.resume(select_tensors(tensors, "contact"), facts["contact"])
 
 
-def part_of(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:
-    """The tensors called `name.*`, under what follows the dot."""
+def select_tensors(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:
+    """Return the tensors called `name.*`, by the rest of their names."""
     return {key.removeprefix(f"{name}."): t for key, t in tensors.items() if key.startswith(f"{name}.")}

@@ -41,7 +41,7 @@ from snug.kernels.lanes import LANES, laid, unlaid
 from snug.recipes.energies import find_energy
 from snug.recipes.recipe import TERMS, Recipe
 from snug.training.device import CPU
-from snug.training.pbns_material import SquaredContact, spring_terms
+from snug.training.losses.pbns_material import SquaredContact, spring_terms
 
 STATIC = ("strain", "bending", "gravity")
 Planes = tuple[Any, Any] | Kernel

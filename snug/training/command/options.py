@@ -1,4 +1,4 @@
-"""The words of `python -m snug.train`."""
+"""Options of `python -m snug.train`. Light to import: --help does without torch."""
 
 from __future__ import annotations
 
@@ -15,27 +15,28 @@ MODELS = ("snug", "pbns", "supervised", "santesteban2019", "tailornet")
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
   python -m snug.train --garment tshirt --garment tunic  one network for each garment
-  python -m snug.train --garment shirt.obj --body mine.npz    for a garment of your own (see snug.check)
+  python -m snug.train --garment shirt.obj --body mine.npz    your own garment (see snug.check)
   python -m snug.train --model pbns --steps 8000         the static baseline
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
   python -m snug.train --validation kick --patience 10   stop when a validation motion gets no better
   python -m snug.train --recipe paper --vertices 4400    the paper's text (but see snug.recipes.named on contact)
-  python -m snug.train --dataset data/walks --model supervised    taught by the simulations of a data set
+  python -m snug.train --dataset data/walks --model supervised    learn from the simulations of a data set
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
   torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
 
-supervised, santesteban2019 and tailornet are taught by simulated motions, which python -m benchmarks.dataset
-makes; python -m benchmarks.run makes its own. With --dataset, --garment, --vertices and --body are those that
-it was built with."""
+supervised, santesteban2019 and tailornet learn from simulated motions, which python -m benchmarks.dataset makes;
+python -m benchmarks.run makes its own. With --dataset, name the --garment, --vertices and --body that it was built
+with."""
 
 
-def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """Parse the command line; fill in the output file."""
     parser = Parser(
         prog="python -m snug.train",
         description="Train a garment network on a dressed body and write it to one file.",
         epilog=EXAMPLES,
     )
-    add = parser.add_argument_group("what").add_argument
+    add = parser.add_argument_group("model").add_argument
     add("--model", choices=MODELS, default="snug", help="network and loss (default: %(default)s)")
     add("--recipe", choices=tuple(RECIPES), help="named options (default: the model's own)")
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
@@ -43,7 +44,9 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         help="tshirt, tunic, skirt, tank_top, long_sleeves, trousers, shorts, dress, or a mesh made for the "
         "body; repeat for one model each (default: tshirt)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
-    add("--body", metavar="FILE", help="an own body of SMPL's family, .npz or .pkl (default: the package's)")
+    add(
+        "--body", metavar="FILE", help="your own body of SMPL's family, .npz or .pkl (default: the package's)"
+    )
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
     add("--dataset", metavar="DIR",
         help="motions and simulations of a data set, read from its files a few frames at a time")  # fmt: skip
@@ -74,7 +77,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     return options
 
 
-LEAST = {
+SMALLEST = {
     "seed": 0,
     "threads": 1,
     "validate_every": 1,
@@ -86,25 +89,25 @@ LEAST = {
 }
 
 
-def _most(name: str) -> int:
-    """More threads than cores only wait for each other; a seed has 63 bits."""
+def _largest(name: str) -> int:
+    """Return the largest value: more threads than cores only wait for each other; a seed has 63 bits."""
     return {"seed": (1 << 63) - 1, "threads": os.cpu_count() or 1}.get(name, 10**9)
 
 
-def check(options: argparse.Namespace) -> None:
-    """Raises ValueError for a word that is out of range, or means nothing without another."""
-    for name, least in LEAST.items():
-        value, most = getattr(options, name), _most(name)
-        if not least <= value <= most:
-            wanted = f"at most {most}" if value > most else f"at least {least}"
-            raise ValueError(f"--{name.replace('_', '-')} {str(value)[:40]}: {wanted}")
+def check_options(options: argparse.Namespace) -> None:
+    """Raise ValueError for an option that is out of range, or means nothing without another."""
+    from snug.training.kinds import find_kind  # loads torch
+
+    for name, smallest in SMALLEST.items():
+        value, largest = getattr(options, name), _largest(name)
+        if not smallest <= value <= largest:
+            limit = f"at most {largest}" if value > largest else f"at least {smallest}"
+            raise ValueError(f"--{name.replace('_', '-')} {str(value)[:40]}: {limit}")
     if options.dataset and options.motions:
         raise ValueError(f"--dataset {options.dataset}: has motions of its own; leave out --motions")
-    from snug.networks.trained_model import find_kind  # loads torch, which --help does without
-
     simulated = not find_kind(options.model).physics
     if simulated and not options.dataset:
-        raise ValueError(f"--model {options.model}: is taught by simulations; add --dataset DIR")
+        raise ValueError(f"--model {options.model}: learns from simulations; add --dataset DIR")
     if options.recipe and simulated:
         raise ValueError(f"--recipe {options.recipe}: {options.model} has its own; leave out --recipe")
     if options.patience and not options.validation:

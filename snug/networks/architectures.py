@@ -1,0 +1,78 @@
+"""The network of each kind of model, and its start from a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+
+from snug.networks.garment_network import GarmentNetwork
+from snug.networks.motion_perceptron import MotionPerceptron
+from snug.networks.pbns import PoseSpaceDeformation
+from snug.networks.regressor import Regressor
+from snug.networks.santesteban2019 import FitAndWrinkles
+from snug.networks.tailornet import FrequencyMixture
+from snug.recipes.recipe import Recipe
+
+ARCHITECTURES: dict[str, type[GarmentNetwork]] = {
+    "snug": Regressor,
+    "dynamic": MotionPerceptron,
+    "supervised": Regressor,
+    "pbns": PoseSpaceDeformation,
+    "santesteban2019": FitAndWrinkles,
+    "tailornet": FrequencyMixture,
+}
+
+
+def find_architecture(kind: str) -> type[GarmentNetwork]:
+    """Return the network of that kind of model. Raises ValueError naming the known kinds."""
+    if kind not in ARCHITECTURES:
+        raise ValueError(f"unknown model {kind!r}: use one of {', '.join(ARCHITECTURES)}")
+    return ARCHITECTURES[kind]
+
+
+def make_network(
+    kind: str, inputs: int, vertices: int, recipe: Recipe, *, seed: int, pins: Sequence[int] = ()
+) -> GarmentNetwork:
+    """Make a network at its start; the same seed gives the same weights, whatever was drawn before.
+
+    Args:
+        kind: one of ARCHITECTURES.
+        inputs: number of features D.
+        vertices: number of vertices V.
+        recipe: gives the scale of the output and whether the last layer starts at zero.
+        seed: of the random weights.
+        pins: vertices without offset, which the body carries.
+
+    Returns:
+        A network that maps features (N, T, D) to offsets (N, T, V, 3) [m].
+
+    Raises:
+        ValueError: for an unknown kind.
+
+    Example:
+        >>> from snug.recipes.recipe import DEFAULT
+        >>> network = make_network("pbns", 141, 4, DEFAULT, seed=0)
+        >>> offsets, state = network(torch.zeros(2, 3, 141))
+        >>> tuple(offsets.shape), state
+        ((2, 3, 4, 3), None)
+    """
+    architecture = find_architecture(kind)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        network = architecture(
+            inputs, vertices, output_scale=recipe.output_scale, zero_last_layer=recipe.zero_last_layer
+        )
+    network.pins = tuple(pins)
+    if network.pins:
+        free = torch.ones(vertices, 1)
+        free[list(pins)] = 0.0
+
+        def hold_pins(
+            _network: nn.Module, _features: object, output: tuple[Tensor, Tensor | None]
+        ) -> tuple[Tensor, Tensor | None]:
+            return output[0] * free.to(output[0].device), output[1]
+
+        network.register_forward_hook(hold_pins)
+    return network

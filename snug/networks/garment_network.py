@@ -1,0 +1,72 @@
+"""Base class of the networks that dress a body: body motion in, offsets of the unposed garment out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+if TYPE_CHECKING:
+    from snug.networks.one_frame import FramePlan
+
+
+class GarmentNetwork(nn.Module):
+    """A map from features (N, T, D) and a state to offsets (N, T, V, 3) [m] and the next state.
+
+    The features are normalised inside, by the mean and spread of the training frames, which are saved with
+    the weights: a caller passes plain features and cannot forget it.
+
+    Attributes:
+        feature_set: inputs it reads, one of snug.networks.dressed_body.FEATURE_SETS.
+        sequential: whether it carries a state from frame to frame.
+        closed_form: whether it trains by snug.kernels.gru, on a CPU; its next state then has no gradient.
+        pins: vertices without offset, which the body carries; see snug.networks.architectures.make_network.
+        output_scale: factor on the predicted offsets.
+    """
+
+    feature_set: ClassVar[str]
+    sequential: ClassVar[bool]
+    closed_form: bool = False
+    pins: tuple[int, ...] = ()
+    input_mean: Tensor
+    input_std: Tensor
+
+    def __init__(
+        self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
+    ) -> None:
+        super().__init__()
+        self.vertices, self.output_scale = vertices, output_scale
+        self.register_buffer("input_mean", torch.zeros(inputs))
+        self.register_buffer("input_std", torch.ones(inputs))
+
+    def normalise_by(self, mean: np.ndarray, std: np.ndarray) -> None:
+        """Set the mean (D,) and spread (D,) of the inputs."""
+        self.input_mean.copy_(torch.as_tensor(mean))
+        self.input_std.copy_(torch.as_tensor(std))
+
+    def normalise(self, features: Tensor) -> Tensor:
+        """Return the features (N, T, D) less their mean, over their spread."""
+        return (features - self.input_mean) / self.input_std
+
+    def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor | None:
+        """Draw the state that a training window starts from; None for a network without one."""
+        return None
+
+    def lay_out(self, plan: FramePlan) -> None:
+        """Add the operations of `forward` for one frame to the plan."""
+        raise NotImplementedError
+
+    @property
+    def megabytes(self) -> float:
+        """Memory of the weights and of the input normalisation [MB]."""
+        tensors = [*self.parameters(), *self.buffers()]
+        return sum(t.numel() * t.element_size() for t in tensors) / 1e6
+
+
+def zero(*layers: nn.Linear) -> None:
+    """Set weights and biases of the layers to zero, so that training starts at the skinned garment."""
+    for layer in layers:
+        for parameter in layer.parameters():
+            nn.init.zeros_(parameter)

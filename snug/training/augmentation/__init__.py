@@ -1,0 +1,1 @@
+"""Augmented training data: clips made from the limbs and pieces of original motions."""

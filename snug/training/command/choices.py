@@ -1,0 +1,80 @@
+"""Garments, motions and files that the command line of snug.train names."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from snug.body.parametric_body import Body
+from snug.garments.garment import Garment
+from snug.garments.options import demand_garment_file, is_garment_file, make_garment_file
+from snug.garments.templates import TSHIRT, GarmentTemplate, find_template
+from snug.motion.files import load_motions
+from snug.motion.library import TRAIN, VALIDATION, make_motion
+from snug.motion.motion import Motion
+from snug.motion.options import parse_motion_options
+from snug.training.simulated_data import DataSet
+
+
+def choose_garments(options: argparse.Namespace) -> list[GarmentTemplate]:
+    """Return the garments to train for, each once; the T-shirt if none is named. Raises ValueError."""
+    if not any(map(is_garment_file, options.garment)):
+        demand_garment_file(options)
+    return [
+        _template_of_file(word, options) if is_garment_file(word) else find_template(word)
+        for word in dict.fromkeys(options.garment or [TSHIRT])
+    ]
+
+
+def _template_of_file(path: str, options: argparse.Namespace) -> GarmentTemplate:
+    """Return a garment that is read instead of tailored, whatever number of vertices is asked for."""
+    from snug.garments.reading import read_garment  # a tailored garment needs no reader of meshes
+
+    file = make_garment_file(path, options)
+
+    def tailor(body: Body, *, vertices: int) -> Garment:
+        return read_garment(file, body)
+
+    return GarmentTemplate(file.name, f"garment of {path}", tailor)
+
+
+def output_files(out: Path, templates: Sequence[GarmentTemplate]) -> list[Path]:
+    """Return the model file of each garment.
+
+    Raises ValueError for one that cannot be written: now rather than after the training.
+    """
+    files = [out]
+    if len(templates) > 1:
+        files = [out.with_name(f"{out.stem}-{template.name}{out.suffix}") for template in templates]
+    if duplicate := next((path for path in files if files.count(path) > 1), None):
+        raise ValueError(f"--garment: two of them would be {duplicate}: rename a file")
+    for path in files:
+        folder = next(folder for folder in path.absolute().parents if folder.exists())
+        if path.is_dir():
+            raise ValueError(f"--out {path}: is a folder; name a file")
+        if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+            raise ValueError(f"--out {path}: {folder} cannot be written to; name another folder")
+    return files
+
+
+def choose_motions(options: argparse.Namespace, data: DataSet | None) -> tuple[list[Motion], list[Motion]]:
+    """Return the motions to train on and those to validate with. Raises ValueError for an unknown name."""
+    reading = parse_motion_options(options)
+    motions = data.motions() if data else [make_motion(name) for name in TRAIN]
+    if options.motions:
+        motions = load_motions(options.motions, options=reading)
+    names = [motion.name for motion in motions]
+    others = [name for name in VALIDATION if name not in names]  # of the library: they never train
+    for option, known in (("hold_out", names), ("validation", [*names, *others])):
+        for name in getattr(options, option):
+            if name not in known:
+                raise ValueError(
+                    f"--{option.replace('_', '-')} {name}: no such motion among {', '.join(known)}"
+                )
+    left_out = {*options.hold_out, *options.validation}
+    training = [motion for motion in motions if motion.name not in left_out]
+    validating = [motion for motion in motions if motion.name in options.validation]
+    validating += [make_motion(name) for name in others if name in options.validation]
+    return training, validating

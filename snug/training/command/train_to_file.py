@@ -1,0 +1,173 @@
+"""Training of one garment's network from the command line: its notes, its checkpoint, its model file."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from snug.body.parametric_body import Body
+from snug.garments.templates import GarmentTemplate
+from snug.motion.motion import Motion
+from snug.networks.dressed_body import DressedBody
+from snug.networks.trained_model import TrainedModel
+from snug.recipes.named import RECIPE_OF_KIND, find_recipe
+from snug.recipes.recipe import Recipe
+from snug.training.checkpoint import Checkpoint
+from snug.training.command.tensorboard_log import TensorBoardLog
+from snug.training.kinds import find_kind
+from snug.training.losses.vertex_targets import StoredVertices
+from snug.training.process_group import Group
+from snug.training.simulated_data import DataSet, settings_of
+from snug.training.train_network import train_network
+from snug.training.validation import Validation
+
+
+@dataclass(frozen=True)
+class TrainingJob:
+    """All that the networks of one command share.
+
+    Attributes:
+        options: of the command line, checked.
+        body: wears the garments.
+        motions: to train on.
+        held_out: to validate with.
+        data: simulated motions, or None.
+        device: `cpu` or `cuda`.
+        group: processes that share the training.
+        stop: whether the process was asked to end.
+    """
+
+    options: argparse.Namespace
+    body: Body
+    motions: list[Motion]
+    held_out: list[Motion]
+    data: DataSet | None
+    device: str
+    group: Group
+    stop: Callable[[], bool]
+
+    @property
+    def recipe(self) -> Recipe:
+        """The recipe named in the command, or that of the model's kind."""
+        name = self.options.recipe
+        return find_recipe(name) if name else RECIPE_OF_KIND[self.options.model]
+
+    def train(self, template: GarmentTemplate, output: Path) -> None:
+        """Train the network of one garment and write it. Raises ValueError, Interrupted."""
+        options, say = self.options, print if self.group.writes else lambda *_: None
+        checkpoint = Checkpoint(
+            path=output.with_name(f"{output.stem}.checkpoint.safetensors"), steps=options.checkpoint_steps,
+            minutes=options.checkpoint_minutes, resume=options.resume,
+        )  # fmt: skip
+        if checkpoint.path.is_file() and not options.resume:
+            say(f"note: {checkpoint.path} of a stopped run will be replaced; --resume would go on with it")
+        dressed = DressedBody(self.body, template.tailor(self.body, vertices=options.vertices))
+        trajectories = self._trajectories(dressed)
+        learned_from = digest_inputs(dressed, self.motions, self.held_out, trajectories or {})
+        if options.resume and output.is_file() and not checkpoint.path.is_file():
+            self._check_finished(output, dressed.vertices, learned_from)
+            say(f"{output}: is there, and no checkpoint beside it; nothing to resume")
+            return
+        if output.is_file():
+            say(f"note: {output} will be replaced when this training has ended")
+        frames = sum(motion.frames for motion in self.motions)
+        say(f"{template.description}: {dressed.vertices} vertices, {len(self.motions)} motions, "
+            f"{frames} frames, recipe {self.recipe.name}")  # fmt: skip
+        model = self._run(dressed, output.stem, checkpoint, trajectories)
+        if self.group.writes:
+            model.summary["learned_from"] = learned_from
+            print_summary(model)
+            print(model.save(output))
+            checkpoint.delete()
+
+    def _trajectories(self, dressed: DressedBody) -> dict[str, StoredVertices] | None:
+        """Return the simulated vertices, if the model learns from them. Raises ValueError for unfit data."""
+        if self.data is None:
+            return None
+        self.data.check(settings_of(self.body, dressed.garment))
+        return None if find_kind(self.options.model).physics else self.data.targets()
+
+    def _run(
+        self,
+        dressed: DressedBody,
+        name: str,
+        checkpoint: Checkpoint,
+        trajectories: Mapping[str, StoredVertices] | None,
+    ) -> TrainedModel:
+        options, validation, curves = self.options, None, None
+        if self.held_out:
+            validation = Validation(
+                motions=self.held_out, every=options.validate_every, patience=options.patience,
+                trajectories=trajectories,
+            )  # fmt: skip
+        if options.tensorboard and self.group.writes:
+            curves = TensorBoardLog(Path(options.tensorboard) / name)
+        try:
+            return train_network(
+                options.model, dressed, self.motions, steps=options.steps, seed=options.seed,
+                recipe=self.recipe, trajectories=trajectories, log=curves.write if curves else None,
+                device=self.device, checkpoint=checkpoint, validation=validation, group=self.group,
+                stop=self.stop,
+            )  # fmt: skip
+        finally:
+            if curves:
+                curves.close()
+
+    def _check_finished(self, output: Path, vertices: int, learned_from: str) -> None:
+        """Raise ValueError unless the existing model is the one that this command trains."""
+        model, options = TrainedModel.load(output), self.options
+        facts = {
+            "model": (model.kind, options.model),
+            "recipe": (model.recipe, self.recipe),
+            "seed": (model.seed, options.seed),
+            "vertices": (model.vertices, vertices),
+            "number of steps": (model.steps, model.steps if options.patience else options.steps),
+            "body, garment or motions": (model.summary.get("learned_from"), learned_from),
+        }
+        differing = [name for name, (stored, wanted) in facts.items() if stored != wanted]
+        if differing:
+            raise ValueError(
+                f"{output}: of another {differing[0]}; name another --out, or leave out --resume"
+            )
+
+
+def digest_inputs(
+    dressed: DressedBody,
+    motions: list[Motion],
+    held_out: list[Motion],
+    simulated: Mapping[str, StoredVertices],
+) -> str:
+    """Return a digest of body, garment, training and validation motions, and simulated vertices."""
+    contents = sorted((name, simulated[name].content) for name in simulated)
+    body, garment = dressed.body, dressed.garment
+    digest = hashlib.sha256(repr((settings_of(body, garment), contents, garment.authored_weights)).encode())
+    for array in (garment.skinning_weights, body.shape_directions, body.joint_directions):
+        digest.update((np.round(array, 6) + 0.0).tobytes())
+    for role, several in (("train", motions), ("validate", held_out)):
+        for motion in several:
+            digest.update(f"{role} {motion.name} {motion.fps}".encode())
+            for array in (motion.poses, motion.translations):  # the last bits are of the processor
+                digest.update((np.round(array, 6) + 0.0).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def print_summary(model: TrainedModel) -> None:
+    """Print the last losses, the times of a step's parts, and high windows."""
+    row, unit = model.history[-1], model.unit
+    terms = [f"{name} {value:.4g}" for name, value in row.items()
+             if "/" not in name and name not in ("step", "seconds")]  # fmt: skip
+    parts = {name: value for name, value in row.items() if "/" in name}
+    print(f"last steps, {unit}, mean over frames: " + "  ".join(terms))
+    print("ms a step: " + "  ".join(f"{n.removeprefix('seconds/')} {1e3 * s:.1f}" for n, s in parts.items()))
+    for window in model.summary["named_windows"][:5]:
+        print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=unit))
+    if validation := model.summary.get("validation"):
+        best, step = validation["best"], validation["best_step"]
+        print(f"validation {best:.4g} {unit} at step {step}, whose weights are kept")
+    print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
+          f"{model.megabytes:.1f} MB")  # fmt: skip

@@ -1,0 +1,53 @@
+"""Kinds of models: the network of each, and whether the energies or simulated vertices teach it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from snug.networks.architectures import ARCHITECTURES, find_architecture
+from snug.networks.garment_network import GarmentNetwork
+from snug.training.losses.vertex_targets import BandTargets, VertexTargets
+
+
+@dataclass(frozen=True)
+class Kind:
+    """The training of one kind of model.
+
+    Attributes:
+        network: its architecture.
+        targets: the form in which it learns simulated vertices; None if it learns from the energies.
+        past: whether inertia is that of a simulation's previous frames, see
+            snug.training.losses.simulated_past.
+        closed_form: whether it trains faster by snug.kernels.gru.
+    """
+
+    network: type[GarmentNetwork]
+    targets: type[VertexTargets] | None = None
+    past: bool = False
+    closed_form: bool = False
+
+    @property
+    def physics(self) -> bool:
+        """Whether it learns from the energies."""
+        return self.targets is None
+
+    @property
+    def unit(self) -> str:
+        """Unit of its loss: a frame's energy, or a distance from the simulated vertices."""
+        return self.targets.unit if self.targets else "J"
+
+
+KINDS = {
+    "snug": Kind(ARCHITECTURES["snug"], closed_form=True),
+    "dynamic": Kind(ARCHITECTURES["dynamic"], past=True, closed_form=True),
+    "supervised": Kind(ARCHITECTURES["supervised"], targets=VertexTargets, closed_form=True),
+    "pbns": Kind(ARCHITECTURES["pbns"]),
+    "santesteban2019": Kind(ARCHITECTURES["santesteban2019"], targets=VertexTargets, closed_form=True),
+    "tailornet": Kind(ARCHITECTURES["tailornet"], targets=BandTargets),
+}
+
+
+def find_kind(name: str) -> Kind:
+    """Return the kind of that name. Raises ValueError naming the known ones."""
+    find_architecture(name)
+    return KINDS[name]

@@ -1,0 +1,1 @@
+"""Losses: energies of the simulator, distances from simulated vertices, PBNS's own material."""

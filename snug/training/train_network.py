@@ -1,0 +1,106 @@
+"""Train a network, or make an untrained one. The command is snug.train."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from snug.motion.motion import Motion
+from snug.networks.architectures import make_network
+from snug.networks.dressed_body import DressedBody
+from snug.networks.trained_model import TrainedModel
+from snug.recipes.recipe import DEFAULT, Recipe
+from snug.training.checkpoint import Checkpoint
+from snug.training.device import find_device
+from snug.training.kinds import find_kind
+from snug.training.losses.vertex_targets import Targets
+from snug.training.optimisation_step import Trainer
+from snug.training.process_group import ALONE, Group
+from snug.training.training_loop import TrainingLoop
+from snug.training.training_set import TrainingSet
+from snug.training.validation import Validation
+
+
+def train_network(
+    model_kind: str,
+    dressed: DressedBody,
+    motions: Sequence[Motion],
+    *,
+    steps: int,
+    seed: int,
+    trajectories: Mapping[str, Targets] | None = None,
+    recipe: Recipe = DEFAULT,
+    log: Callable[[dict[str, float]], None] | None = None,
+    progress: bool = True,
+    every: int = 50,
+    device: str = "cpu",
+    kernels: bool | None = None,
+    checkpoint: Checkpoint | None = None,
+    validation: Validation | None = None,
+    group: Group = ALONE,
+    stop: Callable[[], bool] = lambda: False,
+) -> TrainedModel:
+    """Train one network for a number of steps; on a CPU equal arguments give equal weights, bit for bit.
+
+    Args:
+        model_kind: one of snug.training.kinds.KINDS; `snug` and `pbns` learn from the energies, the others
+            from a simulation.
+        dressed: a garment on a body.
+        motions: training motions, all of one frame rate.
+        steps: number of updates.
+        seed: of everything random.
+        trajectories: for kinds that learn from a simulation, motion name -> simulated world vertices
+            (T, V, 3) [m], or where they are stored.
+        recipe: options of network and training.
+        log: called with each row of the history, every `every` steps.
+        progress: whether a bar is shown on standard error.
+        every: steps between two rows of the history.
+        device: `cpu` or `cuda`, for the whole step.
+        kernels: closed forms in numba (the default on a CPU) or the definitions of the energies in torch
+            (everywhere else).
+        checkpoint: where checkpoints are written. A run resumed from one ends, on a CPU, with the bits of an
+            unbroken run. The last one stays until the caller has stored the model and calls
+            `checkpoint.delete()`.
+        validation: held-out motions; the weights that do best on them are kept.
+        group: processes of torchrun that share the batch.
+        stop: asked after each step; True writes a checkpoint and ends the run.
+
+    Returns:
+        The trained model.
+
+    Raises:
+        ValueError: TrainingError, TargetError, RecipeError, DeviceError or TensorFileError, naming what is
+            missing or diverged.
+        snug.training.training_loop.Interrupted: when `stop` returned True.
+    """
+    start = time.perf_counter()
+    trainer = Trainer(
+        model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
+        device=find_device(device), kernels=kernels, group=group,
+    )  # fmt: skip
+    loop = TrainingLoop(
+        trainer, log=log, progress=progress, every=every, checkpoint=checkpoint, validation=validation,
+        stop=stop, setup_seconds=time.perf_counter() - start,
+    )  # fmt: skip
+    return loop.run()
+
+
+def untrained_model(
+    model_kind: str, dressed: DressedBody, motions: Sequence[Motion], *, seed: int, recipe: Recipe = DEFAULT
+) -> TrainedModel:
+    """Return a network before any step, a row of the benchmark's tables.
+
+    The default recipe starts at a zero last layer, where the untrained network is skinning alone. So this one
+    keeps PyTorch's own random last layer: the answer of a network that has learned nothing. Input statistics
+    are those of the training motions.
+    """
+    kind = find_kind(model_kind)
+    recipe = replace(recipe, zero_last_layer=False)
+    data = TrainingSet(
+        dressed, motions, recipe, features=kind.network.feature_set, sequences=kind.network.sequential
+    )
+    pins = dressed.garment.pins
+    network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)
+    network.normalise_by(*data.input_statistics())
+    return TrainedModel(model_kind, network.eval(), recipe, seed=seed, unit=kind.unit)
