@@ -15,10 +15,10 @@ from benchmarks.methods import find_method
 from benchmarks.plan import plug_ins as outside
 from benchmarks.plan.plan import Motions, Plan
 from benchmarks.presets import find_preset
+from benchmarks.process.timing import one_thread
 from benchmarks.registry import DeclarationError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scenes import SCENES, find_scene, of_garment
-from benchmarks.timing import one_thread
 from reference_sim.command.command_line import Parser, command
 
 if TYPE_CHECKING:

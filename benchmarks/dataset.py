@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.timing import one_thread
+from benchmarks.process.timing import one_thread
 from reference_sim.command.command_line import Parser, command
 from snug.garments.options import add_garment_options
 from snug.motion.options import add_motion_options
@@ -125,14 +125,12 @@ def _told(found: DataSet) -> int:
 
 
 def _verify(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from benchmarks.results.run_folder import RunFolder
-    from benchmarks.runner.cache import damaged
+    from benchmarks.fingerprint.digest import damaged
     from snug.training.simulated_data import MISSING, DataSet
 
-    found = DataSet.read(options.folder)
-    folder, wrong = RunFolder(found.folder), 0
+    found, wrong = DataSet.read(options.folder), 0
     for line in found.sequences:
-        complaint = MISSING if line.status == MISSING else damaged(folder, line.digests)
+        complaint = MISSING if line.status == MISSING else damaged(found.folder, line.digests)
         if complaint:
             print(f"{line.name}: {complaint}")
             wrong += 1

@@ -14,7 +14,7 @@ from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import add_scene_options, scene_fields, split
 from benchmarks.plan.plan import Plan, PlanError
 from benchmarks.plan.request import Request
-from benchmarks.timing import one_thread
+from benchmarks.process.timing import one_thread
 from reference_sim.command.command_line import Parser, command
 
 PROGRAM = "benchmarks.export"

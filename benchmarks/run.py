@@ -13,9 +13,9 @@ from benchmarks.external.roll_out_option import RollOutError
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import PROGRAM, make_parser, request_of_run
 from benchmarks.plan.plan import Plan
+from benchmarks.process.timing import one_thread
 from benchmarks.registry import DeclarationError
 from benchmarks.tasks.task import RunStopped
-from benchmarks.timing import one_thread
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,7 +48,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
 
             print(describe(plan))
             return 0
-        from benchmarks.runner.whole_run import check_roll_outs, execute
+        from benchmarks.runner.execute_plan import check_roll_outs, execute
 
         assets = check_roll_outs(plan)
         with held(plan.folder):

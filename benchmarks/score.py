@@ -27,9 +27,9 @@ from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import add_scene_options, scene_fields, split
 from benchmarks.plan.plan import Plan
 from benchmarks.plan.request import Request
+from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
-from benchmarks.timing import one_thread
 from reference_sim.command.command_line import Parser
 
 PROGRAM = "benchmarks.score"

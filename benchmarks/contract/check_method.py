@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.cell import TaskId
 from benchmarks.contract.findings import Broken, Connections, Findings, altered, fingerprints
 from benchmarks.method import Method
+from benchmarks.process.timing import Reading, clocked
 from benchmarks.scene import BuiltScene
 from benchmarks.tasks.cell_task import UNBELIEVABLE, CellTask, judge, misshapen
 from benchmarks.tasks.task import Context, Outcome
-from benchmarks.timing import Reading, clocked
 
 if TYPE_CHECKING:
     from reference_sim import Trajectory

@@ -21,10 +21,10 @@ from benchmarks.presets import find_preset
 from benchmarks.registry import by_name
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
+from benchmarks.runner.execute_plan import executor_of
 from benchmarks.runner.lock import held
 from benchmarks.runner.loop import NoLog, Runner
 from benchmarks.runner.schedule import Schedule
-from benchmarks.runner.whole_run import executor_of
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.sequence import SimulateSequence
 from benchmarks.tasks.task import Outcome

@@ -18,7 +18,7 @@ from typing import Any
 
 from benchmarks.cell import TaskId
 from benchmarks.fingerprint.dependencies import software
-from benchmarks.fingerprint.digest import digest, digest_of_file
+from benchmarks.fingerprint.digest import damaged, digest, digest_of_file
 from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.results.json_file import ResultsError, read_json
 from benchmarks.results.run_folder import FORMAT, RunFolder, replacing
@@ -108,7 +108,7 @@ class Cache:
         if entry is None or entry["task"] != task.title:
             return "missing", "its entry is damaged or of another version", {}
         outcome, parts, needs = Outcome(**entry["outcome"]), entry["parts"], entry["needs"]
-        if damage := damaged(self.folder, entry["files"]):
+        if damage := damaged(self.folder.path, entry["files"]):
             return "missing", damage, {}
         now = dependencies(task)
         changed = [name for name in now if parts.get(name) != now[name]]
@@ -128,17 +128,6 @@ def read_entry(path: Path) -> dict[str, Any] | None:
         return None
     whole = entry.pop("digest", "") == digest(_text(entry).encode())
     return entry if whole and entry.get("format") == FORMAT else None
-
-
-def damaged(folder: RunFolder, files: Mapping[str, str]) -> str:
-    """Which of these files, name -> digest, is gone or not as it was written; empty where none is."""
-    for name, content in files.items():
-        path = folder.path / name
-        if not path.is_file():
-            return f"{name} is gone"
-        if digest_of_file(path) != content:
-            return f"{name} is damaged"
-    return ""
 
 
 _KEPT = ("status", "reason", "failed", "result", "seconds")

@@ -22,12 +22,11 @@ from typing import Any, BinaryIO
 
 from benchmarks.assets.assets import Assets
 from benchmarks.cell import TaskId
-from benchmarks.fingerprint.digest import digest, digest_of_file
+from benchmarks.fingerprint.digest import damaged, digest, digest_of_file
 from benchmarks.process.errors import one_line
 from benchmarks.process.scheduler import connect
 from benchmarks.results.run_folder import RunFolder, replacing
 from benchmarks.runner import cluster_worker
-from benchmarks.runner.cache import damaged
 from benchmarks.runner.cluster_worker import ASSETS, PIECE, Gone, Unfit
 from benchmarks.runner.local_executor import POLL, Done, LocalExecutor, Needed, Ready
 from benchmarks.tasks.task import Outcome, RunStopped, Task, failure
@@ -268,7 +267,7 @@ class ClusterExecutor(LocalExecutor):
         if worker.has.get(name) == content:
             return
         if stream is None:
-            if damage := damaged(self.folder, {name: content}):
+            if damage := damaged(self.folder.path, {name: content}):
                 raise RunStopped(f"{damage} since this run wrote it")
             stream = (self.folder.path / name).open("rb")
         with stream:

@@ -23,11 +23,11 @@ from benchmarks import provenance
 from benchmarks.fingerprint.dependencies import software
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.process.errors import one_line
+from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.local_executor import TaskProcess, begin_tasks
+from benchmarks.runner.task_process import TaskProcess, begin_tasks
 from benchmarks.tasks.cell_task import CellTask
 from benchmarks.tasks.task import Context, Outcome, Task, failure
-from benchmarks.timing import one_thread
 
 PIECE = 8 << 20  # bytes of a file at a time
 WATCH = 1.0  # [s] between looks at what nobody wants any more

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.results.run_folder import USABLE, Row
-from benchmarks.rows import DECLARED, NOT_FALLING, SPREAD
+from benchmarks.runner.rows import DECLARED, NOT_FALLING, SPREAD
 
 COLUMNS = (
     ("energy/total", "total J"),

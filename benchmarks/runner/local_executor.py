@@ -5,28 +5,20 @@ A task that raises, hangs, or whose process dies is an outcome, not an end of th
 
 from __future__ import annotations
 
-import dataclasses
 import multiprocessing
-import os
 import queue
-import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import suppress
 from typing import Any, Protocol
 
 from benchmarks.assets.assets import Assets
-from benchmarks.cell import TaskId
-from benchmarks.process.isolated_process import IsolatedProcess, WorkerDied, new_processes
-from benchmarks.process.memory import give_back
+from benchmarks.process.isolated_process import IsolatedProcess
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cache import damaged
-from benchmarks.tasks.task import Context, Outcome, RunStopped, Task, failure, tell_nobody
+from benchmarks.runner.task_process import Needed, TaskProcess, begin_task, begin_tasks, call, perform
+from benchmarks.tasks.task import Context, Outcome, Task
 
 POLL = 0.2  # [s] between looks at the progress
-COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
 
-Needed = Mapping[TaskId, Outcome]
 Batch = tuple[Sequence[Task], Needed]
 Done = tuple[Task, Outcome]
 Ready = Callable[[], Batch | None]
@@ -112,7 +104,7 @@ class LocalExecutor:
         with ThreadPoolExecutor(self.workers) as threads:
             begun = {
                 task.process: threads.submit(
-                    _called, self._process(task), _begin, task, needed, seconds=task.deadline
+                    call, self._process(task), begin_task, task, needed, seconds=task.deadline
                 )
                 for task, needed in tasks
             }
@@ -126,7 +118,7 @@ class LocalExecutor:
         self._dismiss()
         if trouble := self._troubles.pop(task.process, None):
             return trouble
-        return _called(self._process(task), _perform, task, needed, seconds=task.deadline)
+        return call(self._process(task), perform, task, needed, seconds=task.deadline)
 
     def _process(self, task: Task) -> IsolatedProcess:
         """The one that a timed task names."""
@@ -149,65 +141,6 @@ class LocalExecutor:
             self._crew.pop().process.close()
 
 
-class TaskProcess:
-    """A process that does one untimed task after another, another process after one that was killed.
-
-    begin(*arguments, progress) is called first in each of them, see begin_tasks.
-    """
-
-    def __init__(self, begin: Callable[..., None], *arguments: Any) -> None:
-        self._begin = (begin, *arguments)
-        self._renew()
-
-    def _renew(self) -> None:
-        # A queue for each process: one that is killed while it reports leaves a lock that nobody opens.
-        self.progress = new_processes().SimpleQueue()
-        self.process = IsolatedProcess(*self._begin, self.progress)
-        self.warm: set[tuple[str, str]] = set()
-
-    def forget(self) -> None:
-        """Let nothing of the batch before be there for the next."""
-        try:
-            if self.process.alive:
-                self.process.call(_forget, seconds=None)
-        except WorkerDied:
-            self._renew()
-
-    def do(self, task: Task, needed: Needed) -> Outcome:
-        """The task's outcome; what it leaves in the memo is there for the next."""
-        outcome = self._warm(task) or _called(self.process, _perform, task, needed, seconds=task.deadline)
-        if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
-            self.process.close()
-        if not self.process.alive:
-            self._renew()
-        return outcome
-
-    def _warm(self, task: Task) -> Outcome | None:
-        """What went wrong before the process could do its first task of this kind and module."""
-        if (task.kind, task.modules[0]) in self.warm:
-            return None
-        trouble = _called(self.process, task.warm_up, seconds=COMPILING)
-        if trouble is None:
-            self.warm.add((task.kind, task.modules[0]))
-        return trouble
-
-    def told(self) -> float:
-        """Progress since the last call, in seconds that it was expected to take."""
-        progress, seconds = self.progress, 0.0  # the worker may get another meanwhile
-        while not progress.empty():
-            seconds += progress.get()
-        return seconds
-
-
-def _called(process: IsolatedProcess, function: Callable[..., Any], *arguments: Any, seconds: Any) -> Any:
-    """function(*arguments) in that process, which is ended at the deadline; what goes wrong is an outcome."""
-    clock = time.perf_counter()
-    try:
-        return process.call(function, *arguments, seconds=seconds)
-    except Exception as error:
-        return dataclasses.replace(failure(error), seconds=time.perf_counter() - clock)
-
-
 def _end(futures: set[Future[Any]]) -> None:
     """Begin no other batch, and end the workers until none is left that a thread waits for."""
     left = {future for future in futures if not future.cancel()}
@@ -215,49 +148,3 @@ def _end(futures: set[Future[Any]]) -> None:
         for child in multiprocessing.active_children():
             child.kill()
         _, left = wait(left, timeout=POLL)
-
-
-# --- in the process ----------------------------------------------------------------------------------------
-
-_context: Context
-_verified: set[tuple[str, str]] = set()  # files that this process has compared with their digests
-
-
-def begin_tasks(context: Context, progress: Any = None) -> None:
-    """Keep what a process knows. progress: a queue of expected seconds, None where nobody follows them."""
-    global _context
-    tell: Callable[[float], None] = tell_nobody if progress is None else progress.put
-    if progress is not None:
-        os.environ["TQDM_DISABLE"] = "1"  # one bar for all that are side by side is enough
-    _context = dataclasses.replace(context, tell=tell, memo={})
-
-
-def _forget() -> None:
-    _context.memo.clear()
-    give_back()
-
-
-def _begin(task: Task, needed: Needed) -> None:
-    for outcome in needed.values():
-        _verify(outcome.digests)
-    with suppress(Exception):  # it is raised again, and told, when it is the task's turn
-        task.begin(_context)
-
-
-def _perform(task: Task, needed: Needed) -> Outcome:
-    for outcome in needed.values():
-        _verify(outcome.digests)
-    context = dataclasses.replace(_context, tell=lambda units: _context.tell(units * task.unit_seconds))
-    clock = time.perf_counter()
-    try:
-        outcome = task.run(context, needed)
-    except Exception as error:
-        outcome = failure(error)
-    return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
-
-
-def _verify(digests: Mapping[str, str]) -> None:
-    """Raises RunStopped where a file is not as it was written: the next run makes it anew."""
-    if damage := damaged(_context.folder, dict(digests.items() - _verified)):
-        raise RunStopped(f"{damage} since this run wrote it")
-    _verified.update(digests.items())

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.cell import Cell, TaskId
 from benchmarks.method import Method
 from benchmarks.process.memory import peak_memory
+from benchmarks.process.timing import Reading, clocked
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import BuiltScene, Scene
 from benchmarks.tasks.task import Context, Outcome, Task, failure
-from benchmarks.timing import Reading, clocked
 
 if TYPE_CHECKING:
     import numpy as np

@@ -47,7 +47,8 @@ def no_processes():
     """Every task is run in this process: none is begun, and nothing is compiled again."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "benchmarks.runner.whole_run.LocalExecutor", lambda folder, assets, _: InProcess(folder, assets)
+            "benchmarks.runner.execute_plan.LocalExecutor",
+            lambda folder, assets, _: InProcess(folder, assets),
         )
         yield
 

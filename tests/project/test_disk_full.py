@@ -20,7 +20,7 @@ import torch
 
 from benchmarks import run
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner import whole_run as execution
+from benchmarks.runner import execute_plan as execution
 from reference_sim import Trajectory
 from reference_sim.command import simulate_command as command
 from reference_sim.files.array_file import write_array
@@ -151,7 +151,7 @@ def in_process(folder, assets, workers) -> InProcess:
 
 @pytest.mark.parametrize("own_processes", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: True)
     words = [
         "--preset",
         "smoke",

@@ -35,7 +35,7 @@ ALLOWED = {
 # The referee's solvers are not for the contestants.
 FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate", "reference_sim.time_loop")}
 # A run ends by making the report of the run that it wrote.
-EXCEPTIONS = {("benchmarks/runner/whole_run.py", "reports.build.build_report")}
+EXCEPTIONS = {("benchmarks/runner/execute_plan.py", "reports.build.build_report")}
 # Headline geometry must not share an error with the physics.
 PURE = ("benchmarks/metrics/surface/curvature.py", "benchmarks/metrics/surface/distances.py")
 DECLARATION = "benchmarks.metric.Metric"  # name, unit and definition: no physics
@@ -127,7 +127,7 @@ def test_a_planted_import_is_found(path, source):
         ("snug/a.py", "from reference_sim import Cloth\nfrom . import body"),
         ("snug/baselines/a.py", "from ..loss import f\nimport torch"),
         (
-            "benchmarks/runner/whole_run.py",
+            "benchmarks/runner/execute_plan.py",
             "def f():\n    import torch\n    from reports.build import build_report",
         ),
         ("reports/a.py", "from benchmarks.results.run_folder import RunFolder\nfrom .tables import f"),

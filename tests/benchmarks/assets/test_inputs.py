@@ -12,7 +12,7 @@ import pytest
 from benchmarks.assets.inputs import InputError, read_inputs
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, request_of_run
-from benchmarks.runner.whole_run import check_roll_outs
+from benchmarks.runner.execute_plan import check_roll_outs
 from benchmarks.score import make_parser as score_parser
 from benchmarks.score import plan_of
 from snug.body.parametric_body import Body

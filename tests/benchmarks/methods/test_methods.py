@@ -9,7 +9,6 @@ import itertools
 import numpy as np
 import pytest
 
-from benchmarks import timing
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.cell import Cell
 from benchmarks.method import Method
@@ -17,11 +16,12 @@ from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import find_preset
+from benchmarks.process import timing
 from benchmarks.results import frame_energies
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.rows import rows_of
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
+from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
 from benchmarks.tasks.cell_task import built

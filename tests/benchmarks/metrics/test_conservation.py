@@ -15,7 +15,7 @@ from benchmarks.metrics.motion import conservation
 from benchmarks.metrics.motion.conservation import law_series
 from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
-from benchmarks.rows import rows_of_cell
+from benchmarks.runner.rows import rows_of_cell
 from benchmarks.scene import Dressed
 from benchmarks.scenes import find_scene
 from benchmarks.tasks.task import Outcome

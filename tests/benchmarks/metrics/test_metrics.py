@@ -30,7 +30,7 @@ from benchmarks.metrics.surface.distances import distance_rms, hem_drift, own_pa
 from benchmarks.metrics.surface.intersections import intersecting, intersecting_share
 from benchmarks.metrics.surface.rest_shape import area_change, dihedral_angle, edge_change
 from benchmarks.results.run_folder import Row
-from benchmarks.rows import remarked
+from benchmarks.runner.rows import remarked
 from reference_sim import Obstacle, Trajectory, simulate
 from snug.body.skeleton import JOINT
 from tests.benchmarks.runner.tasks_by_hand import small_scene

@@ -27,8 +27,9 @@ from benchmarks.plan.choose_cells import MEASURED, Selection, choose_cells, choo
 from benchmarks.plan.plan import Motions, Plan, PlanError
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.rows import described, rows_of
-from benchmarks.runner import whole_run as execution
+from benchmarks.runner import execute_plan as execution
+from benchmarks.runner.rows import rows_of
+from benchmarks.runner.run_json import described
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Outcome
 from reference_sim import simulate
@@ -138,7 +139,7 @@ def test_the_device_reaches_what_trains_and_nothing_else(tmp_path, monkeypatch):
 
 @pytest.fixture
 def without_report(monkeypatch):
-    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: True)
 
 
 def test_a_run_measures_in_a_process_of_its_own_and_reuses_the_rows(tmp_path, without_report):

@@ -27,7 +27,7 @@ from benchmarks.plan.request import Request
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster as runner_side
 from benchmarks.runner import cluster_worker
-from benchmarks.runner import whole_run as execution
+from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cluster import ClusterExecutor
 from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.tasks.task import Outcome, RunStopped
@@ -161,7 +161,7 @@ def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
 @pytest.mark.slow
 def test_a_run_on_clusters_of_one_and_two_is_that_of_this_machine(tmp_path, monkeypatch):
     """Bit for bit, but for times: ground truth, a network, frames, metrics."""
-    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: True)
     words = ["--preset", "smoke", "--suite", "garments", "--split", "validation"]
     words += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
     assert run.main([*words, "-o", str(tmp_path / "0")]) == 0

@@ -12,10 +12,10 @@ import pytest
 from benchmarks import run
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.rows import rows_of
-from benchmarks.runner import local_executor as executor
+from benchmarks.runner import task_process
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
+from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Context, Outcome, RunStopped
 from tests.benchmarks.runner.tasks_by_hand import InProcess
@@ -162,15 +162,15 @@ def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it
     folder = RunFolder(tmp_path)
     first, second = task("first"), task("second", needs=(("network", "first"),))
     cache = Cache(folder)
-    monkeypatch.setattr(executor, "_context", Context(folder), raising=False)
-    monkeypatch.setattr(executor, "_verified", set())
-    found = cache.keep(first, executor._perform(first, {}), {})
+    monkeypatch.setattr(task_process, "_context", Context(folder), raising=False)
+    monkeypatch.setattr(task_process, "_verified", set())
+    found = cache.keep(first, task_process.perform(first, {}), {})
     assert isinstance(found.outcome, Outcome)
     needed = {first.id: found.outcome}
-    assert executor._perform(second, needed).status == "ok"
+    assert task_process.perform(second, needed).status == "ok"
     (tmp_path / "first.txt").write_text("worst")
-    assert executor._perform(second, needed).status == "ok"  # compared once in each process
-    executor._verified.clear()
+    assert task_process.perform(second, needed).status == "ok"  # compared once in each process
+    task_process._verified.clear()
     with pytest.raises(RunStopped, match=r"^first\.txt is damaged since this run wrote it"):
-        executor._perform(second, needed)
+        task_process.perform(second, needed)
     assert cache.find(first, {}).state == "missing"

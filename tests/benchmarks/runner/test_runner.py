@@ -18,11 +18,12 @@ from benchmarks.cell import Cell
 from benchmarks.methods import find_method
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.rows import rows_of
-from benchmarks.runner import whole_run as execution
+from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.runner.loop import Runner
+from benchmarks.runner.rows import rows_of
+from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.task import Outcome, Task
@@ -44,7 +45,7 @@ with held(Path(sys.argv[1])):
 
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
-    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: True)
 
 
 def words_of(folder: Path, *methods: str) -> list[str]:
@@ -98,7 +99,7 @@ def test_what_a_killed_run_was_writing_is_removed(tmp_path):
     scene.mkdir(parents=True)
     for name in ("simulation.vtkhdf", "newton-1.vtkhdf.part", ".body.77.part.npy"):
         (scene / name).write_bytes(b"half")
-    execution.RunLog(plan_of(tmp_path))
+    RunLog(plan_of(tmp_path))
     assert [path.name for path in scene.iterdir()] == ["simulation.vtkhdf"]
 
 
@@ -108,9 +109,9 @@ def test_a_fresh_run_goes_on_from_no_training_that_was_stopped(tmp_path):
     stopped = models / ".snug-seed0.checkpoint.safetensors"
     stopped.write_bytes(b"half")
     plan = plan_of(tmp_path)
-    execution.RunLog(plan)
+    RunLog(plan)
     assert stopped.is_file()
-    execution.RunLog(dataclasses.replace(plan, fresh=True))
+    RunLog(dataclasses.replace(plan, fresh=True))
     assert not stopped.exists()
 
 

@@ -19,7 +19,7 @@ from benchmarks.plan.plan import Motions, Plan
 from benchmarks.plan.suites import CHEAP
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
-from benchmarks.rows import rows_of_cell
+from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import find_scene, out_of_distribution
 from benchmarks.scenes.variations import FEW, FEWEST, ORDINARY, OUT_OF_DISTRIBUTION

@@ -10,8 +10,8 @@ import time
 import pytest
 
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.rows import rows_of
 from benchmarks.runner.dry_run import describe
+from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS, STRESS_TESTS

@@ -19,12 +19,12 @@ from benchmarks.methods.outside.program import program
 from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import Row, RunFolder
-from benchmarks.rows import clock_costs, rows_of
-from benchmarks.runner import whole_run as execution
+from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.dry_run import describe
 from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.runner.loop import NoLog, Runner
+from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import SCENES as DECLARED
 from benchmarks.tasks.task import Context, Outcome, failure
@@ -481,7 +481,7 @@ def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
         time.sleep(0.05)
     before = entry.read_bytes()
 
-    monkeypatch.setattr(execution.RunLog, "make_report", lambda self: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: True)
     assert run.main(words) == 0
     assert entry.read_bytes() == before
     first = RunFolder(out).read_rows()

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.rows import described
+from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
 from reports.document.document import document
 from reports.document.layout import row_block, shortened, table_blocks

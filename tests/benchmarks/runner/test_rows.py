@@ -12,15 +12,16 @@ from benchmarks import provenance
 from benchmarks.cell import Cell
 from benchmarks.methods import METHODS, find_method
 from benchmarks.plan.plan import Motions
+from benchmarks.process.timing import Reading
 from benchmarks.results.run_folder import Row
-from benchmarks.rows import NOT_FALLING, clock_costs, rows_of
 from benchmarks.runner.console import remarks, summary
+from benchmarks.runner.execute_plan import accepted
+from benchmarks.runner.rows import NOT_FALLING, clock_costs, rows_of
+from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.whole_run import RunLog, accepted
 from benchmarks.scenes import SCENES
 from benchmarks.tasks.cell_task import judge
 from benchmarks.tasks.task import Outcome
-from benchmarks.timing import Reading
 from reference_sim import Trajectory
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
 from tests.benchmarks.tasks.test_cell_tasks import plan_of

@@ -9,9 +9,7 @@ from statistics import median
 from typing import Any
 
 from benchmarks.cell import Cell, TaskId
-from benchmarks.methods import find_method
-from benchmarks.metric import Metric
-from benchmarks.metrics import declared, find_metric
+from benchmarks.metrics import find_metric
 from benchmarks.plan.plan import Plan
 from benchmarks.results.run_folder import REFERENCE_TOLERANCE, Row, as_right
 from benchmarks.tasks.task import Outcome, Task
@@ -285,56 +283,3 @@ def _fineness(row: Row) -> float:
     if row.role in ("reference", "reference-variant"):
         return -(REFERENCE_TOLERANCE if row.level is None else row.level)
     return row.level or 0.0
-
-
-def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
-    """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
-    methods = {cell.method: cell.entry for cell in plan.cells}
-    methods |= {benchmark.method: find_method(benchmark.method) for benchmark in plan.microbenchmarks}
-    found = {
-        name: _metric(name, plan) for name in dict.fromkeys(r.metric for r in rows if r.method in methods)
-    }
-    order = {name: place for place, name in enumerate(declared(plan.metrics))}
-    ordered = sorted(found, key=lambda name: order.get(name, len(order)))
-    metrics = {
-        name: _fields(metric, "name", "reference_tolerance", "declared_in")
-        for name in ordered
-        if (metric := found[name]) is not None
-    }
-    without = ("name", "module", "declared_in", "files", "sizes", "options", "metrics")
-    scenes = {
-        scene.name: _fields(scene, *without) | {"role": plan.motions.role_of(scene.motion)}
-        for scene in plan.scenes
-    }
-    said = {
-        name: {
-            "label": entry.label, "description": entry.description, "role": entry.role,
-            "family": entry.reporting.family, "level": entry.reporting.level, "base": entry.reporting.base,
-            "seeded": entry.seeded, "dtype": entry.dtype,
-        }
-        for name, entry in methods.items()
-    }  # fmt: skip
-    for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:
-        if name in methods and not methods[name].timed:
-            said[name]["label"] = f"{methods[name].label or name} (declared time)"
-    cases = {
-        case.name: {
-            "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
-            "metric": case.metric, "map_point": case.map_point,
-        }
-        for case in plan.cases
-    }  # fmt: skip
-    return {"metrics": metrics, "methods": said, "scenes": scenes, "cases": cases}
-
-
-def _metric(name: str, plan: Plan) -> Metric | None:
-    """Its declaration; None of a case, which describes its rows itself."""
-    try:
-        return find_metric(name, plan.metrics)
-    except KeyError:
-        return None
-
-
-def _fields(entry: Any, *without: str) -> dict[str, Any]:
-    names = [field.name for field in dataclasses.fields(entry) if field.name not in without]
-    return {name: getattr(entry, name) for name in names}

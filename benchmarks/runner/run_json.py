@@ -1,4 +1,4 @@
-"""run.json and results.csv of a run, and everything that it does from its first file to its report."""
+"""run.json and results.csv of a run: who writes them, and what they say."""
 
 from __future__ import annotations
 
@@ -11,104 +11,21 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
-from benchmarks.external.roll_out_option import MODULE
 from benchmarks.fingerprint.digest import digest, digest_of_file
+from benchmarks.methods import find_method
+from benchmarks.metric import Metric
+from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, runs
-from benchmarks.process.errors import one_line
 from benchmarks.results import frame_energies
 from benchmarks.results.run_folder import OF_TRAINING, Row, RunFolder, with_provenance
-from benchmarks.rows import described, rows_of
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.console import remarks, summary
-from benchmarks.runner.local_executor import Executor, LocalExecutor
 from benchmarks.runner.loop import Runner
-from benchmarks.runner.schedule import tasks_of
-from benchmarks.tasks.task import RunStopped
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
 
 KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier run in the folder
 OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks", "cells", "outdated")
-
-
-def execute(plan: Plan, assets: Assets | None = None) -> int:
-    """Run the plan, with its assets where they have been made.
-
-    Returns 0 when all ended well, 1 when something failed or there is no report.
-    """
-    tasks = tasks_of(plan)
-    log = RunLog(plan)
-    runner = Runner(tasks, log.cache)
-    try:
-        if plan.garments:
-            try:
-                assets = log.open_assets(assets)
-            except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
-                runner.refuse(("start", "data", "clips", "network"), one_line(error))
-        runner.run(executor_of(plan, log.folder, assets), log)
-    except (KeyboardInterrupt, RunStopped):
-        log.note("interrupted", True)
-        rows = rows_of(plan, runner.tasks, runner.known())
-        if rows or not log.folder.rows_path.is_file():  # nothing known is no reason to lose a table
-            log.write_rows(rows)
-        raise
-    rows = rows_of(plan, runner.tasks, runner.outcomes)
-    log.write_rows(rows)
-    log.note_outcomes(runner)
-    made = log.make_report()
-    print(summary(log.rows, log.stages), flush=True)
-    failed = [row for row in log.rows if not accepted(row)]
-    for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
-        print(line, file=sys.stderr)
-    broken = runner.broken()
-    for label, reason in broken.items():
-        print(f"{label}: {reason}", file=sys.stderr)
-    for line in remarks(log.rows, len(runner.reused), runner.outdated()):
-        print(line, file=sys.stderr)
-    if looks := log.config["test_looks"]:
-        print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)
-    if made:
-        print(log.folder.report_path.resolve(), flush=True)
-    return 0 if made and not (failed or broken) else 1
-
-
-def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:
-    """What executes the plan's tasks. Raises RunStopped where its cluster is gone."""
-    if not plan.scheduler:
-        return LocalExecutor(folder, assets, plan.workers)
-    from benchmarks.process.scheduler import ClusterError
-    from benchmarks.runner.cluster import ClusterExecutor
-
-    try:
-        return ClusterExecutor(folder, assets, plan.workers, plan.scheduler)
-    except ClusterError as error:
-        raise RunStopped(str(error)) from None
-
-
-def check_roll_outs(plan: Plan) -> Assets | None:
-    """Compare every stored roll-out with its scene before anything is written; gives the assets that it made.
-
-    Raises RollOutError.
-    """
-    stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
-    if not stored:
-        return None
-    from benchmarks.external.roll_out_files import forget_roll_outs  # loads numpy
-
-    try:
-        assets = plan.open_assets() if plan.garments else None
-    except ValueError:
-        return None  # the run says so itself, of all dressed scenes
-    for cell in stored:
-        cell.entry.make(models=plan.folder, seed=0).prepare(cell.scene.build(assets))
-    forget_roll_outs()  # each task that takes one reads it in its own process
-    return assets
-
-
-def accepted(row: Row) -> bool:
-    """Whether a row lets the run end with status 0; an extreme case may fail honestly, never silently."""
-    return row.passed or (row.suite == "extremes" and row.status != "failed" and bool(row.reason))
 
 
 class RunLog:
@@ -243,23 +160,60 @@ class RunLog:
         if seen and look["rows"] not in [earlier.get("rows") for earlier in self.config["test_looks"]]:
             self.config["test_looks"] = [*self.config["test_looks"], look]
 
-    def make_report(self) -> bool:
-        """tables/, figures/, report.html and report.pdf; a failure is said and leaves the results."""
-        self.note("finished", now())
-        try:
-            with self.stage("report"):
-                from reports.build import build_report
-
-                _, problems = build_report(self.folder.path)
-        except Exception as error:
-            line = one_line(error)
-            print(f"no report ({line}); the results are in {self.folder.path}", file=sys.stderr)
-            return False
-        for problem in problems:
-            print(f"report: left out: {problem}", file=sys.stderr)
-        return True
-
 
 def now() -> str:
     """The time as ISO text with its zone."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
+
+
+def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
+    """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
+    methods = {cell.method: cell.entry for cell in plan.cells}
+    methods |= {benchmark.method: find_method(benchmark.method) for benchmark in plan.microbenchmarks}
+    found = {
+        name: _metric(name, plan) for name in dict.fromkeys(r.metric for r in rows if r.method in methods)
+    }
+    order = {name: place for place, name in enumerate(declared(plan.metrics))}
+    ordered = sorted(found, key=lambda name: order.get(name, len(order)))
+    metrics = {
+        name: _fields(metric, "name", "reference_tolerance", "declared_in")
+        for name in ordered
+        if (metric := found[name]) is not None
+    }
+    without = ("name", "module", "declared_in", "files", "sizes", "options", "metrics")
+    scenes = {
+        scene.name: _fields(scene, *without) | {"role": plan.motions.role_of(scene.motion)}
+        for scene in plan.scenes
+    }
+    said = {
+        name: {
+            "label": entry.label, "description": entry.description, "role": entry.role,
+            "family": entry.reporting.family, "level": entry.reporting.level, "base": entry.reporting.base,
+            "seeded": entry.seeded, "dtype": entry.dtype,
+        }
+        for name, entry in methods.items()
+    }  # fmt: skip
+    for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:
+        if name in methods and not methods[name].timed:
+            said[name]["label"] = f"{methods[name].label or name} (declared time)"
+    cases = {
+        case.name: {
+            "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
+            "metric": case.metric, "map_point": case.map_point,
+        }
+        for case in plan.cases
+    }  # fmt: skip
+    return {"metrics": metrics, "methods": said, "scenes": scenes, "cases": cases}
+
+
+def _metric(name: str, plan: Plan) -> Metric | None:
+    """Its declaration; None of a case, which describes its rows itself."""
+    try:
+        return find_metric(name, plan.metrics)
+    except KeyError:
+        return None
+
+
+def _fields(entry: Any, *without: str) -> dict[str, Any]:
+    names = [field.name for field in dataclasses.fields(entry) if field.name not in without]
+    return {name: getattr(entry, name) for name in names}

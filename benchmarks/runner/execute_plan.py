@@ -1,0 +1,117 @@
+"""A whole run: from its plan to its report."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from benchmarks.external.roll_out_option import MODULE
+from benchmarks.plan.plan import Plan
+from benchmarks.process.errors import one_line
+from benchmarks.results.run_folder import Row, RunFolder
+from benchmarks.runner.console import remarks, summary
+from benchmarks.runner.local_executor import Executor, LocalExecutor
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.rows import rows_of
+from benchmarks.runner.run_json import RunLog, now
+from benchmarks.runner.schedule import tasks_of
+from benchmarks.tasks.task import RunStopped
+
+if TYPE_CHECKING:
+    from benchmarks.assets.assets import Assets
+
+
+def execute(plan: Plan, assets: Assets | None = None) -> int:
+    """Run the plan, with its assets where they have been made.
+
+    Returns 0 when all ended well, 1 when something failed or there is no report.
+    """
+    tasks = tasks_of(plan)
+    log = RunLog(plan)
+    runner = Runner(tasks, log.cache)
+    try:
+        if plan.garments:
+            try:
+                assets = log.open_assets(assets)
+            except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
+                runner.refuse(("start", "data", "clips", "network"), one_line(error))
+        runner.run(executor_of(plan, log.folder, assets), log)
+    except (KeyboardInterrupt, RunStopped):
+        log.note("interrupted", True)
+        rows = rows_of(plan, runner.tasks, runner.known())
+        if rows or not log.folder.rows_path.is_file():  # nothing known is no reason to lose a table
+            log.write_rows(rows)
+        raise
+    rows = rows_of(plan, runner.tasks, runner.outcomes)
+    log.write_rows(rows)
+    log.note_outcomes(runner)
+    made = make_report(log)
+    print(summary(log.rows, log.stages), flush=True)
+    failed = [row for row in log.rows if not accepted(row)]
+    for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
+        print(line, file=sys.stderr)
+    broken = runner.broken()
+    for label, reason in broken.items():
+        print(f"{label}: {reason}", file=sys.stderr)
+    for line in remarks(log.rows, len(runner.reused), runner.outdated()):
+        print(line, file=sys.stderr)
+    if looks := log.config["test_looks"]:
+        print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)
+    if made:
+        print(log.folder.report_path.resolve(), flush=True)
+    return 0 if made and not (failed or broken) else 1
+
+
+def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:
+    """What executes the plan's tasks. Raises RunStopped where its cluster is gone."""
+    if not plan.scheduler:
+        return LocalExecutor(folder, assets, plan.workers)
+    from benchmarks.process.scheduler import ClusterError
+    from benchmarks.runner.cluster import ClusterExecutor
+
+    try:
+        return ClusterExecutor(folder, assets, plan.workers, plan.scheduler)
+    except ClusterError as error:
+        raise RunStopped(str(error)) from None
+
+
+def check_roll_outs(plan: Plan) -> Assets | None:
+    """Compare every stored roll-out with its scene before anything is written; gives the assets that it made.
+
+    Raises RollOutError.
+    """
+    stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
+    if not stored:
+        return None
+    from benchmarks.external.roll_out_files import forget_roll_outs  # loads numpy
+
+    try:
+        assets = plan.open_assets() if plan.garments else None
+    except ValueError:
+        return None  # the run says so itself, of all dressed scenes
+    for cell in stored:
+        cell.entry.make(models=plan.folder, seed=0).prepare(cell.scene.build(assets))
+    forget_roll_outs()  # each task that takes one reads it in its own process
+    return assets
+
+
+def accepted(row: Row) -> bool:
+    """Whether a row lets the run end with status 0; an extreme case may fail honestly, never silently."""
+    return row.passed or (row.suite == "extremes" and row.status != "failed" and bool(row.reason))
+
+
+def make_report(log: RunLog) -> bool:
+    """Make the report and return whether it is there; a failure is one line and leaves the results."""
+    log.note("finished", now())
+    try:
+        with log.stage("report"):
+            from reports.build import build_report
+
+            _, problems = build_report(log.folder.path)
+    except Exception as error:
+        line = one_line(error)
+        print(f"no report ({line}); the results are in {log.folder.path}", file=sys.stderr)
+        return False
+    for problem in problems:
+        print(f"report: left out: {problem}", file=sys.stderr)
+    return True
