@@ -1,8 +1,10 @@
-"""The one material of a cloth: SI inputs, and the membrane constants that follow from them."""
+"""Material of a cloth: SI inputs, and the membrane constants that follow from them."""
 
 from __future__ import annotations
 
+import json
 import math
+import tomllib
 import warnings
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -14,7 +16,7 @@ _LAME = ("lame_lambda", "lame_mu", "thickness", "areal_density", "bending_stiffn
 
 
 class MaterialError(ValueError):
-    """A file that holds no material; the message names file and field."""
+    """File that holds no material; the message names file and field."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,15 @@ class Material:
 
     Raises:
         ValueError: a value is not finite or outside its physical range.
+
+    Example:
+        >>> from reference_sim import Material
+        >>> cotton = Material()
+        >>> round(cotton.lame_lambda, 1), round(cotton.lame_mu, 1)  # [N/m]
+        (20.9, 11.1)
+        >>> Material(thickness=0.0)
+        Traceback (most recent call last):
+        ValueError: Material.thickness = 0.0: must be a finite number above 0 (SI units)
     """
 
     young_modulus: float = 70e3
@@ -55,7 +66,7 @@ class Material:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Material:
-        """The material of a .toml or .json file: one table of this class's fields, or all of `from_lame`'s.
+        """Read the material of a .toml or .json file: a table of fields of this class, or all of `from_lame`.
 
         Fields that are left out keep their defaults.
 
@@ -89,15 +100,19 @@ class Material:
         areal_density: float,
         bending_stiffness: float,
     ) -> Material:
-        """The material from the numbers that SNUG's code and the methods after it give.
+        """Return the material from the numbers that SNUG's code and the methods after it give.
+
+        nu = lambda / (lambda + 2 mu), E = 2 mu (1 + nu).
 
         Args:
-            lame_lambda, lame_mu: of plane stress, not yet times the thickness [Pa]: 44,400 and 23,600 there.
+            lame_lambda: of plane stress, not yet times the thickness [Pa]: 44,400 there.
+            lame_mu: of plane stress, not yet times the thickness [Pa]: 23,600 there.
             thickness: [m], 0.47e-3 there.
             areal_density: [kg/m^2], 0.20022 there.
             bending_stiffness: k of scaled hinges [J], 3.96e-5 there.
 
-        nu = lambda / (lambda + 2 mu), E = 2 mu (1 + nu). Raises ValueError as the class does.
+        Raises:
+            ValueError: a value is not finite or outside its physical range.
         """
         poisson_ratio = lame_lambda / (lame_lambda + 2 * lame_mu)
         return cls(
@@ -120,17 +135,17 @@ class Material:
 
     @property
     def membrane_modulus(self) -> float:
-        """E2 = 4 mu (lambda + mu) / (lambda + 2 mu) [N/m]: force per width in uniaxial stress."""
+        """Force per width in uniaxial stress, E2 = 4 mu (lambda + mu) / (lambda + 2 mu) [N/m]."""
         mu, lam = self.lame_mu, self.lame_lambda
         return 4 * mu * (lam + mu) / (lam + 2 * mu)
 
     @property
     def areal_density(self) -> float:
-        """rho t [kg/m^2]."""
+        """Mass per area rho t [kg/m^2]."""
         return self.density * self.thickness
 
     def self_weight_stretch(self, length: float) -> float:
-        """Linear estimate of the relative stretch at the top of a strip of `length` [m] under its own weight.
+        """Estimate linearly the relative stretch at the top of a strip of `length` [m] under its own weight.
 
         Warns above 10 %: at that point a unit is usually wrong (the thickness counted twice, say).
         """
@@ -151,9 +166,6 @@ def _table(path: Path) -> dict[str, Any]:
         raise MaterialError(f"{path}: unknown kind of file: a material is a .toml or a .json")
     if path.stat().st_size > LARGEST_FILE:
         raise MaterialError(f"{path}: is too large for a material, which is a few numbers")
-    import json
-    import tomllib
-
     read = tomllib.loads if path.suffix.lower() == ".toml" else json.loads
     try:
         values = read(path.read_text(encoding="utf-8"))

@@ -1,6 +1,6 @@
-"""A moving closed triangle mesh that cloth may touch: contact planes for a step, and true distances.
+"""Moving closed triangle mesh that cloth may touch: contact planes for a step, and true distances.
 
-The simulator knows a body as nothing more than this.
+The solver knows a body as nothing more than this.
 """
 
 from __future__ import annotations
@@ -23,10 +23,14 @@ DEFAULT_REGION = 0.20  # [m]
 
 @dataclass(frozen=True)
 class Planes:
-    """One contact plane per sample: points (S, 3) [m], unit outward normals (S, 3), and where it was found.
+    """Contact plane of each sample.
 
-    faces: (S,) face of the obstacle; barycentric: (S, 3) place on it. far: (S,) samples known to touch
-    nothing in this step, from an obstacle that is `bounded`; else None.
+    Attributes:
+        points: (S, 3) [m] on the obstacle.
+        normals: (S, 3) unit, outward.
+        faces: (S,) of the obstacle.
+        barycentric: (S, 3) places on them.
+        far: (S,) samples known to touch nothing in this step, from an obstacle that is `bounded`; else None.
     """
 
     points: np.ndarray
@@ -37,8 +41,15 @@ class Planes:
 
 
 def reachable_faces(rest_points: np.ndarray, centroids: np.ndarray, region: float) -> np.ndarray:
-    """Indices of the faces that some sample may meet, by the rule of regions: those whose centroid (F, 3) [m]
-    lies within `region` of a sample (S, 3) [m], all at rest; all faces where a sample has none.
+    """Find the faces that some sample may meet, by the rule of regions.
+
+    Args:
+        rest_points: (S, 3) [m] samples at rest.
+        centroids: (F, 3) [m] of the faces at rest.
+        region: [m] a sample meets faces whose centroid lies no farther away; all faces where there is none.
+
+    Returns:
+        Indices of the faces.
     """
     from scipy.spatial import cKDTree
 
@@ -49,7 +60,7 @@ def reachable_faces(rest_points: np.ndarray, centroids: np.ndarray, region: floa
 
 
 class Obstacle:
-    """A closed mesh that moves through T frames.
+    """Closed mesh that moves through T frames.
 
     Args:
         positions: (T, B, 3) [m], or (B, 3) for one that stands still.
@@ -62,6 +73,18 @@ class Obstacle:
 
     Raises:
         MeshError: wrong shapes, NaN, a mesh that is no closed surface (see `check_closed`).
+
+    Example: a tetrahedron that rises by a centimetre a frame.
+
+        >>> import numpy as np
+        >>> from reference_sim import Obstacle
+        >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+        >>> rising = Obstacle(np.stack([corners, corners + [0.0, 0.01, 0.0]]), faces)
+        >>> rising.frames
+        2
+        >>> rising.signed_distance(np.array([[0.1, -0.1, 0.1], [0.2, 0.1, 0.3]]), frame=1).round(3).tolist()
+        [0.11, -0.09]
     """
 
     bounded = False  # whether planes are exact only within a reach that they are to be told
@@ -98,10 +121,11 @@ class Obstacle:
 
     @property
     def frames(self) -> int:
+        """Number of frames, sub-steps included."""
         return (len(self.positions) - 1) * self._substeps + 1
 
     def at(self, frame: int) -> np.ndarray:
-        """Vertices (B, 3) at `frame`; the last frame holds on for ever."""
+        """Return the vertices (B, 3) [m] at `frame`; the last frame holds on for ever."""
         whole, part = divmod(min(frame, self.frames - 1), self._substeps)
         if part == 0:
             return self.positions[whole]
@@ -109,7 +133,7 @@ class Obstacle:
         return (1 - share) * self.positions[whole] + share * self.positions[whole + 1]
 
     def refined(self, substeps: int) -> Obstacle:
-        """The same motion, linear in between, with `substeps` frames for each frame here."""
+        """Return the same motion, linear in between, with `substeps` frames for each frame here."""
         fine = copy.copy(self)
         fine._substeps = self._substeps * substeps
         fine._forget()
@@ -121,10 +145,10 @@ class Obstacle:
         return fingerprint(self.positions, self.faces, self.rest_centroids, np.array(self.region))
 
     def _nearest(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Closest:
-        """Closest points under the rule of regions.
+        """Find closest points under the rule of regions.
 
-        Each search begins with the faces that the last one found for as many points, in the order of those
-        that the first one found: the simulator asks for the same samples in every frame.
+        Each search begins with the faces that the last one answered for as many points, in the order of
+        those of the first one: the solver asks for the same samples in every frame.
         """
         frame = min(frame, self.frames - 1)
         if self._tree is None:
@@ -139,13 +163,13 @@ class Obstacle:
             rest_points = None
         kind = len(points), rest_points is not None
         hints, sequence = self._last.get(kind, (None, None))
-        found = self._tree.nearest(
+        closest = self._tree.nearest(
             points, hints=hints, rest_points=rest_points, region=self.region, sequence=sequence
         )
         if sequence is None and rest_points is not None:
-            sequence = self._tree.in_sequence(found.faces)
-        self._last[kind] = found.faces, sequence
-        return found
+            sequence = self._tree.in_sequence(closest.faces)
+        self._last[kind] = closest.faces, sequence
+        return closest
 
     def planes(
         self,
@@ -154,42 +178,45 @@ class Obstacle:
         rest_points: np.ndarray | None = None,
         reach: np.ndarray | None = None,
     ) -> Planes:
-        """Contact planes at `frame` for samples at points (S, 3) with rest positions rest_points (S, 3).
+        """Return contact planes at `frame`.
 
         The plane goes through the closest allowed point of the surface; its normal points from there to the
         sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
         sample's own position. Beyond the border of the allowed faces it fades: see `surface.plane_normals`.
 
-        reach: (S,) [m] that a sample may come near in this step. It is asked of obstacles that are `bounded`;
-            here every plane is exact.
+        Args:
+            points: (S, 3) [m] samples.
+            frame: of the obstacle.
+            rest_points: (S, 3) [m] the samples at rest, for the rule of regions.
+            reach: (S,) [m] that a sample may come near in this step. It is asked of obstacles that are
+                `bounded`; here every plane is exact.
         """
-        found = self._nearest(points, frame, rest_points)
+        closest = self._nearest(points, frame, rest_points)
         vertices = self.at(frame)
-        normals = np.empty_like(found.points)
+        normals = np.empty_like(closest.points)
         plane_normals(
-            points, found.points, found.faces, found.barycentric, vertices, self.faces,
+            points, closest.points, closest.faces, closest.barycentric, vertices, self.faces,
             vertex_normals(vertices, self.faces), normals,
         )  # fmt: skip
-        return Planes(found.points, normals, found.faces, found.barycentric)
+        return Planes(closest.points, normals, closest.faces, closest.barycentric)
 
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
     ) -> np.ndarray:
-        """Where points (N, 3) at frame - 1 would go if the body transported them: each keeps its place
-        beside its nearest face.
+        """Return points (N, 3) [m] of frame - 1 moved along with the body, each beside its nearest face.
 
         The best known initial guess for a garment: the body's own motion, face by face.
         """
-        found = self._nearest(points, frame - 1, rest_points)
-        carried = np.empty_like(found.points)
+        closest = self._nearest(points, frame - 1, rest_points)
+        carried = np.empty_like(closest.points)
         carry(
-            points, found.points, found.faces, found.barycentric, self.at(frame - 1), self.at(frame),
+            points, closest.points, closest.faces, closest.barycentric, self.at(frame - 1), self.at(frame),
             self.faces, carried,
         )  # fmt: skip
         return carried
 
     def signed_distance(self, points: np.ndarray, frame: int) -> np.ndarray:
-        """True distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
+        """Return the distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
         distance = np.linalg.norm(points - self._nearest(points, frame).points, axis=1)
         vertices = np.asfortranarray(self.at(frame))
         # Only what lies in the bounding box can be inside.

@@ -1,4 +1,4 @@
-"""The sum of energies that a simulator minimises, a network is trained on and every method is measured by."""
+"""Sum of energies that the solver minimises, a network is trained on and every method is measured by."""
 
 from __future__ import annotations
 
@@ -19,8 +19,26 @@ class Potential:
 
     Leaving a term out of `energies` is an ablation; nothing of it is evaluated.
 
+    Args:
+        energies: the terms, all of one cloth.
+
     Raises:
         ValueError: no energies, or energies of different cloths.
+
+    Example: the weight of a triangle pulls its corners down.
+
+        >>> import numpy as np
+        >>> from reference_sim import Cloth, Potential
+        >>> from reference_sim.energies import Gravity, StretchStVK
+        >>> x = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1]])
+        >>> cloth = Cloth(x, np.array([[0, 2, 1]]))
+        >>> potential = Potential([StretchStVK(cloth), Gravity(cloth)])
+        >>> list(potential.terms(x))
+        ['strain', 'gravity']
+        >>> potential.gradient(x)[:, 1].round(6).tolist()  # m g / 3 [N]
+        [0.003274, 0.003274, 0.003274]
+        >>> potential.hessian(x).shape
+        (9, 9)
     """
 
     def __init__(self, energies: Sequence[Energy]) -> None:
@@ -35,13 +53,13 @@ class Potential:
 
     @property
     def time_step(self) -> float | None:
-        """dt [s] of the inertia among the terms; None for a static potential."""
+        """Time step dt [s] of the inertia among the terms; None for a static potential."""
         steps = (energy.parameters()["dt_s"] for energy in self.energies if energy.name == "inertia")
         return next(steps, None)
 
     @property
     def impassable(self) -> bool:
-        """Whether some term may stop an obstacle on its way."""
+        """True if some term may stop an obstacle on its way."""
         return any(energy.impassable for energy in self.energies)
 
     def prepare(self, step: Step) -> None:
@@ -50,19 +68,19 @@ class Potential:
             energy.prepare(step)
 
     def terms(self, x: np.ndarray) -> dict[str, float]:
-        """Energy of each term [J] at x (V, 3) [m], by name."""
+        """Return the energy of each term [J] at x (V, 3) [m], by name."""
         return {energy.name: energy.value_and_gradient(x)[0] for energy in self.energies}
 
     def value(self, x: np.ndarray) -> float:
-        """Sum [J] at x (V, 3) [m]."""
+        """Return the sum [J] at x (V, 3) [m]."""
         return self.value_and_gradient(x)[0]
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """dPhi/dx (V, 3) [N] at x (V, 3) [m]."""
+        """Return dPhi/dx (V, 3) [N] at x (V, 3) [m]."""
         return self.value_and_gradient(x)[1]
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Both at once: they share most of their work."""
+        """Return both at once [J], [N]: they share most of their work."""
         x = np.ascontiguousarray(x, dtype=np.float64)
         total, gradient = 0.0, np.zeros_like(x)
         for energy in self.energies:
@@ -72,11 +90,11 @@ class Potential:
         return total, gradient
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
-        """Largest share of `direction` (V, 3) [m] that every term allows from x (V, 3)."""
+        """Return the largest share of `direction` (V, 3) [m] that every term allows from x (V, 3)."""
         return min(energy.largest_step(x, direction) for energy in self.energies)
 
     def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
-        """Share of the way from x to goal (V, 3) free of collisions for every term; see `Energy`."""
+        """Return the share of the way from x to goal (V, 3) that all terms find free; see `Energy`."""
         return min(energy.ccd_fraction(x, goal, progress) for energy in self.energies)
 
     def set_progress(self, progress: float) -> None:
@@ -90,16 +108,16 @@ class Potential:
             energy.predict_stress(x, step)
 
     def forget(self) -> None:
-        """Back to the true second derivatives."""
+        """Go back to the true second derivatives, without predicted stresses."""
         for energy in self.energies:
             energy.forget()
 
     def infeasibility(self, x: np.ndarray) -> str:
-        """What makes x (V, 3) impossible for the first term that finds something; "" if none does."""
+        """Return why x (V, 3) is impossible for the first term that finds something; "" if none does."""
         return next(filter(None, (energy.infeasibility(x) for energy in self.energies)), "")
 
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
-        """Second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
+        """Return second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
         x = np.ascontiguousarray(x, dtype=np.float64)
         pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
         changing = pattern.changing(x)
@@ -107,7 +125,7 @@ class Potential:
         return pattern.symmetric(pattern.assemble(x, changing))
 
     def pattern(self, free: np.ndarray, *, block: int = 3) -> HessianPattern:
-        """Pattern over the vertices marked free (V,), of the Hessian or (block=1) of a scalar stiffness."""
+        """Return the pattern over the free vertices (V,): of the Hessian, or (block=1) scalar stiffness."""
         from reference_sim.assembly.hessian_pattern import (
             HessianPattern,  # loads numba, which a command's --help can do without
         )

@@ -1,4 +1,4 @@
-"""The bar of long work: what is done, and the time left."""
+"""Progress bar of long work, with the time left."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ SECONDS_OF_A_LOG = 30.0  # between two lines; on a terminal the line is drawn te
 
 
 def progress_bar(*args: Any, **options: Any) -> Any:
-    """A bar of tqdm with these arguments, on stderr; where that is a file, a line every half minute."""
+    """Return a bar of tqdm with these arguments, on stderr; a file gets a line every half minute."""
     from tqdm import tqdm
 
     seconds = 0.1 if sys.stderr.isatty() else SECONDS_OF_A_LOG

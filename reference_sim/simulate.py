@@ -1,4 +1,4 @@
-"""The command `python -m reference_sim.simulate`. It is run, never imported.
+"""Command `python -m reference_sim.simulate`. It is run, never imported.
 
 Importing it would hide the function `reference_sim.simulate` behind this module of the same name.
 """

@@ -26,10 +26,11 @@ class LinearSolver(Protocol):
 
 
 def analyse(indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> LinearSolver:
-    """Symbolic analysis of a lower-triangular CSC pattern, with the best package that is installed.
+    """Analyse a lower-triangular CSC pattern, with the best package that is installed.
 
     Args:
-        indptr, indices: the pattern; entries above the diagonal may be stored and are ignored.
+        indptr: (n + 1,) starts of the columns.
+        indices: (nnz,) rows; entries above the diagonal may be stored and are ignored.
         order: (n,) fill-reducing order of rows and columns.
     """
     try:
@@ -51,6 +52,7 @@ class CholmodSolver:
         self._symbolic = cholmod.symbolic(self._A, p=matrix(order.tolist()), uplo="L")
 
     def factorise(self, data: np.ndarray) -> bool:
+        """Factorise the matrix with these values (nnz,); False if not positive definite."""
         self._A.V = self._matrix(data)
         try:
             self._cholmod.numeric(self._A, self._symbolic)
@@ -59,19 +61,21 @@ class CholmodSolver:
         return True
 
     def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solve with the last factorisation: b (n,) or (n, k), same shape back."""
         x = self._matrix(b)
         self._cholmod.solve(self._symbolic, x)
         return np.array(x).reshape(b.shape)
 
 
 class SuperLUSolver:
-    """scipy's SuperLU kept symmetric: no pivoting, and a negative pivot means not positive definite."""
+    """SuperLU of scipy kept symmetric: no pivoting, and a negative pivot means not positive definite."""
 
     def __init__(self, indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> None:
         self._indptr, self._indices, self._order = indptr, indices, order
         self._lu: spla.SuperLU | None = None
 
     def factorise(self, data: np.ndarray) -> bool:
+        """Factorise the matrix with these values (nnz,); False if not positive definite."""
         size = len(self._order)
         lower = sp.tril(sp.csc_matrix((data, self._indices, self._indptr), shape=(size, size)), format="csc")
         A = sp.csc_matrix(lower + sp.tril(lower, -1).T)[self._order][:, self._order]
@@ -91,6 +95,7 @@ class SuperLUSolver:
         return True
 
     def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solve with the last factorisation: b (n,) or (n, k), same shape back."""
         assert self._lu is not None, "factorise() first"
         x = np.empty_like(b)
         x[self._order] = self._lu.solve(b[self._order])
@@ -98,7 +103,7 @@ class SuperLUSolver:
 
 
 def nested_dissection(adjacency: sp.csr_matrix) -> np.ndarray:
-    """Fill-reducing order (n,) of a vertex graph by METIS, or by reverse Cuthill-McKee without pymetis."""
+    """Return a fill-reducing order (n,) of a vertex graph by METIS; reverse Cuthill-McKee without pymetis."""
     if adjacency.shape[0] < 4:
         return np.arange(adjacency.shape[0])
     try:

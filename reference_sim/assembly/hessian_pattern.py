@@ -1,4 +1,4 @@
-"""The fixed sparsity of a Hessian: where each element's block lands in one lower-triangular CSC matrix."""
+"""Fixed sparsity of a Hessian: where each element's block lands in one lower-triangular CSC matrix."""
 
 from __future__ import annotations
 
@@ -18,14 +18,20 @@ SPARE = 3  # a wider pattern keeps up to this many times the blocks that dynamic
 
 
 class HessianPattern:
-    """Pattern of the sum of `energies` over the vertices that `free` marks, built once per scene.
+    """Pattern of the sum of `energies` over the free vertices, built once per scene.
 
     Dynamic terms have no blocks in it at first: `covering` gives a wider pattern when they couple vertices
     that no other term couples.
 
-    The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order: what a
-    Cholesky factorisation reads. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that all three
+    The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order, as a
+    Cholesky factorisation reads it. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that the
     coordinates share.
+
+    Args:
+        energies: the terms.
+        vertex_count: V.
+        free: (V,) True for vertices that take part.
+        block: 3 or 1.
 
     Attributes:
         free: (n,) indices of the free vertices, in the order of the matrix.
@@ -78,11 +84,11 @@ class HessianPattern:
         self.diagonal = self._diagonal_places(start)
 
     def changing(self, x: np.ndarray, convexity: float = 0.0) -> list[sp.csc_matrix]:
-        """Hessians (3V, 3V) of the dynamic terms at x (V, 3)."""
+        """Return the Hessians (3V, 3V) of the dynamic terms at x (V, 3)."""
         return [energy.sparse_hessian(x, convexity) for energy in self.energies if energy.dynamic]
 
     def covering(self, changing: Sequence[sp.csc_matrix]) -> HessianPattern:
-        """This pattern, or a wider one if the matrices couple vertices that have no block here.
+        """Return this pattern, or a wider one if the matrices couple vertices that have no block here.
 
         A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis each
         time, until more than SPARE times the needed ones are kept.
@@ -107,7 +113,7 @@ class HessianPattern:
         return wider
 
     def _keys_of(self, hessian: sp.csc_matrix) -> tuple[np.ndarray, np.ndarray]:
-        """Keys (m,) of the stored blocks of a (3V, 3V) matrix, sorted, and their values (m, 3, 3)."""
+        """Return keys (m,) of the stored blocks of a (3V, 3V) matrix, sorted, and their values (m, 3, 3)."""
         blocks = hessian.tobsr(blocksize=(3, 3))
         row = self._number[np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))]
         column = self._number[blocks.indices]
@@ -118,10 +124,12 @@ class HessianPattern:
 
     @property
     def size(self) -> int:
+        """Number of rows, block n."""
         return self.block * len(self.free)
 
     @cached_property
     def order(self) -> np.ndarray:
+        """(block n,) fill-reducing order of rows and columns."""
         vertices = nested_dissection(self._adjacency)
         return (self.block * vertices[:, None] + np.arange(self.block)).ravel()
 
@@ -133,10 +141,12 @@ class HessianPattern:
     def assemble(
         self, x: np.ndarray, changing: Sequence[sp.csc_matrix] = (), *, convexity: float = 0.0
     ) -> np.ndarray:
-        """Values (nnz,) of the lower matrix at x (V, 3) [N/m]: Hessian, or scalar stiffness for block 1.
+        """Return the values (nnz,) [N/m] of the lower matrix: Hessian, or scalar stiffness for block 1.
 
-        changing: Hessians of the dynamic terms at x, which this pattern must cover. convexity: see
-        Energy.active_hessian_blocks.
+        Args:
+            x: (V, 3) [m].
+            changing: Hessians of the dynamic terms at x, which this pattern must cover.
+            convexity: see Energy.active_hessian_blocks.
         """
         data = self._constant.copy()
         for energy, slots in zip(self.energies, self._slots):
@@ -148,7 +158,7 @@ class HessianPattern:
 
     @cached_property
     def _constant(self) -> np.ndarray:
-        """Values (nnz,) of the terms that give the same everywhere."""
+        """(nnz,) values of the terms that give the same everywhere."""
         data, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
         for energy, slots in zip(self.energies, self._slots):
             if self.block in energy.constant:
@@ -171,36 +181,36 @@ class HessianPattern:
         data[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += values
 
     def product(self, data: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """The whole symmetric (3n, 3n) matrix of these values times p (3n,), of a pattern of blocks of 3."""
+        """Return the symmetric (3n, 3n) matrix of these values times p (3n,), of a pattern of blocks of 3."""
         result = np.zeros_like(p)
         _multiply(self._key, len(self.free), self._base, self._stride, data, p, result)
         return result
 
     def along(self, data: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Values (m,) of `graph`: the matrix where each vertex moves along its own of directions (n, 3)."""
+        """Return the values (m,) of `graph`, with each vertex moving along its own of directions (n, 3)."""
         values = np.empty(len(self._key))
         _contract(self._key, len(self.free), self._base, self._stride, data, directions, values)
         return values
 
     @property
     def graph(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """indptr, indices and order of an (n, n) lower matrix with one entry for each block."""
+        """Structure (indptr, indices, order) of an (n, n) lower matrix with one entry for each block."""
         column, row = np.divmod(self._key, len(self.free))
         indptr = np.searchsorted(column, np.arange(len(self.free) + 1))
         return indptr, row, self.order[:: self.block] // self.block
 
     def lower(self, data: np.ndarray) -> sp.csc_matrix:
-        """The values as a scipy matrix; the upper halves of its diagonal blocks are stored too."""
+        """Return the values as a scipy matrix; the upper halves of its diagonal blocks are stored too."""
         return sp.csc_matrix((data, self.indices, self.indptr), shape=(self.size, self.size))
 
     def symmetric(self, data: np.ndarray) -> sp.csc_matrix:
-        """The whole symmetric (3n, 3n) matrix."""
+        """Return the whole symmetric (3n, 3n) matrix."""
         lower = sp.tril(self.lower(data), format="csc")
         return sp.csc_matrix(lower + sp.tril(lower, -1).T)
 
 
 def _block_keys(stencils: np.ndarray, n: int) -> np.ndarray:
-    """(N, k * k) key column * n + row of each block of each element, -1 where it is not stored."""
+    """Return (N, k * k) keys column * n + row of each block of each element, -1 where it is not stored."""
     row, column = stencils[:, :, None], stencils[:, None, :]
     key = column * n + row
     key = np.where((row < 0) | (column < 0) | (row < column), -1, key)
@@ -220,7 +230,7 @@ def _fill_rows(start, row, block, indices):
 
 @njit(cache=True)
 def _multiply(key, n, base, stride, data, p, result):
-    """Each block below the diagonal serves twice: as it is for its row, transposed for its column."""
+    """Multiply; each block below the diagonal serves twice: for its row, and transposed for its column."""
     slot = 0
     while slot < key.shape[0]:
         column, step = key[slot] // n, stride[slot]

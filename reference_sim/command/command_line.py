@@ -1,4 +1,4 @@
-"""Commands: a wrong word, bad input, a full disk or an interrupt is one line and an exit status."""
+"""Frame of all commands: whatever they meet is one line on standard error and an exit status."""
 
 from __future__ import annotations
 
@@ -8,35 +8,46 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn, ParamSpec
 
+from reference_sim.files.atomic_files import disk_full
+
 BAD_INPUT, NO_ROOM, INTERRUPTED = 2, 1, 130  # exit status
 Given = ParamSpec("Given")
 
 
 class WrongWord(ValueError):
-    """An argument that the command does not take."""
+    """Argument that the command does not take."""
 
 
 class Parser(argparse.ArgumentParser):
-    """One line for a wrong word in place of the whole usage; examples stay as they are written."""
+    """Argument parser that answers a wrong word with one line; examples stay as they are written."""
 
     def __init__(self, **options: Any) -> None:
         plain = argparse.RawDescriptionHelpFormatter
         super().__init__(formatter_class=plain, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
+        """Raise WrongWord."""
         raise WrongWord(f"{message}; see --help")
 
 
 def command(
     program: str, *, goes_on: str = "", bad_input: tuple[type[Exception], ...] = (ValueError,)
 ) -> Callable[[Callable[Given, int]], Callable[Given, int]]:
-    """main() of `python -m program`, which then gives an exit status whatever input it has met.
+    """Make main() of `python -m program` return an exit status, whatever input it meets.
 
-    goes_on: how work that was stopped is taken up again; without it nothing is left of such work. bad_input:
-    what says of input, in its message, where it is wrong; OSError does so besides. Others are faults of the
-    program, and raised.
+    Args:
+        program: name that the line on standard error begins with.
+        goes_on: how work that was stopped is taken up again; without it nothing is left of such work.
+        bad_input: exceptions whose message says where the input is wrong; OSError does so besides. Others
+            are faults of the program, and raised.
+
+    Example:
+        >>> @command("tools.halve", bad_input=(ZeroDivisionError,))
+        ... def main(number: int) -> int:
+        ...     return 0 if 1 / number else 1
+        >>> main(2)
+        0
     """
-
     refused: tuple[type[Exception], ...] = (*bad_input, WrongWord, OSError)
 
     def with_status(main: Callable[Given, int]) -> Callable[Given, int]:
@@ -45,14 +56,13 @@ def command(
             try:
                 return main(*arguments, **named)
             except refused as error:
-                from reference_sim.files.atomic_files import disk_full  # not loaded for --help
-
                 full = disk_full(error)
-                said, status = full or str(error), NO_ROOM if full else BAD_INPUT
-                left = goes_on if full else ""
+                problem, status = full or str(error), NO_ROOM if full else BAD_INPUT
+                remedy = goes_on if full else ""
             except KeyboardInterrupt:
-                said, status, left = "interrupted", INTERRUPTED, goes_on or "nothing was written"
-            print(f"{program}: {' '.join('; '.join(filter(None, (said, left))).split())}", file=sys.stderr)
+                problem, status, remedy = "interrupted", INTERRUPTED, goes_on or "nothing was written"
+            line = "; ".join(filter(None, (problem, remedy)))
+            print(f"{program}: {' '.join(line.split())}", file=sys.stderr)
             return status
 
         return run

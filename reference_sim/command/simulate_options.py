@@ -7,8 +7,8 @@ import math
 from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
-from typing import NoReturn
 
+from reference_sim.command.command_line import Parser
 from reference_sim.material import Material
 
 DEFAULT_FRAMES, DEFAULT_DT = 60, 1 / 30
@@ -34,30 +34,23 @@ takes the .obj beside the .pc2 and a Mesh Cache modifier.
 Exit status: 0 all frames converged, 1 some frame did not, 2 bad input (nothing is written)."""
 
 
-class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line instead of repeating the whole usage."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"simulate: {message} (see --help)\n")
-
-
 def make_parser() -> argparse.ArgumentParser:
-    """All flags, with units."""
-    parser = OneLineParser(
+    """Return the parser of all flags, with units."""
+    parser = Parser(
         prog="python -m reference_sim.simulate",
         description="Simulate a cloth: backward Euler, every step minimised to a stated tolerance.",
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     parser.add_argument("garment", help="triangle mesh at rest: OBJ, PLY, VTK, STL or OFF")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
     parser.add_argument(
         "--pc2", type=Path, metavar="OUT.pc2", help="also a point cache, with OUT.obj beside it"
     )
-    known = parser.add_mutually_exclusive_group()
-    known.add_argument("--resume", action="store_true", help="go on after the last whole frame of OUT.vtkhdf")
-    known.add_argument("--overwrite", action="store_true", help="replace outputs that exist")
+    existing = parser.add_mutually_exclusive_group()
+    existing.add_argument(
+        "--resume", action="store_true", help="go on after the last whole frame of OUT.vtkhdf"
+    )
+    existing.add_argument("--overwrite", action="store_true", help="replace outputs that exist")
 
     meshes = parser.add_argument_group("meshes")
     units = ("m", "cm", "mm", "in")
@@ -188,7 +181,7 @@ def _add_contact_and_time(parser: argparse.ArgumentParser) -> None:
 
 
 def _number(text: str) -> float:
-    """A number or a fraction such as 1/60."""
+    """Read a number or a fraction such as 1/60."""
     try:
         value = float(Fraction(text)) if "/" in text else float(text)
     except (ValueError, ZeroDivisionError):

@@ -1,43 +1,52 @@
-"""The terms that the flags of `python -m reference_sim.simulate` declare, and flags that contradict."""
+"""Energy terms from the flags of `python -m reference_sim.simulate`, and flags that contradict each other."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from reference_sim.cloth import Cloth
+from reference_sim.command.simulate_inputs import InputError
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk import StretchStVK
+
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from reference_sim.cloth import Cloth
-    from reference_sim.energies.energy import Energy
+# Other terms are loaded where the flags ask for them.
 
 PENALTY_FLAGS = ("contact_stiffness", "contact_margin", "contact_samples")
 BARRIER_FLAGS = ("barrier_distance", "barrier_stiffness")
 
 
-def contradiction(options: Namespace) -> str:
-    """What flags ask for and cannot have, with the remedy; "" if nothing."""
+def check_terms(options: Namespace) -> None:
+    """Raise InputError where flags ask for what they cannot have, with the remedy."""
     barrier = options.barrier or options.self_contact
     given = [name for name in PENALTY_FLAGS + BARRIER_FLAGS if getattr(options, name) is not None]
     penalty_only = [_flag(name) for name in given if name in PENALTY_FLAGS]
     barrier_only = [_flag(name) for name in given if name in BARRIER_FLAGS]
     if options.obstacle is None:
         if options.obstacle_rest or (options.friction and not options.self_contact):
-            return "--obstacle-rest and --friction need an --obstacle, or --friction --self-contact"
+            raise InputError(
+                "--obstacle-rest and --friction need an --obstacle, or --friction --self-contact"
+            )
         if options.barrier:
-            return "--barrier needs an --obstacle; without one give --self-contact"
+            raise InputError("--barrier needs an --obstacle; without one give --self-contact")
         if penalty_only:
-            return f"{penalty_only[0]} needs an --obstacle"
+            raise InputError(f"{penalty_only[0]} needs an --obstacle")
     if barrier and penalty_only:
-        return f"{penalty_only[0]} belongs to the penalty, which a barrier replaces: leave it out"
+        raise InputError(f"{penalty_only[0]} belongs to the penalty, which a barrier replaces: leave it out")
     if barrier_only and not barrier:
-        return f"{barrier_only[0]} needs --barrier or --self-contact"
-    return ""
+        raise InputError(f"{barrier_only[0]} needs --barrier or --self-contact")
 
 
-def terms(cloth: Cloth, options: Namespace) -> list[Energy]:
-    """The terms of Phi in the order of the tables. Raises ValueError where a barrier's package is missing."""
-    from reference_sim.energies import AreaBarrier, BendHinge, Gravity, StretchStVK
+def make_terms(cloth: Cloth, options: Namespace) -> list[Energy]:
+    """Return the terms of Phi in the order of the tables.
 
+    Raises:
+        ValueError: the package of a barrier is missing.
+    """
     angles = "rest" if options.rest_angles == "rest" else 0.0
     declared: list[Energy] = [
         StretchStVK(cloth),
@@ -45,6 +54,8 @@ def terms(cloth: Cloth, options: Namespace) -> list[Energy]:
         Gravity(cloth),
     ]
     if options.area_barrier:
+        from reference_sim.energies.area_barrier import AreaBarrier
+
         declared.append(AreaBarrier(cloth, stiffness=options.area_barrier))
     if options.barrier or options.self_contact:
         return declared + _barrier(cloth, options)
@@ -52,7 +63,8 @@ def terms(cloth: Cloth, options: Namespace) -> list[Energy]:
 
 
 def _penalty(cloth: Cloth, options: Namespace) -> list[Energy]:
-    from reference_sim.energies import ContactFriction, ContactPenalty
+    from reference_sim.energies.contact_friction import ContactFriction
+    from reference_sim.energies.contact_penalty import ContactPenalty
 
     values = {
         name.removeprefix("contact_"): getattr(options, name)
@@ -65,7 +77,8 @@ def _penalty(cloth: Cloth, options: Namespace) -> list[Energy]:
 
 
 def _barrier(cloth: Cloth, options: Namespace) -> list[Energy]:
-    from reference_sim.energies import BarrierFriction, ContactBarrier
+    from reference_sim.energies.barrier_friction import BarrierFriction
+    from reference_sim.energies.contact_barrier import ContactBarrier
 
     values = {
         name.removeprefix("barrier_"): getattr(options, name)

@@ -1,18 +1,25 @@
-"""What a simulation came to, in a few lines for the reader of a terminal."""
+"""Summary of a simulation in a few lines, for the reader of a terminal."""
 
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.obstacle import Obstacle
 from reference_sim.trajectory.trajectory import Trajectory
 
+if TYPE_CHECKING:
+    from reference_sim.obstacle import Obstacle
 
-def predicted_stretch(cloth: Cloth) -> tuple[str, str]:
-    """What its own weight does to a strip as long as this cloth, in words; and the warning, if one is due."""
+
+def predict_stretch(cloth: Cloth) -> tuple[str, str]:
+    """Predict how far a strip as long as this cloth stretches under its own weight.
+
+    Returns:
+        A line in words, and the warning, if there is one.
+    """
     size = np.ptp(cloth.rest_positions, axis=0)
     length = float(size[1] or size.max())
     with warnings.catch_warnings(record=True) as caught:
@@ -22,13 +29,13 @@ def predicted_stretch(cloth: Cloth) -> tuple[str, str]:
     return line, "".join(str(warning.message) for warning in caught)
 
 
-def summary(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int) -> str:
-    """Convergence, energies [J] and depth [mm] at the last frame, time.
+def summarise(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int) -> str:
+    """Return lines on convergence, energies [J] and depth [mm] at the last frame, and time.
 
     Args:
         trajectory: of `simulate`.
-        obstacle: what it met.
-        frames: how many were asked for.
+        obstacle: the body that it met, if any.
+        frames: number of frames that was asked for.
     """
     fields = trajectory.frame_fields
     lines = [f"frames     {trajectory.frames} of {frames}"]

@@ -1,4 +1,4 @@
-"""How a cached contact anchor follows its garment sample over the skin, without a search.
+"""Walk of a cached contact anchor after its garment sample over the skin, without a search.
 
 An anchor moves as a bead on the skin would: to the foot of its sample on the anchor's face and, where the
 foot is outside, over a side that it is outside of onto the next face, until a foot is inside or a side or a
@@ -18,7 +18,7 @@ CROSSINGS = 12  # sides that an anchor may cross at a time: some 15 cm
 
 
 def triangle_adjacency(faces: np.ndarray) -> np.ndarray:
-    """Faces (Q, 3) of a mesh -> (Q, 3) int32: the face across the side opposite to each corner, or -1."""
+    """Return (Q, 3) int32 for faces (Q, 3): the face across the side opposite to each corner, or -1."""
     sides = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
     _, number = np.unique(sides, axis=0, return_inverse=True)
     order = np.argsort(number.ravel(), kind="stable")
@@ -44,10 +44,21 @@ def walk_to_foot(
     reach: np.float32,
     corners: np.ndarray,
 ) -> tuple[np.uint32, np.float32, np.float32]:
-    """Face, and weights of its second and third corner, where an anchor comes to rest for a sample at x.
+    """Return the face, and weights of its second and third corner, where an anchor rests for a sample at x.
 
-    centroids (Q, 3) and homes (S, 3) [m] at rest, reach [m^2]: the rule of regions, squared.
-    corners (1, 3, 3): room to work in.
+    Args:
+        x0: position of the sample [m].
+        x1: second coordinate.
+        x2: third coordinate.
+        face: to begin with.
+        skin: (B, 3) [m].
+        faces: (Q, 3).
+        adjacency: (Q, 3), see `triangle_adjacency`.
+        centroids: (Q, 3) [m] of the faces at rest.
+        homes: (S, 3) [m] of the samples at rest.
+        sample: index in homes.
+        reach: [m^2] the rule of regions, squared.
+        corners: (1, 3, 3) room to work in.
     """
     last, zero, one = face, np.float32(0.0), np.float32(1.0)
     for _ in range(CROSSINGS):

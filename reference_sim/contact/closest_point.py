@@ -29,7 +29,13 @@ HALVINGS = 6  # of the longest side, for samples that nothing is remembered of
 
 @dataclass(frozen=True)
 class Closest:
-    """Per sample: its face (S,), the place on it (S, 3), and that point (S, 3) [m]."""
+    """Closest points of samples.
+
+    Attributes:
+        faces: (S,).
+        barycentric: (S, 3) place on the face.
+        points: (S, 3) [m].
+    """
 
     faces: np.ndarray
     barycentric: np.ndarray
@@ -61,7 +67,7 @@ class FaceTree:
         self._discs = np.empty((len(faces), 7))  # centre, radius and normal of the flat disc around each face
 
     def refit(self, positions: np.ndarray) -> None:
-        """Take the mesh to positions (B, 3) [m]."""
+        """Move the mesh to positions (B, 3) [m]."""
         positions = np.ascontiguousarray(positions, self._corners.dtype)
         _gather(positions, self._vertices, self._corners, self._discs)
         _enclose(self._corners, self._starts, self._boxes)
@@ -77,15 +83,20 @@ class FaceTree:
         reach: np.ndarray | None = None,
         sequence: np.ndarray | None = None,
     ) -> Closest:
-        """Closest points of the mesh to points (S, 3) [m].
+        """Find the closest points of the mesh.
 
-        hints: (S,) faces to begin with, -1 for none. They change the cost and, but for `exact`, no answer.
-        rest_points: (S, 3) [m] where samples are at rest. With them, a sample meets only faces whose rest
-            centroid lies no farther away than `region` [m]; where there is none, all.
-        exact: [m] a sample farther away than this may get any point at most twice as far as the closest: a
-            remembered face then often does, for a third of the cost.
-        reach: (S,) [m] a sample farther away than this gets face -1, and its place and point mean nothing.
-        sequence: (S,) order to search in, see `in_sequence`. It changes the cost and no answer.
+        Args:
+            points: (S, 3) [m] samples.
+            hints: (S,) faces to begin with, -1 for none. They change the cost and, but for `exact`, no
+                answer.
+            rest_points: (S, 3) [m] where samples are at rest. With them, a sample meets only faces whose rest
+                centroid lies no farther away than `region`; where there is none, all.
+            region: [m].
+            exact: [m] a sample farther away than this may get any point at most twice as far as the closest:
+                a remembered face then often does, for a third of the cost.
+            reach: (S,) [m] a sample farther away than this gets face -1, and its place and point mean
+                nothing.
+            sequence: (S,) order to search in, see `in_sequence`. It changes the cost and no answer.
         """
         if rest_points is None:
             rest_points, region = points, np.inf
@@ -103,14 +114,15 @@ class FaceTree:
         return Closest(faces, barycentric, closest)
 
     def in_sequence(self, faces: np.ndarray) -> np.ndarray:
-        """Samples near these faces (S,) in an order (S,) that has neighbours one after another: they visit
-        the same boxes, and do so together.
+        """Order samples near these faces (S,) so that neighbours come one after another.
+
+        They visit the same boxes, and do so together.
         """
         return np.argsort(self._place[faces])
 
 
 def _halved(centroids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Faces in the order of the leaves (F,), and where each of the L leaves begins, (L + 1,) with the end."""
+    """Return faces in the order of the leaves (F,), and where each of L leaves begins, (L + 1,) with end."""
     count = len(centroids)
     order, starts = np.arange(count), np.array([0, count])
     while np.diff(starts).max() > LEAF:
@@ -125,7 +137,7 @@ def _halved(centroids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def by_cells(points: np.ndarray) -> np.ndarray:
-    """Points (S, 3) in the order (S,) of cells of a grid, halved again and again like the faces."""
+    """Order points (S, 3) by the cells of a grid, halved again and again like the faces; returns (S,)."""
     if len(points) == 0:
         return np.empty(0, np.int64)
     side = max(float(np.ptp(points, axis=0).max()), 1e-30)
@@ -165,7 +177,7 @@ def _gather(positions, vertices, corners, discs):
 
 @njit(cache=True)
 def _enclose(points, starts, boxes):
-    """Boxes (N, 2, 3) of points (F, K, 3) in the order of the leaves: leaves first, then up to the root."""
+    """Write boxes (N, 2, 3) of points (F, K, 3) in the order of the leaves: leaves, then up to the root."""
     leaves = len(starts) - 1
     for leaf in range(leaves):
         box = boxes[leaves - 1 + leaf]

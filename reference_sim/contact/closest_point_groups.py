@@ -22,8 +22,11 @@ def search(
     points, rest_points, region, exact, reach, corners, discs, centroids, boxes, rest_boxes, starts, order,
     place, ascending, sequence, faces, barycentric, closest,
 ):  # fmt: skip
-    """faces (S,) come in as hints and go out as answers, -1 where no face lies within a finite reach (S,)."""
-    found, v, w = np.empty(len(points), np.int64), np.empty(len(points)), np.empty(len(points))
+    """Search the closest face of every sample.
+
+    faces (S,) come in as hints and go out as answers, -1 where no face lies within a finite reach (S,).
+    """
+    leaf_faces, v, w = np.empty(len(points), np.int64), np.empty(len(points)), np.empty(len(points))
     missed = np.empty(GROUP, np.int64)
     scratch = (
         np.empty((3, GROUP)), np.empty((3, GROUP)), np.empty((4, 3)), np.empty((GROUP, 2)),
@@ -33,20 +36,20 @@ def search(
         members = sequence[begin : begin + GROUP]
         _descend(
             members, points, rest_points, region, exact, reach, corners, discs, centroids, boxes, rest_boxes,
-            starts, order, place, faces, found, v, w, scratch,
+            starts, order, place, faces, leaf_faces, v, w, scratch,
         )  # fmt: skip
         count = 0
         for s in members:
-            if found[s] < 0 and reach[s] == np.inf:
+            if leaf_faces[s] < 0 and reach[s] == np.inf:
                 missed[count] = s
                 count += 1
         if count > 0:  # no face within the region: then all
             _descend(
                 missed[:count], points, rest_points, np.inf, exact, reach, corners, discs, centroids, boxes,
-                rest_boxes, starts, order, place, faces, found, v, w, scratch,
+                rest_boxes, starts, order, place, faces, leaf_faces, v, w, scratch,
             )  # fmt: skip
     for s in range(len(points)):
-        k, u = found[s], max(1.0 - v[s] - w[s], 0.0)
+        k, u = leaf_faces[s], max(1.0 - v[s] - w[s], 0.0)
         faces[s] = order[k] if k >= 0 or reach[s] == np.inf else -1
         barycentric[s, ascending[k, 0]] = u
         barycentric[s, ascending[k, 1]], barycentric[s, ascending[k, 2]] = v[s], w[s]
@@ -57,10 +60,12 @@ def search(
 @njit(cache=True, error_model="numpy")
 def _descend(
     members, points, rest_points, region, exact, reach, corners, discs, centroids, boxes, rest_boxes, starts,
-    order, place, faces, found, found_v, found_w, scratch,
+    order, place, faces, leaf_faces, leaf_v, leaf_w, scratch,
 ):  # fmt: skip
-    """found (S,): where in the order of the leaves the closest allowed face of each member is, -1 for none,
-    and its weights. At most GROUP members.
+    """Find the closest allowed faces of at most GROUP members by one descent.
+
+    Writes into leaf_faces (S,) the place of the face in the order of the leaves, -1 for none, and its
+    weights.
     """
     x, rest, span, weights, numbers, places, stack, bounds = scratch
     # Squares of: distance to the best face so far, distance beyond which nothing is of use.
@@ -127,13 +132,13 @@ def _descend(
         for g in range(count):
             worst = max(worst, useful[g])
     for g in range(count):
-        found[members[g]] = answer[g]
-        found_v[members[g]], found_w[members[g]] = weights[g, 0], weights[g, 1]
+        leaf_faces[members[g]] = answer[g]
+        leaf_v[members[g]], leaf_w[members[g]] = weights[g, 0], weights[g, 1]
 
 
 @njit(cache=True)
 def _ends(values):
-    """Least and greatest of them, NaN aside."""
+    """Return the least and the greatest value, NaN aside."""
     low, high = np.inf, -np.inf
     for value in values:
         if value < low:
@@ -145,7 +150,7 @@ def _ends(values):
 
 @njit(cache=True, inline="always")
 def _apart(boxes, rest_boxes, node, span, limit):
-    """Squared distance between the boxes of a node and of a group; infinite where the regions are apart."""
+    """Return the squared distance between the boxes of a node and of a group; inf where regions are apart."""
     apart = rest_apart = 0.0
     for i in range(3):
         gap = max(max(np.float64(boxes[node, 0, i]) - span[1, i], span[0, i] - boxes[node, 1, i]), 0.0)
@@ -159,7 +164,7 @@ def _apart(boxes, rest_boxes, node, span, limit):
 
 @njit(cache=True, fastmath=FAST)
 def _box_distances(boxes, node, x, out):
-    """Squared distances from the points of a group to a box."""
+    """Write the squared distances from the points of a group to a box."""
     l0, l1, l2 = np.float64(boxes[node, 0, 0]), np.float64(boxes[node, 0, 1]), np.float64(boxes[node, 0, 2])
     h0, h1, h2 = np.float64(boxes[node, 1, 0]), np.float64(boxes[node, 1, 1]), np.float64(boxes[node, 1, 2])
     for g in range(GROUP):
@@ -171,7 +176,7 @@ def _box_distances(boxes, node, x, out):
 
 @njit(cache=True, inline="always")
 def _to_disc(discs, k, x, y, z):
-    """Squared distance from a point to the flat disc around a face."""
+    """Return the squared distance from a point to the flat disc around a face."""
     dx, dy, dz = x - discs[k, 0], y - discs[k, 1], z - discs[k, 2]
     height = discs[k, 4] * dx + discs[k, 5] * dy + discs[k, 6] * dz
     across = np.sqrt(max(dx * dx + dy * dy + dz * dz - height * height, 0.0)) - discs[k, 3]
@@ -180,14 +185,14 @@ def _to_disc(discs, k, x, y, z):
 
 @njit(cache=True, inline="always")
 def _squared(points, k, x, g):
-    """Squared distance between a point and one of a group."""
+    """Return the squared distance between a point and one of a group."""
     dx, dy, dz = points[k, 0] - x[0, g], points[k, 1] - x[1, g], points[k, 2] - x[2, g]
     return dx * dx + dy * dy + dz * dz
 
 
 @njit(cache=True, inline="always")
 def _useful(squared, size, exact):
-    """Squared distance beyond which nothing is of use, once something is found at `squared`.
+    """Return the squared distance beyond which nothing is of use, once something is found at `squared`.
 
     size: of the mesh, for the round-off in the distances to boxes and faces.
     """

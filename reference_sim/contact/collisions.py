@@ -1,4 +1,4 @@
-"""What of a cloth, and of a body beside it, is close together or about to meet.
+"""Pairs of a cloth with itself, and with a body beside it, that are close together or about to meet.
 
 The geometry is that of the package ipctk (IPC Toolkit, MIT licence): broad phase, closest pairs, continuous
 collision detection, intersection test. What is kept here saves time between its calls: only those faces of
@@ -22,9 +22,14 @@ NO_OBSTACLE = (np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 
 
 @dataclass(frozen=True)
 class NearMesh:
-    """One ipctk mesh: the cloth's vertices, then those of the obstacle that are near.
+    """Mesh of ipctk: the vertices of the cloth, then those of the obstacle that are near.
 
-    mesh: ipctk.CollisionMesh; vertices, faces: which ones of the obstacle it holds; low, high: its box [m].
+    Attributes:
+        mesh: ipctk.CollisionMesh.
+        vertices: of the obstacle that it holds.
+        faces: of the obstacle that it holds.
+        low: corner of its box [m].
+        high: the other corner [m].
     """
 
     mesh: Any
@@ -34,10 +39,11 @@ class NearMesh:
     high: np.ndarray
 
     def stack(self, x: np.ndarray, obstacle: np.ndarray) -> np.ndarray:
-        """Positions of the mesh in the memory order that ipctk reads."""
+        """Return the positions of the mesh in the memory order that ipctk reads."""
         return np.asfortranarray(np.concatenate([x, obstacle[self.vertices]]))
 
     def holds(self, x: np.ndarray) -> bool:
+        """Return whether positions x (V, 3) [m] lie in the box."""
         return bool((x >= self.low).all() and (x <= self.high).all())
 
 
@@ -66,8 +72,8 @@ class Collisions:
     def begin(self, faces: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
         """Begin a step in which an obstacle (faces (Fb, 3)) moves from before to after (B, 3) [m].
 
-        It is put at the end. Nothing is kept from the step before, so that sums have one order, whatever
-        was asked earlier, and a resumed run gives the same bits.
+        It is put at the end. Nothing is kept from the step before, so that sums have one order, whatever was
+        asked earlier, and a resumed run gives the same bits.
         """
         self._obstacle_faces, self._before, self._after = faces, before, after
         self._near: NearMesh | None = None
@@ -79,7 +85,7 @@ class Collisions:
         self._forget()
 
     def obstacle_at(self, progress: float) -> np.ndarray:
-        """(B, 3) [m]."""
+        """Return the obstacle (B, 3) [m] at `progress` (0 to 1) of its way."""
         if progress == 1.0:
             return self._after
         return self._before + progress * (self._after - self._before)
@@ -89,7 +95,7 @@ class Collisions:
         self._at: np.ndarray | None = None  # where the pairs were found
 
     def mesh_around(self, *positions: np.ndarray) -> NearMesh:
-        """The mesh whose box holds all these positions (V, 3) [m]; the last one if it does."""
+        """Return the mesh whose box holds all these positions (V, 3) [m]; the last one if it does."""
         if self._near is None or not all(map(self._near.holds, positions)):
             stacked = np.concatenate(positions)
             self._near = self._build(stacked.min(axis=0) - BOX_MARGIN, stacked.max(axis=0) + BOX_MARGIN)
@@ -116,15 +122,15 @@ class Collisions:
         return NearMesh(mesh, kept, np.flatnonzero(near), low, high)
 
     def _candidates(self, a: np.ndarray, b: np.ndarray) -> Any:
-        """Pairs that may come within the distance while x stays within the slack of the way from a to b."""
+        """Return pairs that may come within the distance near the way from a to b, within the slack."""
         near = self.mesh_around(a, b)
         if not (self._covers(a) and (b is a or self._covers(b))):
             obstacle = self.obstacle_at(self.progress)
             start, end = near.stack(a, obstacle), near.stack(b, obstacle)
-            found = self.package.Candidates()
-            found.build(near.mesh, start, end, self.distance / 2 + self._slack)
-            self._found, self._way = found, (a.copy(), b.copy())
-        return self._found
+            candidates = self.package.Candidates()
+            candidates.build(near.mesh, start, end, self.distance / 2 + self._slack)
+            self._candidate_pairs, self._way = candidates, (a.copy(), b.copy())
+        return self._candidate_pairs
 
     def _covers(self, x: np.ndarray) -> bool:
         if self._way is None:
@@ -136,22 +142,22 @@ class Collisions:
         return bool(np.einsum("vi,vi->v", off, off).max() <= self._slack**2)
 
     def pairs(self, x: np.ndarray) -> tuple[Any, NearMesh, np.ndarray]:
-        """Pairs closer than the distance at x (V, 3): ipctk.NormalCollisions, their mesh, its positions."""
+        """Return the pairs closer than the distance at x (V, 3): ipctk's, their mesh, its positions."""
         if self._at is None or not np.array_equal(self._at, x):
             candidates = self._candidates(x, x)
             near = self.mesh_around(x)
             positions = near.stack(x, self.obstacle_at(self.progress))
-            found = self.package.NormalCollisions()
-            found.use_area_weighting = True
-            found.build(candidates, near.mesh, positions, self.distance)
-            self._pairs, self._at = (found, near, positions), x.copy()
+            pairs = self.package.NormalCollisions()
+            pairs.use_area_weighting = True
+            pairs.build(candidates, near.mesh, positions, self.distance)
+            self._pairs, self._at = (pairs, near, positions), x.copy()
         return self._pairs
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
-        """Share of `direction` (V, 3) [m] that the cloth may go from x (V, 3) while the obstacle stands."""
+        """Return the share of `direction` (V, 3) [m] that the cloth may go while the obstacle stands."""
         goal = x + direction
-        found, near, positions = self.pairs(x)
-        gap = min(self.distance, found.compute_minimum_distance(near.mesh, positions) ** 0.5)
+        pairs, near, positions = self.pairs(x)
+        gap = min(self.distance, pairs.compute_minimum_distance(near.mesh, positions) ** 0.5)
         if 2 * np.sqrt(np.einsum("vi,vi->v", direction, direction).max()) < gap:
             return 1.0  # nothing is close enough to be reached
         candidates = self._candidates(x, goal)
@@ -161,7 +167,10 @@ class Collisions:
         )
 
     def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
-        """Share of the way from x to goal (V, 3) that is free while the obstacle goes on from `progress`."""
+        """Return the free share of the way from x to goal (V, 3), the obstacle going on too.
+
+        progress: (0 to 1) of the obstacle's way, where it begins.
+        """
         near = self.mesh_around(x, goal)
         start, end = near.stack(x, self.obstacle_at(progress)), near.stack(goal, self._after)
         candidates = self.package.Candidates()
@@ -169,7 +178,7 @@ class Collisions:
         return candidates.compute_collision_free_stepsize(near.mesh, start, end, 0.0, self._ccd)
 
     def first_intersection(self, x: np.ndarray) -> str:
-        """An edge and a face that cut each other at x (V, 3), in words; "" if there are none."""
+        """Return an edge and a face that cut each other at x (V, 3), in words; "" if there are none."""
         near = self.mesh_around(x)
         positions = near.stack(x, self.obstacle_at(self.progress))
         mesh, ipctk = near.mesh, self.package
@@ -186,9 +195,9 @@ class Collisions:
 
     def _edge_name(self, edge: np.ndarray, near: NearMesh) -> str:
         count = self.cloth.vertex_count
-        own = bool((edge < count).all())
-        first, second = np.sort(edge if own else near.vertices[edge - count])
-        return f"edge ({first}, {second}) of the {'cloth' if own else 'body'}"
+        of_cloth = bool((edge < count).all())
+        first, second = np.sort(edge if of_cloth else near.vertices[edge - count])
+        return f"edge ({first}, {second}) of the {'cloth' if of_cloth else 'body'}"
 
     def _face_name(self, face: int, near: NearMesh) -> str:
         count = len(self.cloth.faces)
@@ -196,7 +205,7 @@ class Collisions:
 
 
 def _give_areas(mesh: Any, cloth: Cloth) -> None:
-    """Areas that weigh the pairs: of the cloth those at rest, perhaps from its uv, not of its positions.
+    """Set the areas that weigh the pairs: of the cloth those at rest, perhaps from its uv.
 
     Those of the obstacle are cut off at the cloth's mean: an edge across a floor would otherwise push every
     thread above it with the area of the floor.
@@ -205,9 +214,12 @@ def _give_areas(mesh: Any, cloth: Cloth) -> None:
     vertices[: cloth.vertex_count] = cloth.vertex_areas
     vertices[cloth.vertex_count :] = np.minimum(vertices[cloth.vertex_count :], cloth.vertex_areas.mean())
     sides = mesh.faces_to_edges[: len(cloth.faces)].ravel()
-    own = np.bincount(sides, np.repeat(cloth.areas / 3, 3), len(edges))
-    mean = own[np.unique(sides)].mean()
-    mesh.vertex_areas, mesh.edge_areas = vertices, np.where(own > 0, own, np.minimum(edges, mean))
+    cloth_areas = np.bincount(sides, np.repeat(cloth.areas / 3, 3), len(edges))
+    mean = cloth_areas[np.unique(sides)].mean()
+    mesh.vertex_areas, mesh.edge_areas = (
+        vertices,
+        np.where(cloth_areas > 0, cloth_areas, np.minimum(edges, mean)),
+    )
 
 
 def _load() -> ModuleType:

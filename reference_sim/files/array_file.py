@@ -24,11 +24,15 @@ BLOCK = 1 << 20
 
 
 class ArrayFileError(ValueError):
-    """A file that is no .npy or .npz of plain arrays; the message names file and array."""
+    """File that is no .npy or .npz of plain arrays; the message names file and array."""
 
 
 def read_array(path: str | Path) -> np.ndarray:
-    """The array of an .npy file, as long as the file. Raises ArrayFileError."""
+    """Read the array of an .npy file, as long as the file.
+
+    Raises:
+        ArrayFileError: as `read_arrays`.
+    """
     path = Path(path)
     try:
         with path.open("rb") as stream:
@@ -41,13 +45,19 @@ def read_array(path: str | Path) -> np.ndarray:
 def read_arrays(
     path: str | Path, names: Collection[str] | None = None, *, limit: int = LIMIT
 ) -> dict[str, np.ndarray]:
-    """Name -> array of an .npz file: all of them, or those of `names` that are in it; others are not touched.
+    """Read the arrays of an .npz file by name.
+
+    Args:
+        path: the file.
+        names: arrays to read, as far as they are in it; others are not touched. Default all.
+        limit: [bytes] of all of them together, unpacked.
 
     Raises:
         ArrayFileError: no such file, no archive, encrypted, packed in an unknown way, damaged, an array that
             is not plain or not as long as it declares, more than `limit` bytes together.
     """
-    path, found, name = Path(path), {}, ""
+    path, name = Path(path), ""
+    arrays: dict[str, np.ndarray] = {}
     try:
         with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
             for info in archive.infolist():
@@ -56,15 +66,19 @@ def read_arrays(
                     continue
                 _check_member(info)
                 with archive.open(info) as member:
-                    found[name] = _array(member, info.file_size, limit)
-                limit -= found[name].nbytes
-        return found
+                    arrays[name] = _array(member, info.file_size, limit)
+                limit -= arrays[name].nbytes
+        return arrays
     except Exception as error:
         raise _refusal(path, name, error) from None
 
 
 def write_array(path: str | Path, array: np.ndarray) -> None:
-    """An .npy file. Raises OSError with its errno, which numpy.save hides where the disk is full."""
+    """Write an .npy file.
+
+    Raises:
+        OSError: with its errno, which numpy.save hides where the disk is full.
+    """
     array = np.ascontiguousarray(array)
     with open(path, "wb") as stream:
         np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(array))
@@ -72,7 +86,11 @@ def write_array(path: str | Path, array: np.ndarray) -> None:
 
 
 def array_names(path: str | Path) -> list[str]:
-    """Names of the arrays of an .npz file. Raises ArrayFileError for what is no archive."""
+    """Return the names of the arrays of an .npz file.
+
+    Raises:
+        ArrayFileError: no archive.
+    """
     path = Path(path)
     try:
         with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
@@ -91,7 +109,7 @@ def _check_member(info: zipfile.ZipInfo) -> None:
 
 
 def _array(stream: IO[bytes], length: int, limit: int) -> np.ndarray:
-    """The array of a stream of `length` bytes. Raises whatever its bytes make numpy or zipfile raise."""
+    """Read the array of a stream of `length` bytes; raise whatever its bytes make numpy or zipfile raise."""
     version = np.lib.format.read_magic(stream)
     readers: dict[Any, Any] = {
         (1, 0): np.lib.format.read_array_header_1_0,
@@ -112,9 +130,9 @@ def _array(stream: IO[bytes], length: int, limit: int) -> np.ndarray:
         raise ValueError(
             f"declares shape {_short(shape)} of {dtype}, and {limit / 1e6:.0f} MB are read at most"
         )
-    there = length - np.lib.format.MAGIC_LEN - head.tell()
-    if size != there:
-        raise ValueError(f"declares shape {_short(shape)} of {dtype}, {size} bytes, and has {there}")
+    stored = length - np.lib.format.MAGIC_LEN - head.tell()
+    if size != stored:
+        raise ValueError(f"declares shape {_short(shape)} of {dtype}, {size} bytes, and has {stored}")
     data = bytearray(size)
     view, done = memoryview(data), 0
     while block := head.read(BLOCK) or stream.read(BLOCK):

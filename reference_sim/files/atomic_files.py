@@ -14,10 +14,12 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path`: renamed to it when the block ends well, removed when it does not.
+    """Give a temporary name beside `path`: renamed to it when the block ends well, removed when it does not.
 
-    What was there before is there until the new file is on the disk. Raises OSError, which names `path` where
-    there is no room for it.
+    The file that was there before stays until the new one is on the disk.
+
+    Raises:
+        OSError: names `path` where there is no room for it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
@@ -35,15 +37,17 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def demand_new(folder: Path) -> None:
-    """Raises ValueError where something is there that a new folder would replace."""
+    """Raise ValueError where something exists that a new folder would replace."""
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise ValueError(f"{folder}: is there already; name a new folder")
 
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """A folder to fill: under its name once the block ends well, gone when it does not. Raises ValueError
-    where something is there.
+    """Give a folder to fill: under its name once the block ends well, gone when it does not.
+
+    Raises:
+        ValueError: something exists under that name.
     """
     demand_new(folder)
     whole = folder.resolve()
@@ -59,7 +63,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
 
 
 def disk_full(error: BaseException) -> str:
-    """One line of which file found no room, and how much there is; empty where something else was raised."""
+    """Return one line on the file that found no room and how much there is; "" for any other error."""
     if not isinstance(error, OSError) or error.errno not in NO_ROOM:
         return ""
     path = Path(error.filename or ".").absolute()
@@ -72,18 +76,21 @@ def disk_full(error: BaseException) -> str:
 def reserve(path: Path, size: int) -> None:
     """Have the file system set room aside for a file to grow to `size` bytes; it then has that size.
 
-    For libraries in C that crash where they find no room. Raises OSError, which names the file. Where the
-    system cannot promise room, what is free is looked at.
+    For libraries in C that crash where they find no room. Where the system cannot promise room, the room that
+    is free is compared.
+
+    Raises:
+        OSError: no room; it names the file.
     """
-    there = path.stat().st_size
-    if size <= there:
+    present = path.stat().st_size
+    if size <= present:
         return
     if not hasattr(os, "posix_fallocate"):
-        if shutil.disk_usage(path.parent).free < size - there:
+        if shutil.disk_usage(path.parent).free < size - present:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
         return
     with path.open("rb+") as file:
         try:
-            os.posix_fallocate(file.fileno(), there, size - there)
+            os.posix_fallocate(file.fileno(), present, size - present)
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(path)) from None

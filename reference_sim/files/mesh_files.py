@@ -10,13 +10,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from reference_sim.cloth import MeshError
 from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, read_parts
-
-if TYPE_CHECKING:
-    import numpy as np
 
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
@@ -29,12 +28,15 @@ UV_ARRAYS = (UV_OF_VTK, "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What a file held: positions (V, 3) in the file's own unit and axes, triangles (F, 3).
+    """Mesh of a file, in its own unit and axes.
 
-    quads: how many four-cornered faces were cut in two along the diagonal from their first corner.
-    uv: (F, 3, 2) texture coordinates of the faces' corners, several for a vertex on a seam; NaN where a
-    corner has none, None where no corner has any. vertex_data: name -> (V,) or (V, k), what PLY and VTK files
-    say of vertices besides.
+    Attributes:
+        positions: (V, 3).
+        faces: (F, 3) triangles.
+        quads: number of four-cornered faces that were cut in two along the diagonal from their first corner.
+        uv: (F, 3, 2) texture coordinates of the faces' corners, several for a vertex on a seam; NaN where a
+            corner has none, None where no corner has any.
+        vertex_data: name -> (V,) or (V, k), further values of the vertices in PLY and VTK files.
     """
 
     positions: np.ndarray
@@ -51,8 +53,6 @@ def read_mesh(path: str | Path) -> Surface:
         MeshError: missing or unreadable file, unknown format, no faces, faces with five corners or more,
             a vertex that is not finite; the message names the file.
     """
-    import numpy as np
-
     path = Path(path)
     if not path.is_file():
         raise MeshError(f"{path}: no such file")
@@ -82,22 +82,19 @@ def read_mesh(path: str | Path) -> Surface:
 
 
 def _halved(polygons: Any) -> list[Any]:
-    """Triangles of triangles and quads."""
+    """Cut quads into triangles; triangles stay."""
     return [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
 
 
 def _corner_uv(path: Path, parts: Parts, faces: np.ndarray) -> np.ndarray | None:
-    """Texture coordinates (F, 3, 2) of the faces' corners, NaN where there are none."""
-    import numpy as np
-
+    """Return the texture coordinates (F, 3, 2) of the faces' corners, NaN where there are none."""
     places = faces
     if parts.uv_polygons:
         uv, places = np.asarray(parts.uv, dtype=np.float64), np.array(_halved(parts.uv_polygons), np.int64)
     else:
-        found = _uv_of_vertices(parts.vertex_data)
-        if found is None:
+        uv = _uv_of_vertices(parts.vertex_data)
+        if uv is None:
             return None
-        uv = found
     if (places < 0).all():
         return None
     bad = np.flatnonzero((places >= len(uv)).any(axis=1) | (places < -1).any(axis=1))
@@ -110,8 +107,6 @@ def _corner_uv(path: Path, parts: Parts, faces: np.ndarray) -> np.ndarray | None
 
 
 def _uv_of_vertices(data: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    import numpy as np
-
     for u, v in UV_NAMES:
         if u in data and v in data:
             return np.stack([data[u], data[v]], axis=1).astype(np.float64)
@@ -131,8 +126,6 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     Raises:
         MeshError: as `read_mesh`; no files; vertices or faces that do not correspond to the first file's.
     """
-    import numpy as np
-
     paths = mesh_paths(str(pattern))
     first = read_mesh(paths[0])
     frames = [first.positions]
@@ -144,44 +137,53 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
 
 
 def mesh_paths(pattern: str) -> list[Path]:
-    """The files that `read_sequence` reads, in its order. Raises MeshError where there are none."""
+    """Return the files that `read_sequence` reads, in its order.
+
+    Raises:
+        MeshError: there are none, or they are of several kinds.
+    """
     path = Path(pattern)
     if path.is_dir():
-        found = [p for p in path.iterdir() if p.suffix.lower() in MESH_SUFFIXES]
-        if not found:
+        paths = [p for p in path.iterdir() if p.suffix.lower() in MESH_SUFFIXES]
+        if not paths:
             raise MeshError(f"{path}: no mesh in this folder ({', '.join(MESH_SUFFIXES)})")
     elif path.exists() or not glob.has_magic(pattern):
-        found = [path]
+        paths = [path]
     else:
-        found = [Path(name) for name in glob.glob(pattern)]
-        if not found:
+        paths = [Path(name) for name in glob.glob(pattern)]
+        if not paths:
             raise MeshError(f"{pattern}: no file matches (quote the pattern, or the shell expands it)")
-    kinds = sorted({p.suffix.lower() for p in found})
+    kinds = sorted({p.suffix.lower() for p in paths})
     if len(kinds) > 1:
         raise MeshError(
             f"{pattern}: meshes of several kinds ({', '.join(kinds)}): name one, as in '*{kinds[0]}'"
         )
-    return sorted(found, key=lambda p: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", str(p))])
+    return sorted(paths, key=lambda p: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", str(p))])
 
 
 def _check_corresponds(path: Path, surface: Surface, first_path: Path, first: Surface) -> None:
-    import numpy as np
-
     remedy = "a sequence needs one numbering: export OBJ or PLY without reordering"
-    for noun, here, there in (
+    for noun, rows, first_rows in (
         ("vertices", surface.positions, first.positions),
         ("faces", surface.faces, first.faces),
     ):
-        if len(here) != len(there):
-            raise MeshError(f"{path}: {len(here)} {noun}, but {first_path.name} has {len(there)}: {remedy}")
+        if len(rows) != len(first_rows):
+            raise MeshError(
+                f"{path}: {len(rows)} {noun}, but {first_path.name} has {len(first_rows)}: {remedy}"
+            )
     bad = np.flatnonzero((surface.faces != first.faces).any(axis=1))
     if bad.size:
-        here, there = surface.faces[bad[0]].tolist(), first.faces[bad[0]].tolist()
-        raise MeshError(f"{path}: face {bad[0]} = {here}, but {there} in {first_path.name}: {remedy}")
+        face, first_face = surface.faces[bad[0]].tolist(), first.faces[bad[0]].tolist()
+        raise MeshError(f"{path}: face {bad[0]} = {face}, but {first_face} in {first_path.name}: {remedy}")
 
 
 def to_metres_y_up(positions: np.ndarray, *, units: str = "m", up: str = "y") -> np.ndarray:
-    """Positions (..., 3) of a file in metres with y up; z up is turned by a quarter about x.
+    """Bring positions (..., 3) of a file to metres with y up; z up is turned by a quarter about x.
+
+    Args:
+        positions: (..., 3) in the file's unit and axes.
+        units: a key of METRES.
+        up: one of UP_AXES.
 
     Raises:
         ValueError: unknown unit or axis.

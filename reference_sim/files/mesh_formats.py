@@ -1,4 +1,4 @@
-"""What mesh files hold, before polygons become triangles: OBJ by ourselves, others through meshio and VTK."""
+"""Raw contents of mesh files, before polygons become triangles: OBJ here, others through meshio and VTK."""
 
 from __future__ import annotations
 
@@ -9,21 +9,27 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from reference_sim.cloth import MeshError
 from reference_sim.files.mesh_header import check_header
-
-if TYPE_CHECKING:
-    import numpy as np
 
 UV_OF_VTK = "UV"  # what the texture coordinates of a VTK file are called here
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a file holds. uv_polygons: places in uv (N, 2), parallel to
-    polygons, -1 for a corner without; empty where the UV are those of the vertices.
+    """Raw contents of a mesh file.
+
+    Attributes:
+        points: (V, 3).
+        polygons: vertex indices of each face.
+        uv: (N, 2) texture coordinates.
+        uv_polygons: places in uv, parallel to polygons, -1 for a corner without; empty where the UV are those
+            of the vertices.
+        vertex_data: name -> (V,) or (V, k).
     """
 
     points: Any
@@ -34,12 +40,16 @@ class Parts:
 
 
 def read_parts(path: Path) -> Parts:
-    """Everything of a file that is there. Raises MeshError naming the file."""
+    """Read everything of a file that exists.
+
+    Raises:
+        MeshError: not understood; the message names the file.
+    """
     return _read_obj(path) if path.suffix.lower() == ".obj" else _read_with_meshio(path)
 
 
 def _read_obj(path: Path) -> Parts:
-    """Vertices, polygons and texture coordinates of an OBJ file.
+    """Read vertices, polygons and texture coordinates of an OBJ file.
 
     meshio refuses a file with more texture coordinates than vertices, which every garment with seams has.
     """
@@ -49,15 +59,15 @@ def _read_obj(path: Path) -> Parts:
     uv_polygons: list[list[int]] = []
     with open(path, encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, start=1):
-            words = line.split()
+            parts = line.split()
             try:
-                if words and words[0] == "v":
-                    x, y, z = words[1:4]  # colours may follow
+                if parts and parts[0] == "v":
+                    x, y, z = parts[1:4]  # colours may follow
                     points.append([float(x), float(y), float(z)])
-                elif words and words[0] == "vt":
-                    uv.append([float(words[1]), float(words[2]) if len(words) > 2 else 0.0])
-                elif words and words[0] == "f":
-                    corners = [word.split("/") for word in words[1:]]
+                elif parts and parts[0] == "vt":
+                    uv.append([float(parts[1]), float(parts[2]) if len(parts) > 2 else 0.0])
+                elif parts and parts[0] == "f":
+                    corners = [corner.split("/") for corner in parts[1:]]
                     polygons.append([_counted(c[0], len(points)) for c in corners])
                     uv_polygons.append(
                         [_counted(c[1], len(uv)) if len(c) > 1 and c[1] else -1 for c in corners]
@@ -68,7 +78,11 @@ def _read_obj(path: Path) -> Parts:
 
 
 def _counted(text: str, count: int) -> int:
-    """From 0 on: OBJ counts from 1, and from the last by -1. Raises ValueError for what is no number."""
+    """Return an index from 0 on: OBJ counts from 1, and from the last by -1.
+
+    Raises:
+        ValueError: no number.
+    """
     number = int(text)
     if not 0 < abs(number) < 1 << 62:
         raise ValueError(text)
@@ -76,9 +90,8 @@ def _counted(text: str, count: int) -> int:
 
 
 def _read_with_meshio(path: Path) -> Parts:
-    """Points and polygons through meshio; legacy and XML PolyData, which it cannot read, through VTK."""
+    """Read points and polygons through meshio; PolyData of VTK, which it cannot read, through VTK."""
     import meshio
-    import numpy as np
 
     check_header(path)
     printed = io.StringIO()
@@ -102,8 +115,7 @@ def _read_with_meshio(path: Path) -> Parts:
 
 
 def _read_with_vtk(path: Path) -> Parts | None:
-    """Points and triangles of a file of PolyData, or None if it holds none."""
-    import numpy as np
+    """Read points and triangles of a file of PolyData; None if it holds none."""
     import pyvista
 
     try:

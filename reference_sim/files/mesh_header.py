@@ -1,4 +1,4 @@
-"""Counts that a mesh file declares, compared with its length before a library believes them.
+"""Check of the counts that a mesh file declares against its length, before a library believes them.
 
 meshio reads a header that does not end for ever; meshio and VTK make room for as many vertices as a file
 claims, and look for all of them.
@@ -28,7 +28,11 @@ COUNTS = {
 
 
 def check_header(path: Path) -> None:
-    """Refuse a file shorter than its header says, and a PLY or OFF file without one. Raises MeshError."""
+    """Refuse a file shorter than its header says, and a PLY or OFF file without a header.
+
+    Raises:
+        MeshError: the message names file and line.
+    """
     pattern, dense = COUNTS.get(path.suffix.lower(), (b"", 0))
     if not pattern:
         return
@@ -38,9 +42,8 @@ def check_header(path: Path) -> None:
     lines = list(re.finditer(pattern, head, re.MULTILINE | re.IGNORECASE))
     if (kind == ".ply" and not end) or (kind == ".off" and not lines):
         raise MeshError(f"{path}: cannot be read (its header does not end): {REMEDY}")
-    for found in lines:
-        for count in found[1].split():
+    for line in lines:
+        for count in line[1].split():
             if len(count) > 20 or int(count) > most:
-                words = found[0].decode(errors="replace").split()
-                line = " ".join(words)[:60]
-                raise MeshError(f"{path}: cannot be read (shorter than '{line}' says): {REMEDY}")
+                text = " ".join(line[0].decode(errors="replace").split())[:60]
+                raise MeshError(f"{path}: cannot be read (shorter than '{text}' says): {REMEDY}")

@@ -1,4 +1,4 @@
-"""A flat rest shape from the UV chart of a mesh: the pattern that a garment was sewn from, in metres.
+"""Flat rest shape from the UV chart of a mesh: the pattern that a garment was sewn from, in metres.
 
 Along a seam a vertex has one place in each piece of the pattern, so a chart is kept by the faces' corners. In
 space the pieces are one mesh: vertices that a program has doubled for the sake of its chart are joined.
@@ -20,10 +20,11 @@ STRETCHED_SHARE = 0.1  # of the area, from which a chart is no pattern
 
 
 def join_seams(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
-    """The surface (in metres) without doubled vertices; of each vertex left its number in the file (V,), and
-    of each vertex in the file its number now.
+    """Join the doubled vertices of a surface in metres: those closer than a micrometre are one.
 
-    Vertices closer than a micrometre are one. A surface that has none stays as it is.
+    Returns:
+        The surface, of each vertex left its number in the file (V,), and of each vertex in the file its
+        number now. A surface without doubled vertices stays as it is.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -47,7 +48,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
 
 
 def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndarray:
-    """The chart (F, 3, 2) [m] of a surface in metres, as `Cloth` takes it for `rest_uv`.
+    """Return the chart (F, 3, 2) [m] of a surface in metres, as `Cloth` takes it for `rest_uv`.
 
     Args:
         surface: positions in metres.
@@ -91,7 +92,7 @@ def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndar
 
 
 def flattened(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """A chart (F, 3, 2) [m] of a mesh at rest in space: each triangle laid flat by itself, as it is."""
+    """Return a chart (F, 3, 2) [m] of a mesh at rest in space: each triangle laid flat by itself."""
     frames = Cloth(positions, faces).frames
     return np.concatenate([np.zeros((len(faces), 1, 2)), frames.transpose(0, 2, 1)], axis=1)
 
@@ -105,9 +106,13 @@ def areas_of(corners: np.ndarray) -> np.ndarray:
 
 
 def stretches(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:
-    """Principal stretches (F, 2), the larger first, from chart (F, 3, 2) to corners (F, 3, 3).
+    """Return the principal stretches (F, 2), the larger first, from a chart to a mesh.
 
-    No triangle of the chart is without area. They are the singular values of F = [x1 - x0, x2 - x0] Dm^-1.
+    They are the singular values of F = [x1 - x0, x2 - x0] Dm^-1.
+
+    Args:
+        corners: (F, 3, 3) of the mesh.
+        chart: (F, 3, 2), no triangle without area.
     """
     Dm = np.stack([chart[:, 1] - chart[:, 0], chart[:, 2] - chart[:, 0]], axis=-1)
     Ds = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)

@@ -1,4 +1,4 @@
-"""What makes a triangle mesh the surface of a body, and messages for what does not."""
+"""Check that a triangle mesh is the closed surface of a body, with messages for what is wrong."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ SLIVER = 1e-12  # area of a face relative to the mean, below which it has no nor
 
 
 def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
-    """Refuse what is no moving closed surface: positions (T, B, 3) [m], faces (F, 3).
+    """Refuse a mesh that is no moving closed surface.
+
+    Args:
+        positions: (T, B, 3) [m].
+        faces: (F, 3).
 
     Raises:
         MeshError: wrong shapes, no frame, NaN, a face without area, an open, non-manifold, inconsistently
@@ -31,18 +35,18 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
 
 
 def _check_edges(faces: np.ndarray, size: int) -> None:
-    """Every edge between exactly two faces that walk it in opposite directions."""
+    """Refuse an edge that is not between exactly two faces that walk it in opposite directions."""
     half = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     undirected = np.sort(half, axis=1) @ np.array([size, 1])
     _, inverse, count = np.unique(undirected, return_inverse=True, return_counts=True)
     count = count[inverse]
-    for wrong, words in (
+    for wrong, message in (
         (count == 1, "is not closed: edge ({a}, {b}) of face {face} has one face only: fill the hole"),
         (count > 2, "has {count} faces at edge ({a}, {b}), {face} one of them: separate what meets there"),
     ):
         if wrong.any():
             k = int(np.argmax(wrong))
-            text = words.format(a=half[k, 0], b=half[k, 1], face=k // 3, count=count[k])
+            text = message.format(a=half[k, 0], b=half[k, 1], face=k // 3, count=count[k])
             raise MeshError(f"obstacle {text}")
     directed, first, times = np.unique(half @ np.array([size, 1]), return_index=True, return_counts=True)
     if len(directed) < len(half):
@@ -54,7 +58,7 @@ def _check_edges(faces: np.ndarray, size: int) -> None:
 
 
 def _check_shape(corner: np.ndarray, frame: int) -> None:
-    """Faces (F, 3, 3) of one frame: all with an area, and a positive volume inside."""
+    """Refuse faces (F, 3, 3) of one frame without an area, or with no positive volume inside."""
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = np.sqrt(np.einsum("fi,fi->f", normal, normal))
     if not area.min() > SLIVER * area.mean():

@@ -1,4 +1,4 @@
-"""Normals of a triangle mesh, the contact planes of closest points, and what its faces carry."""
+"""Normals of a triangle mesh, contact planes at closest points, and points carried along by faces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BEYOND = 1e-3  # cosine to a face, of an offset that leads over it: above the ro
 
 @njit(cache=True, error_model="numpy")
 def cross_of_face(x, i, j, k):
-    """Twice the area of a triangle times its normal."""
+    """Return twice the area of a triangle of positions x (V, 3) times its normal."""
     a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
     b0, b1, b2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
@@ -21,7 +21,7 @@ def cross_of_face(x, i, j, k):
 
 @njit(cache=True, error_model="numpy")
 def vertex_normals(positions, faces):
-    """Unit normals (B, 3) of the vertices of a mesh (B, 3) [m], (F, 3): of its faces, weighted by area."""
+    """Return unit normals (B, 3) of vertices (B, 3) [m]: of the faces (F, 3) around, weighted by area."""
     normals = np.zeros_like(positions)
     for f in range(len(faces)):
         n = cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
@@ -42,11 +42,11 @@ def _normalise(v):
 
 @njit(cache=True, error_model="numpy")
 def _beyond(offset, c, face, weights, vertices, faces):
-    """Whether some face at c, which is on a side or a corner of one, leads nearer along the unit offset.
+    """Return whether some face at c leads nearer along the unit offset; c is on a side or a corner of one.
 
     Few samples ask: all faces are looked through for those that share the side or corner.
     """
-    around, own = 0, 0.0
+    around, lowest = 0, 0.0
     for f in range(len(faces)):
         shared = True
         for a in range(3):
@@ -63,13 +63,13 @@ def _beyond(offset, c, face, weights, vertices, faces):
                 squared += way * way
             if along > BEYOND * np.sqrt(squared):
                 return True
-            own = min(own, along + BEYOND * np.sqrt(squared))
-    return around == 1 and own < 0.0  # over the border of the mesh itself
+            lowest = min(lowest, along + BEYOND * np.sqrt(squared))
+    return around == 1 and lowest < 0.0  # over the border of the mesh itself
 
 
 @njit(cache=True, error_model="numpy")
-def plane_normals(points, closest, found, barycentric, vertices, faces, of_vertices, normals):
-    """normals (S, 3): from the closest point to the sample, turned outwards.
+def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, of_vertices, normals):
+    """Write the normals (S, 3) from the closest points to the samples, turned outwards.
 
     A sample that looks along the surface, or is below it and beyond the border of the faces that it may meet
     (another face at the closest point c leads nearer), meets a ball that touches the surface in c from below:
@@ -79,7 +79,7 @@ def plane_normals(points, closest, found, barycentric, vertices, faces, of_verti
     """
     offset, smooth = np.empty(3), np.empty(3)
     for s in range(len(points)):
-        i, j, k = faces[found[s], 0], faces[found[s], 1], faces[found[s], 2]
+        i, j, k = faces[closest_faces[s], 0], faces[closest_faces[s], 1], faces[closest_faces[s], 2]
         u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
         for c in range(3):
             smooth[c] = u * of_vertices[i, c] + v * of_vertices[j, c] + w * of_vertices[k, c]
@@ -90,7 +90,7 @@ def plane_normals(points, closest, found, barycentric, vertices, faces, of_verti
         # Within a micrometre, or looking along the surface, the offset has no direction to trust.
         beside = not (length > 1e-6 and np.abs(cosine) > 0.3)
         if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
-            beside |= _beyond(offset, closest[s], faces[found[s]], barycentric[s], vertices, faces)
+            beside |= _beyond(offset, closest[s], faces[closest_faces[s]], barycentric[s], vertices, faces)
         if beside:
             ball = max(BALL, 1.5 * length)  # below c is in it, however deep
             for c in range(3):
@@ -109,7 +109,7 @@ def plane_normals(points, closest, found, barycentric, vertices, faces, of_verti
 
 @njit(cache=True, error_model="numpy")
 def _frame_of_face(x, i, j, k, axes):
-    """Orthonormal axes (3, 3) of a triangle, in rows; the last is its normal."""
+    """Write the orthonormal axes (3, 3) of a triangle, in rows; the last is its normal."""
     for c in range(3):
         axes[0, c] = x[j, c] - x[i, c]
     axes[2, 0], axes[2, 1], axes[2, 2] = cross_of_face(x, i, j, k)
@@ -121,11 +121,11 @@ def _frame_of_face(x, i, j, k, axes):
 
 
 @njit(cache=True, error_model="numpy")
-def carry(points, closest, found, barycentric, before, after, faces, carried):
-    """carried (N, 3): points beside their closest faces, which go from vertices `before` to `after`."""
+def carry(points, closest, closest_faces, barycentric, before, after, faces, carried):
+    """Write into carried (N, 3) the points beside their closest faces, which go from `before` to `after`."""
     old, new = np.empty((3, 3)), np.empty((3, 3))
     for s in range(len(points)):
-        i, j, k = faces[found[s], 0], faces[found[s], 1], faces[found[s], 2]
+        i, j, k = faces[closest_faces[s], 0], faces[closest_faces[s], 1], faces[closest_faces[s], 2]
         _frame_of_face(before, i, j, k, old)
         _frame_of_face(after, i, j, k, new)
         u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]

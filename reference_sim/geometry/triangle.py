@@ -1,4 +1,4 @@
-"""The closest point of a triangle, the same to the bit for all triangles that share the side or corner."""
+"""Closest point of a triangle, the same to the bit for all triangles that share the side or corner."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SLIVER = 1e-3  # squared sine of a triangle's first angle, below which all of it
 
 @njit(cache=True, error_model="numpy")
 def _on_side(corners, place, a, b, x, y, z):
-    """Share of the side from corner a to b at which it comes closest to a point; distance squared.
+    """Return the share of the side from corner a to b that is closest to a point, and the distance squared.
 
     The same bits for every face that has the side, and the same for every side that ends in the corner.
     """
@@ -32,11 +32,13 @@ def _on_side(corners, place, a, b, x, y, z):
 
 @njit(cache=True, error_model="numpy")
 def closest_on_triangle(corners, place, x, y, z):
-    """Of triangle corners[place] and a point: weights v, w of the second and third corner at the closest
-    point, and the squared distance to it.
+    """Find the closest point of triangle corners[place] to a point (x, y, z).
 
-    The foot of the perpendicular, where it lies inside; else the best of the sides that the foot is beyond,
-    one of which holds the closest point. Of a sliver, whose foot is too inexact to tell, all sides.
+    It is the foot of the perpendicular, where that lies inside; else the best of the sides that the foot is
+    beyond, one of which holds the closest point. Of a sliver, whose foot is too inexact to tell, all sides.
+
+    Returns:
+        Weights v, w of the second and third corner at the closest point, and the squared distance to it.
     """
     o0, o1, o2 = corners[place, 0, 0], corners[place, 0, 1], corners[place, 0, 2]
     r0, r1, r2 = x - o0, y - o1, z - o2

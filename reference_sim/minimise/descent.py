@@ -19,14 +19,19 @@ Observer = Callable[[np.ndarray], object]  # is called with positions (V, 3) [m]
 
 
 class Descent:
-    """State of one minimisation of `potential` from x (V, 3) [m] over the free vertices of its cloth.
+    """State of one minimisation over the free vertices of a cloth.
+
+    Args:
+        potential: the sum of energies.
+        x: (V, 3) [m] start.
+        after: an earlier descent, whose counts and clock go on.
+        observe: called by `show` with a copy of x.
 
     Attributes:
         x: (V, 3), the point kept last; value [J] and g (3n,) [N] belong to it.
-        iterations, factorisations: counts. seconds: time by part.
-        started: clock [s] at the beginning. All four go on from those of `after`, an earlier descent.
-
-    `observe` is called by `show` with a copy of x.
+        iterations, factorisations: counts.
+        seconds: time by part.
+        started: clock [s] at the beginning.
     """
 
     def __init__(

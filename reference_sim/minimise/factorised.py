@@ -1,4 +1,4 @@
-"""The Hessian of a potential as Newton's method needs it: assembled, shifted, factorised, solved with."""
+"""Hessian of a potential as Newton's method needs it: assembled, shifted, factorised, solved with."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class FactorisedHessian:
         self._solver = analyse(pattern.indptr, pattern.indices, pattern.order)
 
     def assemble(self, x: np.ndarray, convexity: float) -> np.ndarray:
-        """Values (nnz,) at x (V, 3), with that share of the elements' negative curvature taken out.
+        """Return values (nnz,) at x (V, 3), with that share of the elements' negative curvature taken out.
 
         Dynamic terms may need a wider pattern, analysed anew.
         """
@@ -66,23 +66,23 @@ class FactorisedHessian:
         return self._solver.solve(b)
 
     def precondition(self, r: np.ndarray) -> np.ndarray:
-        """A first guess (3n,) of the solution for r (3n,): here the solution."""
+        """Return a first guess (3n,) of the solution for r (3n,): here the solution."""
         return self.solve(r)
 
     def look_for_negative_curvature(self) -> None:
-        """Nothing to look for: the last factorisation was proof of none."""
+        """Do nothing: the last factorisation was proof that there is none."""
 
     def stiffest(self, data: np.ndarray) -> float:
-        """Largest entry of the diagonal [N/m]."""
+        """Return the largest entry of the diagonal [N/m]."""
         return float(np.abs(data[self._pattern.diagonal]).max(initial=0.0))
 
     def tiny_shift(self, data: np.ndarray) -> np.ndarray:
-        """The shift (3n,) in units of M/dt^2 below which curvature counts as none."""
+        """Return the shift (3n,) in units of M/dt^2 below which curvature counts as none."""
         return max(self.flat, 1e-13 * self.stiffest(data)) / self.metric
 
 
 class FactorisedDescent(Descent):
-    """A descent that factorises a Hessian, counts that and takes its time."""
+    """Descent that factorises a Hessian, counts that and takes its time."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class FactorisedDescent(Descent):
         self.factorised = False  # whether the last factorisation exists, to solve with
 
     def assemble(self, convexity: float) -> np.ndarray:
-        """Values (nnz,) of the Hessian here."""
+        """Return values (nnz,) of the Hessian at the point kept last."""
         start = time.perf_counter()
         with np.errstate(all="ignore"):
             data = self.hessian.assemble(self.x, convexity)
@@ -106,7 +106,7 @@ class FactorisedDescent(Descent):
         return data
 
     def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
-        """As the Hessian's."""
+        """Factorise, as the Hessian does; False if not positive definite."""
         start = time.perf_counter()
         self.factorised = self.hessian.factorise(data, shift)
         self.factorisations += 1
@@ -114,21 +114,21 @@ class FactorisedDescent(Descent):
         return self.factorised
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """As the Hessian's."""
+        """Solve with the last factorisation, as the Hessian does."""
         start = time.perf_counter()
         x = self.hessian.solve(b)
         self.seconds["solve"] += time.perf_counter() - start
         return x
 
     def precondition(self, r: np.ndarray) -> np.ndarray:
-        """As the Hessian's."""
+        """Return a first guess of a solution, as the Hessian does."""
         start = time.perf_counter()
         x = self.hessian.precondition(r)
         self.seconds["solve"] += time.perf_counter() - start
         return x
 
     def look_for_negative_curvature(self) -> None:
-        """As the Hessian's."""
+        """Look for negative curvature, as the Hessian does."""
         start = time.perf_counter()
         self.hessian.look_for_negative_curvature()
         self.seconds["solve"] += time.perf_counter() - start

@@ -1,4 +1,4 @@
-"""The Hessian of a mesh too large to factorise it: solved with by preconditioned conjugate gradients.
+"""Hessian of a mesh too large to factorise it: solved with by preconditioned conjugate gradients.
 
 The preconditioner P^-1 = S^-1 + N (N^T H N)^-1 N^T needs two factorisations of n x n matrices. The scalar S
 of L-BFGS takes cloth to be as stiff along its normals, the columns of N, as in its plane, though only bending
@@ -6,7 +6,7 @@ resists there. So the normals get the true Hessian among themselves. Cloth that 
 the steps, crumpled cloth up to as many.
 
 How exactly a system is solved follows from the size of its right-hand side (Nocedal and Wright 2006,
-algorithm 7.1). A direction of negative curvature ends a solve, and what was found until then goes down all
+algorithm 7.1). A direction of negative curvature ends a solve, and the solution until then goes down all
 the same. That there is none, nothing proves but a factorisation: Lanczos' method from a random start, which
 finds the ends of the spectrum first, estimates the lowest curvature.
 """
@@ -32,7 +32,7 @@ EXHAUSTED = 1e-12  # residual below which the steps have seen all that the start
 
 
 class IterativeHessian(FactorisedHessian):
-    """A FactorisedHessian whose preconditioner alone is factorised: a solve may meet negative curvature."""
+    """FactorisedHessian whose preconditioner alone is factorised: a solve may meet negative curvature."""
 
     def __init__(self, potential: Potential, *, tolerance: float, reference_dt: float) -> None:
         self._scalar = ScalarPreconditioner(potential)
@@ -44,6 +44,7 @@ class IterativeHessian(FactorisedHessian):
         self._first, self._along_normals = indptr[:-1], analyse(indptr, rows, order)
 
     def assemble(self, x: np.ndarray, convexity: float) -> np.ndarray:
+        """Return values (nnz,) at x (V, 3), and keep the preconditioner's scalar and normals there."""
         from reference_sim.geometry.surface import (
             vertex_normals,  # loads numba, which a command's --help can do without
         )
@@ -72,7 +73,7 @@ class IterativeHessian(FactorisedHessian):
         return run.x
 
     def look_for_negative_curvature(self) -> None:
-        """Lanczos' method from a random start, until its lowest eigenvalue has settled or is negative."""
+        """Run Lanczos' method from a random start until its lowest eigenvalue has settled or is negative."""
         run = ConjugateGradients(self, np.random.default_rng(0).standard_normal(len(self.metric)))
         lowest, error = 0.0, np.inf
         while error > SETTLED * lowest and len(run.lengths) < MAX_PRODUCTS and run.step():
@@ -84,17 +85,17 @@ class IterativeHessian(FactorisedHessian):
         self.evidence = f", lowest curvature {lowest:.1e} of the preconditioner's by Lanczos' method, {word}"
 
     def product(self, p: np.ndarray) -> np.ndarray:
-        """The kept matrix times p (3n,)."""
+        """Return the kept matrix times p (3n,)."""
         return self._pattern.product(self._data, p) + self._shift * p
 
     def precondition(self, r: np.ndarray) -> np.ndarray:
-        """P^-1 r (3n,)."""
+        """Return P^-1 r (3n,)."""
         along = self._along_normals.solve(np.einsum("vi,vi->v", self._normals, r.reshape(-1, 3)))
         return self._scalar.solve(r) + (along[:, None] * self._normals).ravel()
 
 
 class ConjugateGradients:
-    """H x = b from x = 0, a step at a time; its numbers are those of Lanczos' method for P^-1 H.
+    """Solution of H x = b from x = 0, a step at a time; its numbers are those of Lanczos' method for P^-1 H.
 
     Attributes:
         x: (3n,) the solution so far; P^-1 b where the curvature along that is not positive.
@@ -114,7 +115,7 @@ class ConjugateGradients:
         self.ratios: list[float] = []
 
     def step(self) -> bool:
-        """Go along p; False if the curvature there is not positive."""
+        """Go along p; return False if the curvature there is not positive."""
         product = self._hessian.product(self._p)
         curvature = dot(self._p, product)
         if not curvature > 0:
@@ -133,9 +134,10 @@ class ConjugateGradients:
         return True
 
     def lowest_eigenvalue(self) -> tuple[float, float]:
-        """The lowest Ritz value of P^-1 H, and how far from it there is an eigenvalue at most.
+        """Return the lowest Ritz value of P^-1 H, and how far from it there is an eigenvalue at most.
 
-        Saad 2003, section 6.7.3: the tridiagonal matrix of Lanczos' method from the numbers of the steps.
+        Source: Saad 2003, section 6.7.3: the tridiagonal matrix of Lanczos' method from the numbers of the
+        steps.
         """
         inverse, ratios = 1.0 / np.array(self.lengths), np.array(self.ratios)
         diagonal = inverse + np.append(0.0, ratios[:-1] * inverse[:-1])

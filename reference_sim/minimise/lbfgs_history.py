@@ -1,4 +1,4 @@
-"""The last steps and gradient changes, from which L-BFGS estimates the curvature."""
+"""History of L-BFGS: the last steps and gradient changes, from which it estimates the curvature."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ LEAST_CURVATURE = 1e-10  # of |s| |y|: pairs of negative curvature would make th
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> float:
-    """a . b of two (n,). Not by BLAS, whose threads cost more than such a sum, and change its last digit."""
+    """Return a . b of two (n,), not by BLAS: its threads cost more than the sum and change its last digit."""
     return float(np.einsum("i,i", a, b))
 
 
 class LBFGSHistory:
-    """The last `memory` pairs of a step s (3n,) [m] and the change y (3n,) [N] of the gradient along it."""
+    """Last `memory` pairs of a step s (3n,) [m] and the change y (3n,) [N] of the gradient along it."""
 
     def __init__(self, memory: int) -> None:
         self._memory = memory
@@ -27,6 +27,7 @@ class LBFGSHistory:
         return min(self._count, self._memory)
 
     def clear(self) -> None:
+        """Forget all pairs."""
         self._count = 0
 
     def add(self, s: np.ndarray, y: np.ndarray) -> None:
@@ -40,9 +41,11 @@ class LBFGSHistory:
             self._count += 1
 
     def direction(self, g: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """-H g (3n,) by the two-loop recursion (Nocedal and Wright 2006, algorithm 7.4).
+        """Return -H g (3n,) by the two-loop recursion (Nocedal and Wright 2006, algorithm 7.4).
 
-        solve applies the first guess of the inverse Hessian, which the pairs correct.
+        Args:
+            g: (3n,) gradient [N].
+            solve: applies the first guess of the inverse Hessian, which the pairs correct.
         """
         from reference_sim.minimise.two_loop import (  # loads numba, which a command's --help can do without
             first_loop,

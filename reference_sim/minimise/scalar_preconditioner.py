@@ -1,4 +1,7 @@
-"""The n x n matrix that x, y and z share, in place of the Hessian (Liu, Bouaziz and Kavan 2017)."""
+"""Scalar preconditioner: an n x n matrix that x, y and z share, in place of the Hessian.
+
+Source: Liu, Bouaziz and Kavan 2017.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ class ScalarPreconditioner:
         self._floor = FLOOR * potential.cloth.masses[free] * 30**2
 
     def assemble(self, x: np.ndarray) -> np.ndarray:
-        """Values (nnz,) [N/m] at x (V, 3) [m]."""
+        """Return values (nnz,) [N/m] at x (V, 3) [m]."""
         data = self._pattern.assemble(x)
         data[self._pattern.diagonal] += self._floor
         return data

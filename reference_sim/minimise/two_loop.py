@@ -1,4 +1,4 @@
-"""The two loops of L-BFGS, compiled; see lbfgs_history."""
+"""Compiled loops of L-BFGS; see lbfgs_history."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FAST = {"reassoc", "contract", "nsz"}  # sums in vector instructions
 def first_loop(
     pairs: np.ndarray, curvatures: np.ndarray, order: np.ndarray, q: np.ndarray, alphas: np.ndarray
 ) -> None:
-    """Newest pair first: alphas (k,) are set, q (3n,) becomes what the first guess is applied to."""
+    """Run from the newest pair to the oldest: set alphas (k,); q (3n,) is then ready for the first guess."""
     for k in range(len(order) - 1, -1, -1):
         s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
         for i in range(len(q)):
@@ -27,7 +27,7 @@ def first_loop(
 def second_loop(
     pairs: np.ndarray, curvatures: np.ndarray, order: np.ndarray, p: np.ndarray, alphas: np.ndarray
 ) -> None:
-    """Oldest pair first: p (3n,) becomes the direction."""
+    """Run from the oldest pair to the newest: p (3n,) becomes the direction."""
     for k in range(len(order)):
         s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
         for i in range(len(p)):

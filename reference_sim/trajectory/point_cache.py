@@ -1,4 +1,4 @@
-"""A trajectory as a PC2 point cache beside an OBJ: what Blender's Mesh Cache modifier reads.
+"""Trajectory as a PC2 point cache beside an OBJ, as Blender's Mesh Cache modifier reads it.
 
 A 32-byte header (signature, version 1, number of points, first frame, frames per sample, number of samples),
 then float32 positions, sample by sample. PC16 is the same in float16.
@@ -20,7 +20,7 @@ TYPES = {".pc2": "<f4", ".pc16": "<f2"}
 
 
 def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, Path]:
-    """Write PC2 [m, y up, float32] at `path` and the first frame as OBJ beside it; returns both paths.
+    """Write PC2 [m, y up, float32] at `path` and the first frame as OBJ beside it; return both paths.
 
     Each file is written whole or not at all.
 
@@ -48,7 +48,7 @@ def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray) -> None:
 
 
 def read_point_cache(path: str | Path) -> np.ndarray:
-    """Positions (T, V, 3) of a .pc2 (float32) or .pc16 (float16) file, in its own unit and axes.
+    """Read positions (T, V, 3) of a .pc2 (float32) or .pc16 (float16) file, in its unit and axes.
 
     Raises:
         TrajectoryError: no such file, no point cache, or not as long as its header says.
@@ -62,10 +62,10 @@ def read_point_cache(path: str | Path) -> np.ndarray:
         if len(header) < HEADER or not header.startswith(SIGNATURE):
             raise TrajectoryError(f"{path}: is no point cache: it does not begin with POINTCACHE2")
         version, points, _, _, frames = struct.unpack("<iiffi", header[len(SIGNATURE) :])
-        due = HEADER + frames * points * 3 * kind.itemsize
-        if version != 1 or points < 1 or frames < 1 or due != length:
+        declared = HEADER + frames * points * 3 * kind.itemsize
+        if version != 1 or points < 1 or frames < 1 or declared != length:
             raise TrajectoryError(
-                f"{path}: version {version}, {frames} samples of {points} points take {due} bytes, the file "
-                f"has {length}: write it again"
+                f"{path}: version {version}, {frames} samples of {points} points take {declared} bytes, the "
+                f"file has {length}: write it again"
             )
         return np.fromfile(file, kind).reshape(frames, points, 3)

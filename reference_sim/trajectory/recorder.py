@@ -1,4 +1,4 @@
-"""Frames as they come: in memory and, where a path is given, in a file; with the status of the whole."""
+"""Recorder of a simulation: frames in memory and, where a path is given, in a file; status of the whole."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from reference_sim.trajectory.writer import TrajectoryWriter
 
 
 class Recorder:
-    """Collects the frames of one simulation; use it in a `with` block.
+    """Collector of the frames of one simulation; use it in a `with` block.
 
     Args:
         cloth: gives the faces.
@@ -47,16 +47,17 @@ class Recorder:
 
     @property
     def frames(self) -> int:
+        """Number of frames so far."""
         return len(self._positions)
 
     def start(self, x: np.ndarray, fields: dict[str, float]) -> None:
-        """Frame 0: x (V, 3) [m], which is given; the file appears."""
+        """Add frame 0, x (V, 3) [m], which is given; the file appears."""
         self.add(x, 0.0, 0.0, fields)
         if self._file:
             self._file.go_live()
 
     def replay(self, earlier: PartialRun) -> None:
-        """The frames of an earlier run; the file that it left is replaced by a clean one."""
+        """Add the frames of an earlier run; the file that it left is replaced by a clean one."""
         old = earlier.trajectory
         for k in range(old.frames):
             fields = {name: float(values[k]) for name, values in old.frame_fields.items()}
@@ -68,8 +69,10 @@ class Recorder:
             self._file.go_live()
 
     def note(self, frame: int, results: Sequence[Result]) -> None:
-        """Take note of the first minimisation that did not converge, on the way to `frame`; until there is
-        one, of the first that converged within round-off alone.
+        """Take the status of the whole from the minimisations on the way to `frame`.
+
+        It is that of the first that did not converge; until there is one, the reason is that of the first
+        that converged within round-off alone.
         """
         for result in results:
             failed = result.status != "converged" and self.status == "converged"
@@ -89,7 +92,7 @@ class Recorder:
         fields: dict[str, float],
         before: np.ndarray | None = None,
     ) -> None:
-        """One frame; the arguments are those of `TrajectoryWriter.append`."""
+        """Add one frame; the arguments are those of `TrajectoryWriter.append`."""
         self._positions.append(x)
         self._times.append(time)
         self._seconds.append(seconds)
@@ -98,7 +101,7 @@ class Recorder:
             self._file.append(x, time, seconds, fields, before=before)
 
     def trajectory(self) -> Trajectory:
-        """All frames so far."""
+        """Return all frames so far."""
         return Trajectory(
             positions=np.array(self._positions),
             faces=self._faces,

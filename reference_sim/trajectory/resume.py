@@ -1,4 +1,4 @@
-"""Continue a run that was cut off: what its file still holds, and whether it is the same run.
+"""Recovery of a run that was cut off: the whole frames of its file, and whether it is the same run.
 
 A resumed run takes up positions and velocity exactly as they were, and prepares the last step once more
 (terms may remember something of it, as lagged friction does), so that on one machine it ends in the same
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PartialRun:
-    """The whole frames of an earlier run.
+    """Whole frames of an earlier run.
 
     Attributes:
         trajectory: those frames, with the status of the first that failed, or "converged".
@@ -41,12 +41,17 @@ class PartialRun:
     ended: bool
 
     def complete(self, frames: int) -> bool:
-        """Whether nothing is left to do for a run of `frames` frames."""
+        """Return whether nothing is left to do for a run of `frames` frames."""
         return self.ended and (self.trajectory.frames == frames or self.trajectory.status == "diverged")
 
 
 def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> PartialRun | None:
-    """The whole frames of the run in `path`, or None if there is no such file.
+    """Return the whole frames of the run in `path`, or None if there is no such file.
+
+    Args:
+        path: VTKHDF file.
+        provenance: of the run that is to go on; the file's must be the same.
+        frames: number of frames that is asked for.
 
     Raises:
         TrajectoryError: the file cannot be read at all, another run wrote it, or it holds more than `frames`.
@@ -72,7 +77,7 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Par
 
 @contextmanager
 def _opened(path: Path) -> Iterator[h5py.File]:
-    """The file, or a copy of it as long as HDF5 believes it to be, where its end was cut off."""
+    """Open the file, or a copy of it as long as HDF5 believes it to be, where its end was cut off."""
     import h5py
 
     with open(path, "rb") as raw:
@@ -93,9 +98,9 @@ def _opened(path: Path) -> Iterator[h5py.File]:
 
 
 def _whole_frames(file: h5py.File) -> PartialRun:
-    own, points = file["benchmark"], file["VTKHDF/Points"]
+    benchmark, points = file["benchmark"], file["VTKHDF/Points"]
     vertex_count = int(file["VTKHDF/NumberOfPoints"][0])
-    written = min(int(own.attrs["frames"]), len(points) // vertex_count)
+    written = min(int(benchmark.attrs["frames"]), len(points) // vertex_count)
     whole = 0
     while whole < written:
         try:
@@ -106,12 +111,12 @@ def _whole_frames(file: h5py.File) -> PartialRun:
     if whole == 0:
         raise ValueError("no whole frame in it")
     last = whole - 1
-    held = BEFORE in own and last >= written - 2
-    before = own[BEFORE][last % 2] if held else None
+    held = BEFORE in benchmark and last >= written - 2
+    before = benchmark[BEFORE][last % 2] if held else None
     trajectory = read_trajectory(file, frames=whole)
     ended = trajectory.status != UNFINISHED
     if not ended:
-        status, reason = json.loads(own.attrs.get(FAILURE, '["converged", ""]'))
+        status, reason = json.loads(benchmark.attrs.get(FAILURE, '["converged", ""]'))
         trajectory = trajectory.with_status(status, reason)
     return PartialRun(trajectory, before, ended)
 
@@ -131,7 +136,7 @@ def _check_same_run(path: Path, then: dict[str, Any], now: dict[str, Any]) -> No
 
 
 def _flat(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Leaves of nested dictionaries by dotted name."""
+    """Return the leaves of nested dictionaries by dotted name."""
     leaves: dict[str, Any] = {}
     for key, value in tree.items():
         leaves |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}

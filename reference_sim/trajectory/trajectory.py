@@ -1,4 +1,4 @@
-"""A trajectory: positions over time, whether and how they converged, and its file.
+"""Trajectory: positions over time, whether and how they converged, and its file.
 
 The file is VTKHDF (temporal PolyData), so ParaView opens it as it is; what VTK has no place for lies in the
 top-level group /benchmark.
@@ -30,7 +30,7 @@ UNREADABLE = (
 
 
 class TrajectoryError(ValueError):
-    """A trajectory file that cannot be read; the message names file and remedy."""
+    """Trajectory file that cannot be read; the message names file and remedy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +47,21 @@ class Trajectory:
         reason: one line in words.
         provenance: what made it (JSON values).
         frame_fields: further numbers per frame, each (T,).
+
+    Example: two frames of a triangle, to a file and back.
+
+        >>> import tempfile
+        >>> import numpy as np
+        >>> from reference_sim import Trajectory
+        >>> x = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1]])
+        >>> rise = Trajectory(np.stack([x, x + 0.01]), np.array([[0, 2, 1]]), times=np.array([0.0, 0.02]))
+        >>> rise.frames, rise.dt, rise.status
+        (2, 0.02, 'ok')
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     rise.save(f"{folder}/rise.vtkhdf")
+        ...     again = Trajectory.load(f"{folder}/rise.vtkhdf")
+        >>> bool((again.positions == rise.positions).all())
+        True
     """
 
     positions: np.ndarray
@@ -64,6 +79,7 @@ class Trajectory:
 
     @property
     def frames(self) -> int:
+        """Number of frames T."""
         return len(self.positions)
 
     @property
@@ -98,11 +114,11 @@ class Trajectory:
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
 
     def with_status(self, status: str, reason: str) -> Trajectory:
-        """The same frames with another status."""
+        """Return the same frames with another status."""
         return replace(self, status=status, reason=reason)
 
     def first(self, count: int) -> Trajectory:
-        """That many of its frames, or all that there are."""
+        """Return the first `count` frames, or all if there are fewer."""
         return replace(
             self, positions=self.positions[:count], times=self.times[:count],
             frame_seconds=self.frame_seconds[:count],
@@ -110,35 +126,40 @@ class Trajectory:
         )  # fmt: skip
 
     def finite(self) -> Trajectory:
-        """The frames before the first in which a position is not finite."""
+        """Return the frames before the first in which a position is not finite."""
         whole = np.isfinite(self.positions).all(axis=(1, 2))
         return self if whole.all() else self.first(int(np.argmin(whole)))
 
 
 def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:
-    """The first `frames` frames of an open file, default all that are whole; raises one of UNREADABLE."""
-    own, vtk = file["benchmark"], file["VTKHDF"]
-    provenance = json.loads(own.attrs["provenance"])
+    """Read the first `frames` frames of an open file, by default all that are whole.
+
+    Raises:
+        UNREADABLE: one of these, for a file that is no trajectory or is damaged.
+    """
+    benchmark, vtk = file["benchmark"], file["VTKHDF"]
+    provenance = json.loads(benchmark.attrs["provenance"])
     if not isinstance(provenance, dict):
         raise ValueError("its provenance is no JSON object")
-    frames = int(own.attrs["frames"]) if frames is None else frames
+    frames = int(benchmark.attrs["frames"]) if frames is None else frames
     vertex_count = int(_whole(vtk["NumberOfPoints"])[0])
     return Trajectory(
         positions=_whole(vtk["Points"], frames * vertex_count).reshape(frames, vertex_count, 3),
         faces=_whole(vtk["Polygons/Connectivity"]).reshape(-1, 3),
         times=_whole(vtk["Steps/Values"], frames),
-        frame_seconds=_whole(own["frame_seconds"], frames),
-        status=str(own.attrs["status"]),
-        reason=str(own.attrs["reason"]),
+        frame_seconds=_whole(benchmark["frame_seconds"], frames),
+        status=str(benchmark.attrs["status"]),
+        reason=str(benchmark.attrs["reason"]),
         provenance=provenance,
-        frame_fields={k.replace(":", "/"): _whole(v, frames) for k, v in own["frame_fields"].items()},
+        frame_fields={k.replace(":", "/"): _whole(v, frames) for k, v in benchmark["frame_fields"].items()},
     )
 
 
 def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
-    """The first rows of a dataset, all of them by default, once their size is that of what is stored.
+    """Read the first rows of a dataset, by default all, once their size is that of what is stored.
 
-    Raises ValueError for one that declares more numbers than it holds, or no plain numbers.
+    Raises:
+        ValueError: it declares more numbers than it holds, or no plain numbers.
     """
     rows = len(dataset) if rows is None else rows
     if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":

@@ -1,4 +1,4 @@
-"""Writes a trajectory frame by frame: what is there after a kill, or on a full disk, is whole frames."""
+"""Writer of a trajectory, frame by frame: after a kill, or on a full disk, the file holds whole frames."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ class TrajectoryWriter:
         self.frames = 0
         self._create(self._part, np.size(faces))
         _vtk_skeleton(self._file, np.asarray(faces, dtype=np.int64), vertex_count)
-        own = self._file.create_group("benchmark")
-        own.create_group("frame_fields")
-        own.create_dataset("frame_seconds", (0,), maxshape=(None,), dtype="f8")
-        own.attrs.update(
+        benchmark = self._file.create_group("benchmark")
+        benchmark.create_group("frame_fields")
+        benchmark.create_dataset("frame_seconds", (0,), maxshape=(None,), dtype="f8")
+        benchmark.attrs.update(
             {
                 "frames": 0,
                 "status": UNFINISHED,
@@ -64,7 +64,7 @@ class TrajectoryWriter:
         )
 
     def _create(self, path: Path, numbers: int) -> None:
-        """Make the file, with room for its faces; where there is none it is gone again."""
+        """Make the file, with room for its faces; where there is no room it is gone again."""
         import h5py
 
         path.write_bytes(b"")
@@ -77,9 +77,10 @@ class TrajectoryWriter:
             raise
 
     def _reserve(self, numbers: int) -> None:
-        """Room for so many more numbers and what HDF5 puts around them: it crashes where it finds none.
+        """Set room aside for so many more numbers and what HDF5 puts around them: without, it crashes.
 
-        Raises OSError; what was written before is then whole.
+        Raises:
+            OSError: no room; what was written before is then whole.
         """
         reserve(self._part or self.path, self._file.id.get_filesize() + 16 * numbers + ROOM)
 
@@ -92,10 +93,15 @@ class TrajectoryWriter:
         *,
         before: np.ndarray | None = None,
     ) -> None:
-        """Add one frame: positions (V, 3) [m], its time [s], the clock's seconds, further numbers by name.
+        """Add one frame.
 
-        before: (2, V, 3) positions [m] and velocity [m/s] from which the last step to this frame was made; a
-        run with sub-steps that is resumed from this frame needs them.
+        Args:
+            positions: (V, 3) [m].
+            time: of the frame [s].
+            seconds: on the clock [s].
+            fields: further numbers by name.
+            before: (2, V, 3) positions [m] and velocity [m/s] from which the last step to this frame was
+                made; a run with sub-steps that is resumed from this frame needs them.
         """
         numbers = {name: np.array([value]) for name, value in (fields or {}).items()}
         self.extend(
@@ -111,13 +117,18 @@ class TrajectoryWriter:
         *,
         before: np.ndarray | None = None,
     ) -> None:
-        """Add K frames at once: positions (K, V, 3) [m], times and seconds (K,), further numbers (K,).
+        """Add K frames at once.
 
-        before: as of `append`, for one frame.
+        Args:
+            positions: (K, V, 3) [m].
+            times: (K,) [s].
+            seconds: (K,) on the clock [s].
+            fields: further numbers by name, (K,) each.
+            before: as of `append`, for one frame.
         """
         k, count = self.frames, len(positions)
         self._reserve(np.size(positions) + (0 if before is None else 2 * np.size(before)))
-        vtk, own = self._file["VTKHDF"], self._file["benchmark"]
+        vtk, benchmark = self._file["VTKHDF"], self._file["benchmark"]
         steps = vtk["Steps"]
         # VTK crashes on Values longer than NSteps, so the count is raised first.
         steps.attrs.modify("NSteps", k + count)
@@ -128,9 +139,9 @@ class TrajectoryWriter:
         _append(steps["NumberOfParts"], np.ones(count, dtype=np.int64))
         for name in ("CellOffsets", "ConnectivityIdOffsets"):
             _append(steps[name], np.zeros((count, 4), dtype=np.int64))
-        _append(own["frame_seconds"], seconds)
+        _append(benchmark["frame_seconds"], seconds)
         for name, values in fields.items():
-            group = own["frame_fields"]
+            group = benchmark["frame_fields"]
             # An energy's name has a slash in it; HDF5 would make a group of that.
             key = name.replace("/", ":")
             if key not in group:
@@ -138,13 +149,15 @@ class TrajectoryWriter:
             group[key].resize((k + count,))
             group[key][k:] = values
         if before is not None:
-            if BEFORE not in own:
-                own.create_dataset(BEFORE, (2, *np.shape(before)), dtype="f8")
-            own[BEFORE][k % 2] = before  # the other half still serves the frame before, should this one fail
+            if BEFORE not in benchmark:
+                benchmark.create_dataset(BEFORE, (2, *np.shape(before)), dtype="f8")
+            benchmark[BEFORE][k % 2] = (
+                before  # the other half still serves the frame before, should this one fail
+            )
         self.frames = k + count
         if self._live:
             self._file.flush()
-        own.attrs.modify("frames", self.frames)  # last: a reader trusts only whole frames
+        benchmark.attrs.modify("frames", self.frames)  # last: a reader trusts only whole frames
         if self._live:
             self._file.flush()
             self._put_in_place()
@@ -160,17 +173,17 @@ class TrajectoryWriter:
         self._file = h5py.File(self.path, "r+")
 
     def go_live(self) -> None:
-        """From now on every frame is flushed; the file is put in place with what it holds."""
+        """Flush every frame from now on; the file is put in place with what it holds."""
         self._live = True
         self._file.flush()
         self._put_in_place()
 
     def first_failure(self, status: str, reason: str) -> None:
-        """Remember how the frame failed that is appended next, for a run that resumes this one."""
+        """Note how the frame failed that is appended next, for a run that resumes this one."""
         self._file["benchmark"].attrs[FAILURE] = json.dumps([status, reason])
 
     def finish(self, status: str, reason: str) -> None:
-        """Say how it ended."""
+        """Write how the run ended."""
         self._file["benchmark"].attrs.update({"status": status, "reason": reason})
 
     def __enter__(self) -> TrajectoryWriter:
@@ -200,7 +213,7 @@ def _append(dataset: h5py.Dataset, rows: Any) -> None:
 
 
 def _vtk_skeleton(file: h5py.File, faces: np.ndarray, vertex_count: int) -> None:
-    """The groups VTK's reader insists on, for one moving PolyData with fixed faces."""
+    """Make the groups VTK's reader insists on, for one moving PolyData with fixed faces."""
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 3], dtype="i8")
     root.attrs.create("Type", b"PolyData", dtype="S8")

@@ -16,7 +16,7 @@ import pytest
 import torch
 
 from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, simulate
-from reference_sim.command.summary import summary
+from reference_sim.command.summary import summarise
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Energy, Gravity, StretchStVK
 from reference_sim.progress import progress_bar
 from tests.reference_sim.meshes import box, grid, patch, random_rotation
@@ -292,7 +292,7 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):
     first = int(np.flatnonzero(relaxed)[0])
     said = f"frame {first}: round-off: residual {residual[first]:.1e} above tolerance 1.0e-06"
     assert result.reason.startswith(said) and Trajectory.load(path).reason == result.reason
-    assert f"round-off  {relaxed.sum():.0f} frames above the tolerance, first {said}" in summary(
+    assert f"round-off  {relaxed.sum():.0f} frames above the tolerance, first {said}" in summarise(
         result, None, frames=4
     )
     with h5py.File(path, "r+") as file:  # a run that was killed

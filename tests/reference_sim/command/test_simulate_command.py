@@ -15,7 +15,8 @@ import pytest
 
 import reference_sim
 from reference_sim import Cloth, Material, Trajectory
-from reference_sim.command.simulate_command import choose_pins, main
+from reference_sim.command.simulate_command import main
+from reference_sim.command.simulate_inputs import choose_pins
 from reference_sim.command.simulate_options import EXAMPLES, make_parser
 from reference_sim.energies import StretchStVK
 from reference_sim.files.mesh_files import read_mesh
@@ -374,7 +375,7 @@ def test_interrupted_by_hand(folder, capsys, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("reference_sim.time_loop.simulate", interrupt)
+    monkeypatch.setattr("reference_sim.command.simulate_run.simulate", interrupt)
     assert main(["sheet.obj", "-o", "out.vtkhdf"]) == 130
     assert "--resume goes on from out.vtkhdf" in capsys.readouterr().err
 
