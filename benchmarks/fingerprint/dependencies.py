@@ -167,11 +167,23 @@ def _imported(node: ast.AST, package: list[str]) -> list[tuple[str, str]]:
     """(module, name in it or empty) of everything that an import statement in that package names."""
     if isinstance(node, ast.Import):
         return [(alias.name, "") for alias in node.names]
+    if isinstance(node, ast.ClassDef):
+        return [(module, name) for module, _, name in _kernels_of(node)]
     if not isinstance(node, ast.ImportFrom):
         return []
     above = package[: len(package) - node.level + 1] if node.level else []
     base = ".".join([*above, *(node.module or "").split(".")]).strip(".")
     return [(base, alias.name) for alias in node.names]
+
+
+def _kernels_of(node: ast.ClassDef) -> Iterator[tuple[str, str, str]]:
+    """Yield (module, ":", function) of the kernels that an energy declares: solvers import them by name."""
+    for statement in node.body:
+        target = statement.target if isinstance(statement, ast.AnnAssign) else None
+        target = statement.targets[0] if isinstance(statement, ast.Assign) else target
+        if isinstance(target, ast.Name) and target.id == "kernels":
+            values = (part.value for part in ast.walk(statement) if isinstance(part, ast.Constant))
+            yield from (value.partition(":") for value in values if isinstance(value, str) and ":" in value)
 
 
 def _running(node: ast.AST) -> Iterator[ast.AST]:
@@ -198,8 +210,9 @@ def _files_behind(base: str, name: str, importer: str, top: str) -> Iterator[str
         return
     yield path
     if name not in _bound(path):
-        files = sorted(p.name for p in (ROOT / path).parent.glob("*.py"))
-        modules = [f"{path.rpartition('/')[0]}/{file}" for file in files if file != "__init__.py"]
+        folder = (ROOT / path).parent
+        files = sorted(p for p in folder.rglob("*.py") if p.name != "__init__.py")
+        modules = [f"{path.rpartition('/')[0]}/{file.relative_to(folder).as_posix()}" for file in files]
         yield from [module for module in modules if name in _defined(module)] or modules
 
 

@@ -1,7 +1,8 @@
-"""The physical terms. Each file holds one: its formula, its definition in torch, its closed-form kernels.
+"""Physical terms. Each file holds one, or each folder: its formula, its definition in torch, its kernels.
 
-A new term is one file, its line in MODULE_OF and its import for type checkers. The file is imported when the
-term's name is first used, so that a scene without contact never loads contact.
+In a folder, `definition.py` has the formula and the kernels in float64, and every other file the kernels of one
+use (kernels.fast_kernels). A new term is one file, its line in MODULE_OF and its import for type checkers. The
+file is imported when the term's name is first used, so that a scene without contact never loads contact.
 """
 
 from importlib import import_module
@@ -10,24 +11,24 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from reference_sim.energies.area_barrier import AreaBarrier as AreaBarrier
     from reference_sim.energies.barrier_friction import BarrierFriction as BarrierFriction
-    from reference_sim.energies.bend_hinge import BendHinge as BendHinge
+    from reference_sim.energies.bend_hinge.definition import BendHinge as BendHinge
     from reference_sim.energies.contact_barrier import ContactBarrier as ContactBarrier
     from reference_sim.energies.contact_friction import ContactFriction as ContactFriction
-    from reference_sim.energies.contact_penalty import ContactPenalty as ContactPenalty
+    from reference_sim.energies.contact_penalty.definition import ContactPenalty as ContactPenalty
     from reference_sim.energies.energy import Energy as Energy
     from reference_sim.energies.energy import Step as Step
     from reference_sim.energies.gravity import Gravity as Gravity
     from reference_sim.energies.inertia import Inertia as Inertia
     from reference_sim.energies.stretch_spring import StretchSpring as StretchSpring
-    from reference_sim.energies.stretch_stvk import StretchStVK as StretchStVK
+    from reference_sim.energies.stretch_stvk.definition import StretchStVK as StretchStVK
 
 MODULE_OF = {
-    "StretchStVK": "stretch_stvk",
+    "StretchStVK": "stretch_stvk.definition",
     "StretchSpring": "stretch_spring",
-    "BendHinge": "bend_hinge",
+    "BendHinge": "bend_hinge.definition",
     "Gravity": "gravity",
     "Inertia": "inertia",
-    "ContactPenalty": "contact_penalty",
+    "ContactPenalty": "contact_penalty.definition",
     "ContactFriction": "contact_friction",
     "ContactBarrier": "contact_barrier",
     "BarrierFriction": "barrier_friction",

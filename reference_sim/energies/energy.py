@@ -7,8 +7,9 @@ holds every override to the default. Torch is imported only where the definition
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -51,6 +52,8 @@ class Energy:
         remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
             judged without preparing the one before it.
         impassable: whether an obstacle may have to stop on its way to the end of a step.
+        kernels: fast kernels by use, "module:function" each, or the name of a function of the term's own file;
+            the uses are listed in kernels.fast_kernels. A subclass does not inherit them.
     """
 
     name: str
@@ -60,6 +63,7 @@ class Energy:
     constant: tuple[int, ...] = ()
     remembers: bool = False
     impassable: bool = False
+    kernels: ClassVar[Mapping[str, str]] = {}
 
     def energy(self, x: Tensor) -> Tensor:
         """Energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""

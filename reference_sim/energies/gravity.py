@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from reference_sim.material import GRAVITY
 
 if TYPE_CHECKING:
     from torch import Tensor
+
+    from reference_sim.kernels.training_lanes import BatchKernel
 
 
 class Gravity(Energy):
@@ -24,6 +26,7 @@ class Gravity(Energy):
 
     name = "gravity"
     constant = (3,)
+    kernels: ClassVar = {"vertex_weights": "vertex_weights", "training_batch": "batch"}
 
     def __init__(self, cloth: Cloth, origin_height: float = 0.0, *, acceleration: float = GRAVITY) -> None:
         self.cloth = cloth
@@ -49,3 +52,20 @@ class Gravity(Energy):
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         return np.arange(0), np.zeros((0, 3, 3))
+
+
+def vertex_weights(term: Gravity) -> np.ndarray:
+    """Return the weight (V,) [N] of each vertex, along -y."""
+    return term.weights
+
+
+def batch(term: Gravity) -> BatchKernel:
+    """Return the kernel of training on a CPU (kernels.training_lanes)."""
+    weights = term.weights.astype(np.float32)
+    zero = np.float32(term.weights.sum() * term.origin_height)
+
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        gradients[:, :, 1] += weights[:, None]
+        return weights @ x[:, :, 1] - zero
+
+    return run

@@ -5,12 +5,13 @@ x_hat holds no gravity: the weight is a term of its own, so a body in free fall 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
+from reference_sim.kernels.training_lanes import TRAINING_LANES, BatchKernel
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -21,6 +22,7 @@ class Inertia(Energy):
 
     name = "inertia"
     constant = (1, 3)
+    kernels: ClassVar = {"vertex_inertia": "vertex_inertia"}
 
     def __init__(self, cloth: Cloth, dt: float) -> None:
         if not (np.isfinite(dt) and dt > 0):
@@ -61,3 +63,35 @@ class Inertia(Energy):
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.arange(len(self.masses)), (self.masses / self.dt**2)[:, None, None]
+
+
+def vertex_inertia(term: Inertia) -> np.ndarray:
+    """Return the stiffness (V,) [N/m] by which each vertex is pulled towards x_hat."""
+    return term.masses / term.dt**2
+
+
+def batch_of_windows(term: Inertia, ahead: np.ndarray, windows: int) -> BatchKernel:
+    """Return the kernel of training on a CPU (kernels.training_lanes), of windows that fill whole blocks.
+
+    E = m / (2 dt^2) |a|^2 with a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t, zero for the first two frames. ahead
+    (C, 3, TRAINING_LANES) [m]: where the frame before would be if nothing pulled, seen from where it is.
+    """
+    stiffness = (term.masses / term.dt**2).astype(np.float32)[:, None, None]
+    one = windows // TRAINING_LANES  # blocks a frame
+
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        a = x[2 * one :] - x[one:-one]
+        a -= x[one:-one]
+        a += x[: -2 * one]
+        a -= ahead[2 * one :, None]
+        force = stiffness * a
+        gradients[2 * one :] += force
+        a *= force
+        values = np.zeros((len(x), TRAINING_LANES), np.float32)
+        values[2 * one :] = 0.5 * a.sum((1, 2), dtype=np.float64)
+        gradients[: -2 * one] += force
+        force += force
+        gradients[one:-one] -= force
+        return values
+
+    return run

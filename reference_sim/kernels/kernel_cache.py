@@ -28,6 +28,7 @@ from numba.misc.appdirs import AppDirs
 
 KEPT = 4  # folders of one module, so that going back to another branch compiles nothing
 CONSTANTS = (bool, int, float, complex, str, tuple, np.generic)
+FLAGS = (set, frozenset)  # of fastmath
 USED = ".used"  # file whose date says when a folder was last asked for
 
 _config: Any = numba.config
@@ -79,8 +80,13 @@ def _locator_in_use() -> Iterator[None]:
         _config.CACHE_LOCATOR_CLASSES = given
 
 
+def source_digest(function: Any) -> str:
+    """Return the digest of the source of a kernel's function, and of what it takes from other files."""
+    return _digests.get(function.__module__) or _digest(function)
+
+
 def _digest(function: Any) -> str:
-    """Of the file of a module's first kernel, and of the kernels and constants imported above it."""
+    """Return the digest of the file of a module's first kernel, with kernels and constants imported above."""
     digest = hashlib.blake2b(Path(function.__code__.co_filename).read_bytes(), digest_size=8)
     for name, value in function.__globals__.items():
         if isinstance(value, Dispatcher):
@@ -91,6 +97,8 @@ def _digest(function: Any) -> str:
             digest.update(_digests.get(value.__name__, "").encode())
         elif isinstance(value, CONSTANTS) and not name.startswith("__"):
             digest.update(f"{name}={value!r};".encode())
+        elif isinstance(value, FLAGS):
+            digest.update(f"{name}={sorted(map(repr, value))};".encode())
     return digest.hexdigest()
 
 

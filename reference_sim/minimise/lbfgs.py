@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.energies.term_kinds import has_kernels
+from reference_sim.kernels.fast_kernels import terms_without_kernel, warn_slow_path
 from reference_sim.minimise.descent import Descent, Observer
 from reference_sim.minimise.lbfgs_history import LBFGSHistory
 from reference_sim.minimise.loop import NOT_FINITE, iterate
@@ -76,7 +76,11 @@ class LBFGS:
         self.observe = observe
         self.max_iterations = min(patience, max_iterations) if finish else max_iterations
         small = potential.cloth.vertex_count <= LARGEST_COMPILED
-        fast = finish and memory > 0 and small and has_kernels(potential)
+        fast = finish and memory > 0 and small and potential.time_step is not None
+        if fast and (slow := terms_without_kernel(potential, "float32_lanes")):
+            instead = "every step begins in float64 by numpy (docs/extend.md, An energy)"
+            warn_slow_path("LBFGS", "float32 kernel", slow, instead)
+            fast = False
         if switch is None:
             switch = COMPILED_SWITCH if fast else SWITCH
         self.switch = max(switch, tolerance) if finish else tolerance

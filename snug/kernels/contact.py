@@ -7,8 +7,8 @@ import numpy as np
 from reference_sim.contact.anchor_walk import walk_to_foot
 from reference_sim.geometry.surface import vertex_normals
 from reference_sim.kernels.kernel_cache import njit
-from snug.kernels.lanes import LANES
-from snug.kernels.vector_rows import mixed_rows
+from reference_sim.kernels.training_lanes import TRAINING_LANES
+from reference_sim.kernels.vector_rows import mixed_rows
 
 PARTS = 255.0  # of a barycentric coordinate
 
@@ -93,9 +93,9 @@ def contact_energy(
     slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:  # fmt: skip
-    """k max(margin - d, 0)^power of each sample, summed: values (C, LANES), and added up: gradients like x.
+    """k max(margin - d, 0)^power of each sample, summed: values (C, TRAINING_LANES), and added up: gradients like x.
 
-    x (C, V, 3, LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first asked
+    x (C, V, 3, TRAINING_LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first asked
     whether it counts from the end. Most samples are out of reach, and for them it is the loads that count:
     what they read of a frame is first laid together.
     """
@@ -107,7 +107,7 @@ def contact_energy(
     skin, m = np.zeros(size + 1, np.float32), np.zeros(size + 1, np.float32)
     for n in range(frames.size):
         frame, window = divmod(n, len(frames))
-        block, lane = divmod(n, LANES)
+        block, lane = divmod(n, TRAINING_LANES)
         for v in range(vertices):
             for c in range(3):
                 garment[3 * v + c] = x[block, v, c, lane]

@@ -21,8 +21,8 @@ import torch
 from torch import Tensor, nn
 
 from reference_sim.kernels.kernel_cache import njit
-from snug.kernels.lanes import LANES
-from snug.kernels.vector_rows import copy_lanes
+from reference_sim.kernels.training_lanes import TRAINING_LANES
+from reference_sim.kernels.vector_rows import copy_lanes
 
 # No assumption on NaN or infinity: the guard of training must see them.
 FAST = {"contract", "nsz"}
@@ -53,7 +53,7 @@ class FastGRU(torch.autograd.Function):
 
     weights: input, hidden, input bias, hidden bias of each layer. Differentiable once, by the weights alone:
     neither inputs nor the state at the start are trained, and the state that comes out is a constant. Between
-    products a row of units is as wide as the next multiple of LANES, and 0 beyond H.
+    products a row of units is as wide as the next multiple of TRAINING_LANES, and 0 beyond H.
     """
 
     @staticmethod
@@ -63,7 +63,7 @@ class FastGRU(torch.autograd.Function):
         for layer, start in enumerate(state):
             w_i, w_h, b_i, b_h = weights[4 * layer : 4 * layer + 4]
             (frames, count), size = x.shape[:2], w_h.shape[1]
-            wide = size + -size % LANES
+            wide = size + -size % TRAINING_LANES
             inputs = _widened(product(x.flatten(0, 1), w_i, b_i), size).view(frames, count, -1)
             hidden = x.new_zeros(frames + 1, count, wide)
             gates = x.new_empty(frames, count, 4 * wide)  # r, z, n, q
@@ -71,7 +71,7 @@ class FastGRU(torch.autograd.Function):
             for t in range(frames):
                 recurrent = _widened(product(hidden[t, :, :size].contiguous(), w_h, b_h), size)
                 arrays = inputs[t], recurrent, hidden[t], gates[t], hidden[t + 1]
-                _cell(*(array.numpy().ravel() for array in arrays), wide // LANES)
+                _cell(*(array.numpy().ravel() for array in arrays), wide // TRAINING_LANES)
             saved += [x, gates, hidden]
             x = hidden[1:, :, :size].contiguous()
             last.append(hidden[-1, :, :size])
@@ -109,22 +109,22 @@ def _back_in_time(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tupl
     back, y = y.new_zeros(count, wide), _widened(y.contiguous(), size)
     arrays = [tensor.numpy() for tensor in (y, gates, hidden, to_inputs, to_recurrent)]
     for t in reversed(range(frames)):
-        _cell_back(back.numpy().ravel(), *(array[t].ravel() for array in arrays), wide // LANES)
+        _cell_back(back.numpy().ravel(), *(array[t].ravel() for array in arrays), wide // TRAINING_LANES)
         if t:
             back[:, :size] += product(_narrowed(to_recurrent[t], size), w_h.t())
     return _narrowed(to_inputs.flatten(0, 1), size), _narrowed(to_recurrent.flatten(0, 1), size)
 
 
 def _widened(rows: Tensor, size: int) -> Tensor:
-    """Rows (..., k H), H of this size, with each of the k parts filled up with 0 to a multiple of LANES."""
-    if size % LANES == 0:
+    """Rows (..., k H), H of this size, with each of the k parts filled up with 0 to a multiple of TRAINING_LANES."""
+    if size % TRAINING_LANES == 0:
         return rows
-    return nn.functional.pad(rows.unflatten(-1, (-1, size)), (0, -size % LANES)).flatten(-2)
+    return nn.functional.pad(rows.unflatten(-1, (-1, size)), (0, -size % TRAINING_LANES)).flatten(-2)
 
 
 def _narrowed(rows: Tensor, size: int) -> Tensor:
     """The inverse of `_widened`."""
-    return rows.unflatten(-1, (-1, size + -size % LANES))[..., :size].flatten(-2)
+    return rows.unflatten(-1, (-1, size + -size % TRAINING_LANES))[..., :size].flatten(-2)
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
@@ -147,9 +147,9 @@ def _cell(
     blocks: int,
 ) -> None:
     """One frame of a layer: what W_i x and W_h h give (N, 3H) and h (N, H) -> r, z, n, q (N, 4H) and h'
-    (N, H). All flat, with H, widened, of so many blocks of LANES.
+    (N, H). All flat, with H, widened, of so many blocks of TRAINING_LANES.
     """
-    L, u = LANES, np.empty(7 * LANES, np.float32)
+    L, u = TRAINING_LANES, np.empty(7 * TRAINING_LANES, np.float32)
     for place in range(len(after) // L):
         row, block = divmod(place, blocks)
         for part in range(3):
@@ -181,7 +181,7 @@ def _cell_back(
     """One frame of a layer: back (N, H), the gradient of h' that comes from later frames, becomes what passes
     to h through z alone. All flat, as in `_cell`.
     """
-    L, u = LANES, np.empty(7 * LANES, np.float32)
+    L, u = TRAINING_LANES, np.empty(7 * TRAINING_LANES, np.float32)
     for place in range(len(back) // L):
         row, block = divmod(place, blocks)
         for part in range(4):

@@ -13,9 +13,10 @@ import torch
 from torch import Tensor, nn
 
 from reference_sim.kernels.kernel_cache import njit
+from reference_sim.kernels.training_lanes import TRAINING_LANES
+from reference_sim.kernels.vector_rows import copy_lanes
 from snug.kernels.gru import product
-from snug.kernels.lanes import LANES, laid, unlaid
-from snug.kernels.vector_rows import copy_lanes
+from snug.kernels.lanes import laid, unlaid
 
 
 class FastSkin(torch.autograd.Function):
@@ -26,29 +27,29 @@ class FastSkin(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-        entries = torch.from_numpy(laid(transforms.flatten(-2)))  # (C, J, 12, LANES)
+        entries = torch.from_numpy(laid(transforms.flatten(-2)))  # (C, J, 12, TRAINING_LANES)
         entries = entries.movedim(1, -1).flatten(0, 2)
-        ctx.blended = product(weights, entries).view(len(weights), -1, 12 * LANES).numpy()
+        ctx.blended = product(weights, entries).view(len(weights), -1, 12 * TRAINING_LANES).numpy()
         columns = points.detach().permute(2, 3, 1, 0).flatten(2)  # (V, 3, T N)
-        columns = nn.functional.pad(columns, (0, -columns.shape[2] % LANES)).contiguous()
-        posed = np.empty((ctx.blended.shape[1], len(weights), 3, LANES), np.float32)
+        columns = nn.functional.pad(columns, (0, -columns.shape[2] % TRAINING_LANES)).contiguous()
+        posed = np.empty((ctx.blended.shape[1], len(weights), 3, TRAINING_LANES), np.float32)
         _posed(columns.numpy().ravel(), ctx.blended, posed.ravel())
         return unlaid(posed, *points.shape[:2])
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> Any:
         windows, frames, vertices, _ = above[0].shape
-        back = np.empty((vertices, 3, ctx.blended.shape[1], LANES), np.float32)
+        back = np.empty((vertices, 3, ctx.blended.shape[1], TRAINING_LANES), np.float32)
         _turned_back(laid(above[0]).ravel(), ctx.blended, back.ravel())
         columns = torch.from_numpy(back).flatten(2)[..., : frames * windows]
         return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
 
 
-# The point is copied into one small array of known size, for the reason given in snug.kernels.energies.
+# The point is copied into one small array of known size, for the compiler then knows that nothing overlaps.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
-    """Flat points (V, 3, C, LANES), blended (V, C, 12 LANES), flat out (C, V, 3, LANES)."""
-    L, (vertices, blocks, _) = LANES, blended.shape
+    """Flat points (V, 3, C, TRAINING_LANES), blended (V, C, 12 TRAINING_LANES), flat out (C, V, 3, TRAINING_LANES)."""
+    L, (vertices, blocks, _) = TRAINING_LANES, blended.shape
     u = np.empty(3 * L, np.float32)
     for v in range(vertices):
         for block in range(blocks):
@@ -67,7 +68,7 @@ def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _turned_back(above: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
     """Gradients by the points, laid out like these: the transpose of each rotation part."""
-    L, (vertices, blocks, _) = LANES, blended.shape
+    L, (vertices, blocks, _) = TRAINING_LANES, blended.shape
     u = np.empty(3 * L, np.float32)
     for v in range(vertices):
         for block in range(blocks):

@@ -17,13 +17,13 @@ class Fault:
 
 
 MATERIAL, CLOTH, TIME_STEP = (f"reference_sim/{name}.py" for name in ("material", "cloth", "time_step"))
-STVK, SPRING, BARRIER, HINGE = (
-    f"reference_sim/energies/{name}.py"
-    for name in ("stretch_stvk", "stretch_spring", "area_barrier", "bend_hinge")
+STVK, HINGE, CONTACT = (
+    f"reference_sim/energies/{name}/definition.py"
+    for name in ("stretch_stvk", "bend_hinge", "contact_penalty")
 )
-GRAVITY, INERTIA, CONTACT, FRICTION = (
+SPRING, BARRIER, GRAVITY, INERTIA, FRICTION = (
     f"reference_sim/energies/{name}.py"
-    for name in ("gravity", "inertia", "contact_penalty", "contact_friction")
+    for name in ("stretch_spring", "area_barrier", "gravity", "inertia", "contact_friction")
 )
 NEWTON, CHECK, FACTORISED, DESCENT, HISTORY = (
     f"reference_sim/minimise/{name}.py"

@@ -87,10 +87,11 @@ def imported(path: Path, module: str, modules: set[str]) -> Iterator[str]:
 def test_every_lazy_name_is_defined_by_one_module_of_its_package():
     package = ROOT / "reference_sim/energies"
     defined: dict[str, list[str]] = {}
-    for path in package.glob("*.py"):
+    for path in package.rglob("*.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.ClassDef):
-                defined.setdefault(node.name, []).append(path.stem)
+                module = ".".join(path.relative_to(package).with_suffix("").parts)
+                defined.setdefault(node.name, []).append(module)
     assert {name: defined[name] for name in MODULE_OF} == {name: [file] for name, file in MODULE_OF.items()}
     nodes = ast.walk(ast.parse((package / "__init__.py").read_text(encoding="utf-8")))
     named = [alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names]

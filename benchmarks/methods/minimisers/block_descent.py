@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, weights
 from benchmarks.methods.minimisers.kernels import sweep_vertices
 from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
-from reference_sim.energies.term_kinds import terms_of
+from reference_sim.kernels.fast_kernels import step_terms
+from reference_sim.kernels.kernel_argument import KernelArgument
 from reference_sim.minimise.result import Stop
 from reference_sim.potential import Potential
 
@@ -36,29 +36,31 @@ class VertexBlockDescent(SweepSolver):
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
         super().__init__(potential, max_iterations=max_iterations)
-        self._terms = terms = terms_of(potential, "vertex block descent")
+        self._terms = step_terms(potential, "vertex_block", "vertex block descent")
         self._free = np.flatnonzero(potential.cloth.free)
-        self._membrane, self._hinges = membrane(terms.strain), hinges(terms.bending)
-        _, sample_weights, *_ = touching = contacts(terms.contact)
         vertices = potential.cloth.vertex_count
-        self._around = (
-            *incidence(self._membrane[0], np.ones_like(self._membrane[0]), vertices),
-            *incidence(self._hinges[0], np.ones_like(self._hinges[0]), vertices),
-            *incidence(touching[0], sample_weights > 0.0, vertices),
+        self._blocks = [
+            (KernelArgument(blocks.kernel), incidence(blocks.stencils, blocks.used, vertices), blocks.freeze)
+            for blocks in self._terms.kernels
+        ]
+
+    def freeze(self) -> tuple[tuple, tuple]:
+        """Return inertia and the other terms as `sweep_vertices` takes them in this step."""
+        terms, inertia = self._terms, self._terms.inertia
+        return (
+            (inertia.masses / inertia.dt**2, inertia.x_hat, terms.weights),
+            tuple((kernel, (*around, *freeze())) for kernel, around, freeze in self._blocks),
         )
 
     def init(self, run: SweepRun) -> Stop | None:
         """Begin at the guess."""
-        terms = self._terms
-        inertia = terms.inertia.masses / terms.inertia.dt**2, terms.inertia.x_hat, weights(terms)
-        run.frozen = inertia, contacts(terms.contact)
+        run.frozen = self.freeze()
         run.swept = run.x.copy()
         return None
 
     def step(self, run: SweepRun) -> Stop | None:
         """Move every free vertex once."""
-        inertia, touching = run.frozen
-        sweep_vertices(run.swept, self._free, inertia, self._membrane, self._hinges, touching, self._around)
+        sweep_vertices(run.swept, self._free, *run.frozen)
         return None
 
 

@@ -21,10 +21,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, weights
 from benchmarks.methods.minimisers.kernels import sweep_constraints
 from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
-from reference_sim.energies.term_kinds import terms_of
+from reference_sim.kernels.fast_kernels import step_terms
+from reference_sim.kernels.kernel_argument import KernelArgument
 from reference_sim.minimise.result import Stop
 from reference_sim.potential import Potential
 
@@ -42,24 +42,22 @@ class XPBD(SweepSolver):
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
         super().__init__(potential, max_iterations=max_iterations)
-        self._terms = terms = terms_of(potential, "XPBD")
-        self._membrane, self._hinges = membrane(terms.strain), hinges(terms.bending)
-        masses, self._dt = terms.inertia.masses, terms.inertia.dt
-        self._inverse = np.where(potential.cloth.free, self._dt**2 / masses, 0.0)
+        self._terms = terms = step_terms(potential, "constraint", "XPBD")
+        self._kernels = [KernelArgument(constraints.kernel) for constraints in terms.kernels]
+        masses, dt = terms.inertia.masses, terms.inertia.dt
+        self._inverse = np.where(potential.cloth.free, dt**2 / masses, 0.0)
 
     def init(self, run: SweepRun) -> Stop | None:
         """Begin at the predicted positions; of the guess only the pinned vertices are read."""
-        terms = self._terms
-        touching = contacts(terms.contact)
-        x = terms.inertia.x_hat.copy()
-        x[:, 1] -= self._inverse * weights(terms)
-        pins = terms.inertia.cloth.pins
+        x = self._terms.inertia.x_hat.copy()
+        x[:, 1] -= self._inverse * self._terms.weights
+        pins = self.potential.cloth.pins
         x[pins] = run.x[pins]
-        shapes = (len(self._membrane[0]), 3), len(self._hinges[0]), len(touching[0])
-        run.swept, run.frozen = x, (touching, *(np.zeros(shape) for shape in shapes))
+        frozen = (constraints.freeze() for constraints in self._terms.kernels)
+        run.swept, run.frozen = x, tuple(zip(self._kernels, frozen))
         return None
 
     def step(self, run: SweepRun) -> Stop | None:
         """Solve every constraint once."""
-        sweep_constraints(run.swept, self._inverse, self._membrane, self._hinges, *run.frozen)
+        sweep_constraints(run.swept, self._inverse, run.frozen)
         return None

@@ -60,6 +60,6 @@ def _folded(fold: float) -> tuple[Cloth, np.ndarray]:
 
 def _signs(cloth: Cloth) -> np.ndarray:
     """(H,) sign of each hinge's angle where the strip is folded by a small negative angle."""
-    from reference_sim.energies.bend_hinge import dihedral_angles
+    from reference_sim.energies.bend_hinge.definition import dihedral_angles
 
     return np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))

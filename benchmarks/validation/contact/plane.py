@@ -8,7 +8,7 @@ from benchmarks.meshes import in_space, jittered_patch
 from benchmarks.validation.convergence import demand_converged
 from reference_sim import Cloth, Material, Obstacle, Potential, minimise
 from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
-from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
+from reference_sim.energies.contact_penalty.definition import DEFAULT_STIFFNESS
 from reference_sim.material import GRAVITY
 
 

@@ -14,7 +14,7 @@ from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
-from reference_sim.energies.contact_penalty import DEFAULT_MARGIN, DEFAULT_STIFFNESS
+from reference_sim.energies.contact_penalty.definition import DEFAULT_MARGIN, DEFAULT_STIFFNESS
 from reference_sim.material import GRAVITY
 from reference_sim.obstacle import Planes
 

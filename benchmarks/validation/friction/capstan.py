@@ -21,7 +21,7 @@ from benchmarks.validation.contact.round_bodies import DRUM, SLACK, RoundBody, w
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim import Cloth, Material, simulate
 from reference_sim.energies import ContactFriction, ContactPenalty, StretchStVK
-from reference_sim.energies.contact_penalty import DEFAULT_MARGIN
+from reference_sim.energies.contact_penalty.definition import DEFAULT_MARGIN
 from reference_sim.obstacle import Planes
 
 HARD = 3.4e10  # [J/m^5]: the strip lies a hundredth as deep in the margin as on a body

@@ -18,7 +18,7 @@ from benchmarks.validation.contact.plane import box
 from benchmarks.validation.convergence import demand_converged
 from reference_sim import Cloth, Material, Obstacle, simulate
 from reference_sim.energies import ContactFriction, ContactPenalty, Gravity, StretchStVK
-from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
+from reference_sim.energies.contact_penalty.definition import DEFAULT_STIFFNESS
 from reference_sim.material import GRAVITY
 
 MU = 0.5

@@ -3,29 +3,24 @@
 The method of minimise.LBFGS without its finish by Newton: the same preconditioner (mass over dt^2, the
 cotangent Laplacian, contacts at the start), the same two-loop recursion, the same sufficient decrease. What
 it leaves out: float64, the check of convergence (nothing but a factorised Hessian can say "converged"), and
-all terms but inertia, weight, StVK, hinges and the contact penalty.
+all terms that declare no kernel "float32_lanes" (kernels.fast_kernels).
 """
 
 from __future__ import annotations
 
 import time
-from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from reference_sim.cloth import Cloth
-from reference_sim.energies.term_kinds import Terms, terms_of
-from reference_sim.kernels.kernel_cache import njit
+from reference_sim.kernels.fast_kernels import StepTerms, step_terms
+from reference_sim.kernels.float32_lanes import SCRATCH, Float32Lanes, to_blocks
+from reference_sim.kernels.kernel_argument import KernelArgument
 from reference_sim.minimise.compiled import iteration
-from reference_sim.minimise.compiled.elements import LANES, SCRATCH, blocks, edges_of
 from reference_sim.minimise.compiled.scalar_factor import WIDTH, ScalarPattern
 from reference_sim.minimise.descent import mean_weight
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
-
-if TYPE_CHECKING:
-    from reference_sim.energies import BendHinge, ContactPenalty, Energy, StretchStVK
 
 MEMORY = 10
 
@@ -43,31 +38,26 @@ class CompiledLBFGS:
 
     def __init__(self, potential: Potential, *, max_iterations: int, tolerance: float = 1e-6) -> None:
         self.potential, self.max_iterations = potential, max_iterations
-        self._terms = terms = terms_of(potential, "CompiledLBFGS")
+        self._terms = terms = step_terms(potential, "float32_lanes", "CompiledLBFGS")
+        self._lanes: tuple[Float32Lanes, ...] = terms.kernels
+        self._gradients = [KernelArgument(lanes.gradient) for lanes in self._lanes]
         self._weight = mean_weight(potential)
         self._tolerance = tolerance * self._weight
         cloth = potential.cloth
         count = cloth.vertex_count
-        zero = np.zeros(count)
         self._vertices = iteration.Vertices(
             (terms.inertia.masses / terms.inertia.dt**2).astype(np.float32),
-            (zero if terms.gravity is None else terms.gravity.weights).astype(np.float32),
+            terms.weights.astype(np.float32),
             3 * np.asarray(cloth.pins, np.int64),
         )
-        self._membrane, self._lame = _membrane(terms.strain)
-        self._hinges = _hinges(terms.bending)
-        self._order, self._contact = _contact(terms.contact)
-        self._weights = np.zeros((0, 3 * LANES))  # in float64: a third of metres is no third in float32
-        if terms.contact is not None:
-            self._weights = blocks(terms.contact.weights[self._order])
-        self._factor = _factor(cloth, terms, self._order)
+        self._factor, self._stiffening = _factor(cloth.free, cloth.rest_positions, terms)
         size = (MEMORY, 3 * count)
         self._memory = iteration.Memory(
             np.empty(size, np.float32), np.empty(size, np.float32), np.empty(MEMORY, np.float32)
         )
         self._work = np.empty((4, 3 * count), np.float32)
         self._scratch = np.empty(SCRATCH, np.float32)
-        self._energies, self._counts = np.zeros(len(iteration.ENERGIES)), np.zeros(3)
+        self._energies, self._counts = np.zeros(iteration.ELEMENTS + len(self._lanes)), np.zeros(3)
         self.start_again()
 
     def start_again(self) -> None:
@@ -77,21 +67,20 @@ class CompiledLBFGS:
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]: status "max_iterations", "stalled" or "diverged"."""
         start = time.perf_counter()
-        terms, x0 = self._terms, np.ascontiguousarray(x0, np.float64)
-        target = (terms.inertia.x_hat - x0).astype(np.float32).ravel()
-        edges_of(x0, self._membrane.vertices, 2, self._membrane.state)
-        edges_of(x0, self._hinges.vertices, 3, self._hinges.state)
-        contact = self._frozen_contact(x0)
+        x0 = np.ascontiguousarray(x0, np.float64)
+        target = (self._terms.inertia.x_hat - x0).astype(np.float32).ravel()
+        terms = self.freeze(x0)
+        stiffening = tuple((kernel, (*terms[k][1], places)) for k, kernel, places in self._stiffening)
         self._energies[:], self._counts[:] = np.nan, 0.0  # nothing of the step before is reported
         u = np.zeros(x0.size, np.float32)
         middle = time.perf_counter()
-        if not iteration.precondition(contact, self._factor):
+        if not iteration.precondition(stiffening, self._factor):
             return self._result(x0, "stalled", "the preconditioner is not positive definite", {}, np.nan)
         begun = time.perf_counter()
         residual = iteration.descend(
-            u, target, self._vertices, self._membrane, self._lame, self._hinges, contact, self._factor,
-            self._memory, self.max_iterations, self._tolerance, min(2.0 * self._first_step, 1.0), self._work,
-            self._scratch, self._energies, self._counts,
+            u, target, self._vertices, terms, self._factor, self._memory, self.max_iterations,
+            self._tolerance, min(2.0 * self._first_step, 1.0), self._work, self._scratch, self._energies,
+            self._counts,
         )  # fmt: skip
         self._first_step = float(self._counts[2])
         seconds = {"assemble": middle - start, "factorise": begun - middle}
@@ -102,24 +91,18 @@ class CompiledLBFGS:
         reason = f"stopped after {int(self._counts[0])} iterations"
         return self._result(x, "max_iterations", reason, seconds, residual)
 
-    def _frozen_contact(self, x0: np.ndarray) -> Any:
-        """The blocks of samples, and which of them have one that is not far."""
-        near, term = np.zeros(0, np.int64), self._terms.contact
-        if term is not None:
-            near = _depths(
-                x0.ravel(), self._order, self._contact.vertices, self._weights, term.points, term.normals,
-                term.margin, _far(term), self._contact.state,
-            )  # fmt: skip
-        return iteration.Contact(near, *self._contact)
+    def freeze(self, x0: np.ndarray) -> tuple[tuple[KernelArgument, tuple[Any, ...]], ...]:
+        """Return kernel and data of each term of elements for a step from x0 (V, 3) [m]."""
+        return tuple(zip(self._gradients, (lanes.freeze(x0) for lanes in self._lanes)))
 
     def _result(
         self, x: np.ndarray, status: str, reason: str, seconds: dict[str, float], residual: float
     ) -> Result:
-        named = dict(zip(iteration.ENERGIES, self._energies.tolist()))
-        gravity = self._terms.gravity
-        if gravity is not None:
-            named["gravity"] = gravity.value_and_gradient(x)[0]
-        terms = {energy.name: named[energy.name] for energy in self.potential.energies}
+        inertia, _, *elements = self._energies.tolist()
+        values = {self._terms.inertia.name: inertia}
+        values |= {term.name: term.value_and_gradient(x)[0] for term in self._terms.weighing}
+        values |= {term.name: value for term, value in zip(self._terms.elements, elements)}
+        terms = {energy.name: values[energy.name] for energy in self.potential.energies}
         return Result(
             positions=x,
             status=status,
@@ -133,81 +116,32 @@ class CompiledLBFGS:
         )
 
 
-def _elements(stencils: np.ndarray, constants: list[np.ndarray], states: int) -> Any:
-    """Blocks of elements with constants (N,) or (N, k), and room for so many states."""
-    columns = np.concatenate([c.reshape(len(c), prod(c.shape[1:])) for c in constants], axis=1)
-    vertices = blocks(3 * stencils.astype(np.int32))
-    state = np.zeros((len(vertices), states * LANES), np.float32)
-    return iteration.Elements(vertices, blocks(columns.astype(np.float32)), state)
+def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, list[tuple]]:
+    """Lay the preconditioner of free vertices (V,) bool out.
 
-
-def _membrane(term: StretchStVK | None) -> tuple[Any, Any]:
-    if term is None:
-        return _elements(np.zeros((0, 3), int), [np.zeros((0, 5))], 6), iteration.Lame(*np.zeros(2, "f4"))
-    elements = _elements(term.stencils, [term.Dm_inverse, term.areas], 6)
-    return elements, iteration.Lame(np.float32(term.lam), np.float32(term.mu))
-
-
-def _hinges(term: BendHinge | None) -> Any:
-    if term is None:
-        return _elements(np.zeros((0, 4), int), [np.zeros((0, 2))], 9)
-    return _elements(term.stencils, [term.stiffness, term.rest_angles], 9)
-
-
-def _contact(term: ContactPenalty | None) -> tuple[np.ndarray, Any]:
-    """Samples in an order (S,) in which those of a block lie near each other, and their blocks."""
-    if term is None:
-        return np.zeros(0, int), _elements(np.zeros((0, 3), int), [np.zeros((0, 4))], 4)
-    from reference_sim.contact.closest_point import by_cells  # not of a cloth that meets nothing
-
-    order = by_cells(term.rest_samples)
-    return order, _elements(term.stencils[order], [term.weights[order], term.stiffness[order]], 4)
-
-
-def _factor(cloth: Cloth, terms: Terms, order: np.ndarray) -> Any:
-    """Pattern and constant values of the preconditioner, and room for its factor."""
-    number = np.full(cloth.vertex_count, -1)
-    number[cloth.free] = np.arange(cloth.free.sum())
-    fixed: list[Energy] = [e for e in (terms.inertia, terms.strain) if e is not None]
-    touching = np.zeros((0, 3), int) if terms.contact is None else terms.contact.stencils[order]
-    pattern = ScalarPattern(int(cloth.free.sum()), [number[e.stencils] for e in fixed] + [number[touching]])
+    Returns pattern and constant values, at positions rest (V, 3) [m], with room for the factor; and of each
+    term whose stiffness changes from step to step its number, its kernel and the places of its lanes.
+    """
+    number = np.full(len(free), -1)
+    number[free] = np.arange(free.sum())
+    fixed = [e for e in (terms.inertia, *terms.elements) if 1 in e.constant]
+    changing = [(k, lanes) for k, lanes in enumerate(terms.kernels) if lanes.stiffness is not None]
+    stencils = [number[e.stencils] for e in fixed] + [number[lanes.stencils] for _, lanes in changing]
+    pattern = ScalarPattern(int(free.sum()), stencils)
     constant = np.zeros(pattern.entries)
     for energy in fixed:
-        elements, values = energy.scalar_stiffness(cloth.rest_positions)
+        elements, values = energy.scalar_stiffness(rest)
         places = pattern.places(number[energy.stencils[elements]])
         np.add.at(constant, places[places >= 0], values[places >= 0])
-    places = pattern.places(number[touching]).reshape(-1, 9)
     n, entries = pattern.count, len(pattern.rows)
-    return iteration.Factor(
-        constant, blocks(places), np.flatnonzero(cloth.free)[pattern.order], pattern.row_starts,
-        pattern.row_columns, pattern.factor_rows, pattern.factor_columns, pattern.starts, pattern.rows,
-        np.empty_like(constant), np.empty(entries), np.empty(n), np.zeros(n), np.empty(n, np.int64),
-        np.zeros((n, WIDTH)),
+    factor = iteration.Factor(
+        constant, np.flatnonzero(free)[pattern.order], pattern.row_starts, pattern.row_columns,
+        pattern.factor_rows, pattern.factor_columns, pattern.starts, pattern.rows, np.empty_like(constant),
+        np.empty(entries), np.empty(n), np.zeros(n), np.empty(n, np.int64), np.zeros((n, WIDTH)),
     )  # fmt: skip
-
-
-def _far(term: ContactPenalty) -> np.ndarray:
-    """(S,) samples that the step has out of reach."""
-    planes = term.planes
-    return np.zeros(len(term.stencils), bool) if planes is None or planes.far is None else planes.far
-
-
-@njit(cache=True)
-def _depths(x, order, vertices, constants, points, normals, margin, far, state):
-    """Normals and depths of the samples at x (3V,), in blocks; those with one that is not far (S,)."""
-    near, count = np.empty(len(state), np.int64), 0
-    for place in range(len(order)):
-        s, block, lane = order[place], place // LANES, place % LANES
-        i, j, k = vertices[block, lane], vertices[block, LANES + lane], vertices[block, 2 * LANES + lane]
-        u, v, w = constants[block, lane], constants[block, LANES + lane], constants[block, 2 * LANES + lane]
-        depth = margin
-        for a in range(3):
-            sample = u * x[i + a] + v * x[j + a] + w * x[k + a]
-            depth -= normals[s, a] * (sample - points[s, a])
-            state[block, a * LANES + lane] = normals[s, a]
-        state[block, 3 * LANES + lane] = depth
-        if far[s] or (count > 0 and near[count - 1] == block):
-            continue
-        near[count] = block
-        count += 1
-    return near[:count]
+    stiffening = []
+    for k, lanes in changing:
+        places = pattern.places(number[lanes.stencils])
+        blocks = to_blocks(places.reshape(len(places), -1))
+        stiffening.append((k, KernelArgument(lanes.stiffness), blocks))
+    return factor, stiffening

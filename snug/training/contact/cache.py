@@ -20,9 +20,9 @@ import numpy as np
 from reference_sim.contact.anchor_walk import SLACK, triangle_adjacency
 from reference_sim.contact.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
+from reference_sim.kernels.training_lanes import TRAINING_LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
 from snug.kernels.contact import PARTS, byte_normals, contact_energy, interpolated_planes
-from snug.kernels.lanes import LANES
 
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
@@ -160,14 +160,14 @@ class ContactCache:
         *,
         walk: bool = False,
     ) -> np.ndarray:
-        """Contact energy of garments x (C, V, 3, LANES) float32 [m], see snug.kernels.lanes, in frames (N, T), with
+        """Contact energy of garments x (C, V, 3, TRAINING_LANES) float32 [m], see snug.kernels.lanes, in frames (N, T), with
         the planes of `planes`; rows (N, T).
 
-        -> values (C, LANES) [J], zero in lanes beyond the last frame; adds to gradients like x [N]. walk:
+        -> values (C, TRAINING_LANES) [J], zero in lanes beyond the last frame; adds to gradients like x [N]. walk:
         anchors near the skin first walk to where their samples are, and are remembered there. A sample that
         is out of reach costs no more than the look at its anchor, and no plane is stored.
         """
-        values = np.zeros((len(x), LANES), np.float32)
+        values = np.zeros((len(x), TRAINING_LANES), np.float32)
         contact_energy(
             x,
             *_samples(contact),

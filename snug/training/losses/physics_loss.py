@@ -8,9 +8,10 @@ in joules a frame: a frame without two frames before it in the window has no ine
 three holds three static terms and one inertia, whose gradient reaches all three frames.
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
-kernels (snug.kernels.energies, or those beside the definition) give the same values and gradients in a small
-part of the time, so autograd uses those. On a GPU the definitions run as they are, and on a CPU that of an
-energy that has no kernel. A recipe may name any energy of the simulator (snug.recipes.energies).
+kernels (those that a term declares as "training_batch", or its own gradient) give the same values and
+gradients in a small part of the time, so autograd uses those. On a GPU the definitions run as they are, and on
+a CPU that of an energy that has no kernel. A recipe may name any energy of the simulator
+(snug.recipes.energies).
 The contact planes are the one difference: training keeps an anchor for each sample, which walks along, and
 takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the
 closest point.
@@ -36,15 +37,17 @@ from reference_sim.energies import (
     StretchSpring,
     StretchStVK,
 )
-from snug.kernels.energies import KERNELS, Kernel, batched_kernel, inertia_kernel
-from snug.kernels.lanes import LANES, laid, unlaid
+from reference_sim.energies.inertia import batch_of_windows
+from reference_sim.kernels.fast_kernels import fast_kernel, has_kernel, warn_slow_path
+from reference_sim.kernels.training_lanes import TRAINING_LANES, BatchKernel
+from snug.kernels.lanes import laid, unlaid
 from snug.recipes.energies import find_energy
 from snug.recipes.recipe import TERMS, Recipe
 from snug.training.device import CPU
 from snug.training.losses.pbns_material import SquaredContact, spring_terms
 
 STATIC = ("strain", "bending", "gravity")
-Planes = tuple[Any, Any] | Kernel
+Planes = tuple[Any, Any] | BatchKernel
 
 MEMBRANES = {"stvk": StretchStVK, "springs": StretchSpring}
 
@@ -86,7 +89,7 @@ class ClosedForms(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx: Any, x: Tensor, *kernels: Kernel) -> tuple[Tensor, ...]:
+    def forward(ctx: Any, x: Tensor, *kernels: BatchKernel) -> tuple[Tensor, ...]:
         lanes = laid(x)
         gradient = np.zeros_like(lanes)
         values = tuple(unlaid(kernel(lanes, gradient), *x.shape[:2]) for kernel in kernels)
@@ -132,9 +135,10 @@ def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Te
     return energy.energy(x, *frame_data).sum(-1)
 
 
-def has_kernel(energy: Energy) -> bool:
-    """Whether its gradient is known in closed form; automatic differentiation gives that of the others."""
-    return type(energy) in KERNELS or type(energy).value_and_gradient is not Energy.value_and_gradient
+def has_closed_form(energy: Energy) -> bool:
+    """Return whether its gradient is known in closed form; automatic differentiation gives that of others."""
+    own_gradient = type(energy).value_and_gradient is not Energy.value_and_gradient
+    return has_kernel(energy, "training_batch") or own_gradient
 
 
 def on_device(energy: Any, device: torch.device) -> Any:
@@ -165,9 +169,16 @@ class PhysicsLoss:
         if not kernels:
             self.inertia, self._contact = on_device(self.inertia, device), on_device(self.contact, device)
         self.static = {
-            name: term if kernels and has_kernel(term) else on_device(term, device)
+            name: term if kernels and has_closed_form(term) else on_device(term, device)
             for name, term in self.static.items()
         }
+        self._batches: dict[str, BatchKernel] = {}
+        if kernels:
+            made = {name: fast_kernel(term, "training_batch") for name, term in self.static.items()}
+            self._batches = {name: kernel for name, kernel in made.items() if kernel is not None}
+            if slow := [term for name, term in self.static.items() if name not in self._batches]:
+                instead = "frames are evaluated one after the other, or by torch (docs/extend.md, An energy)"
+                warn_slow_path("training", "batch kernel", slow, instead)
 
     def __call__(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Tensor]:
         """Joules of each window and frame, term -> (N, T).
@@ -184,7 +195,7 @@ class PhysicsLoss:
             closed = dict(zip(kernels, energies.apply(x, *kernels.values()) if kernels else ()))
         terms = {}
         for name, energy in self.static.items():
-            kernels_too = self.kernels and has_kernel(energy)
+            kernels_too = self.kernels and has_closed_form(energy)
             terms[name] = closed[name] if name in closed else summed(energy, x, kernels=kernels_too)
         if "inertia" in self.terms and x.shape[1] >= 3:
             terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead)
@@ -196,14 +207,14 @@ class PhysicsLoss:
                 terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
         return terms
 
-    def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Kernel]:
-        """Those terms that have a kernel in lanes."""
-        found: dict[str, Any] = {name: batched_kernel(energy) for name, energy in self.static.items()}
-        if "inertia" in self.terms and x.shape[1] >= 3 and len(x) % LANES == 0:
-            found["inertia"] = inertia_kernel(self.inertia, laid(ahead), len(x))
+    def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, BatchKernel]:
+        """Return the kernels in lanes of the terms that have one, by name of the term."""
+        kernels = dict(self._batches)
+        if "inertia" in self.terms and x.shape[1] >= 3 and len(x) % TRAINING_LANES == 0:
+            kernels["inertia"] = batch_of_windows(self.inertia, laid(ahead), len(x))
         if "collision" in self.terms and callable(planes):
-            found["collision"] = planes
-        return {name: kernel for name, kernel in found.items() if kernel}
+            kernels["collision"] = planes
+        return kernels
 
     def _inertia(self, x: Tensor, ahead: Tensor) -> Tensor:
         x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]

@@ -23,6 +23,11 @@ FILES = {
     "reference_sim/terms/__init__.py": "def __getattr__(name):\n    return load(name)\n",
     "reference_sim/terms/stretch.py": "class Stretch:\n    pass\n",
     "reference_sim/terms/bend.py": "class Bend:\n    pass\n",
+    "reference_sim/terms/twist/__init__.py": "",
+    "reference_sim/terms/twist/definition.py": (
+        "class Twist:\n    kernels: ClassVar = {'lanes': 'reference_sim.terms.twist.lanes:make', 'own': 'f'}\n"
+    ),
+    "reference_sim/terms/twist/lanes.py": "def make(term):\n    return 2 * term\n",
     "snug/network.py": "import torch\nfrom reference_sim.terms import Unknown\n",
     "snug/data/body.npz": "weights",
     "benchmarks/methods/__init__.py": "from . import one, other\n",
@@ -107,6 +112,16 @@ def test_what_lies_beside_the_source_counts_where_its_package_is_reached(project
     assert data_of(code_of("benchmarks.methods.one")) == {}
 
 
+def test_the_kernels_that_a_term_declares_count_with_it(project):
+    project("benchmarks/three.py", "from reference_sim.terms import Twist\n")
+    terms = "reference_sim/terms"
+    files = {"benchmarks/three.py", f"{terms}/__init__.py"}
+    assert set(code_of("benchmarks.three")) == files | {
+        f"{terms}/twist/definition.py",
+        f"{terms}/twist/lanes.py",
+    }
+
+
 def test_an_unknown_module_is_named():
     with pytest.raises(ValueError, match=r"benchmarks\.nothing"):
         code_of("benchmarks.nothing")
@@ -132,14 +147,18 @@ def test_a_scene_without_obstacle_or_body_depends_on_neither():
         "benchmarks.scenes.hanging_sheet",
         "benchmarks.methods.solvers.simulation",
     )
-    assert "reference_sim/energies/bend_hinge.py" in code and "reference_sim/minimise/newton.py" in code
+    assert (
+        "reference_sim/energies/bend_hinge/definition.py" in code
+        and "reference_sim/minimise/newton.py" in code
+    )
     unused = ("snug/", "reports/", "reference_sim/energies/contact", "benchmarks/methods/__init__")
     assert [path for path in code if path.startswith(unused)] == []
 
 
 def test_training_does_not_hang_on_the_solver():
     code = code_of("benchmarks.tasks.training")
-    assert "snug/training/losses/physics_loss.py" in code and "reference_sim/energies/bend_hinge.py" in code
+    assert "snug/training/losses/physics_loss.py" in code
+    assert "reference_sim/energies/bend_hinge/definition.py" in code
     assert [path for path in code if path.startswith("reference_sim/minimise")] == []
 
 

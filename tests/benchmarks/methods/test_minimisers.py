@@ -9,8 +9,7 @@ import pytest
 
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
-from benchmarks.methods.minimisers.elements import contacts, hinges, membrane, weights
-from benchmarks.methods.minimisers.kernels import block, depth, fold, strain
+from benchmarks.methods.minimisers.kernels import block
 from benchmarks.methods.minimisers.xpbd import XPBD
 from benchmarks.methods.solvers.warm_started import FromElsewhere, WarmStarted
 from benchmarks.metrics.energies.time_step import first_guess
@@ -25,7 +24,11 @@ from reference_sim.energies import (
     Step,
     StretchStVK,
 )
-from reference_sim.energies.term_kinds import terms_of
+from reference_sim.energies.bend_hinge.sweeps import fold
+from reference_sim.energies.contact_penalty.sweeps import depth
+from reference_sim.energies.stretch_stvk.sweeps import strain
+from reference_sim.kernels.element_sweeps import SCRATCH_SHAPE
+from reference_sim.kernels.fast_kernels import step_terms
 from reference_sim.minimise import Newton, make_minimiser
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
@@ -51,17 +54,13 @@ def test_the_block_of_a_vertex_is_that_of_the_potential(touching):
     potential, guess = touching
     x = guess + np.random.default_rng(2).normal(0, 2e-3, guess.shape)
     assert potential.terms(x)["collision"] > 0.0
-    terms, descent = terms_of(potential, "test"), VertexBlockDescent(potential, max_iterations=1)
-    inertia = terms.inertia.masses / terms.inertia.dt**2, terms.inertia.x_hat, weights(terms)
+    inertia, terms = VertexBlockDescent(potential, max_iterations=1).freeze()
     pattern = potential.pattern(np.ones(len(x), dtype=bool))
     convex = pattern.symmetric(pattern.assemble(x, convexity=1.0)).toarray()
-    gradient, free = potential.gradient(x), np.empty(3)
+    gradient = potential.gradient(x)
     g, H = np.empty(3), np.empty((3, 3))
     for v in range(len(x)):
-        block(
-            x, v, inertia, membrane(terms.strain), hinges(terms.bending), contacts(terms.contact),
-            descent._around, g, H, free, np.empty(3), np.empty((4, 3)),
-        )  # fmt: skip
+        block(x, v, inertia, terms, g, H, np.empty(SCRATCH_SHAPE), np.empty(len(terms)))
         assert g == pytest.approx(gradient[v], abs=1e-12 * np.abs(gradient).max())
         rows = slice(3 * v, 3 * v + 3)
         assert np.abs(H - convex[rows, rows]).max() < 1e-12 * np.abs(convex).max()
@@ -70,16 +69,17 @@ def test_the_block_of_a_vertex_is_that_of_the_potential(touching):
 def test_the_constraints_of_xpbd_carry_our_energies(touching):
     potential, guess = touching
     x = guess + np.random.default_rng(3).normal(0, 2e-3, guess.shape)
-    terms, energies = terms_of(potential, "test"), potential.terms(x)
-    faces, inverse, areas, lam, mu = membrane(terms.strain)
+    energies = potential.terms(x)
+    data = [constraints.freeze() for constraints in step_terms(potential, "constraint", "XPBD").kernels]
+    (faces, inverse, areas, lam, mu, _), hinges, contacts = data
     stiffness = np.array([[lam + 2 * mu, lam, 0], [lam, lam + 2 * mu, 0], [0, 0, 4 * mu]])
     C = np.array([strain(x, face, D, np.empty(3), np.empty(3)) for face, D in zip(faces, inverse)])
     quadratic = np.einsum("fi,ij,fj->f", C, stiffness, C)
     assert 0.5 * areas @ quadratic == pytest.approx(energies["strain"], rel=1e-12)
-    folds = [fold(x, h, rest, np.empty((4, 3))) for h, _, rest in zip(*hinges(terms.bending))]
-    k = hinges(terms.bending)[1]
+    folds = [fold(x, h, rest, np.empty((4, 3))) for h, _, rest in zip(*hinges[:3])]
+    k = hinges[1]
     assert 0.5 * k @ np.square(folds) == pytest.approx(energies["bending"], rel=1e-12)
-    stencils, shares, k, margin, points, normals = contacts(terms.contact)
+    stencils, shares, k, margin, points, normals, _ = contacts
     planes = zip(stencils, shares, points, normals)
     C = np.array([depth(x, s, w, margin, c, n) ** 1.5 for s, w, c, n in planes])
     assert 0.5 * (2 * k) @ C**2 == pytest.approx(energies["collision"], rel=1e-12)

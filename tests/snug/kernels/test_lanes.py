@@ -7,24 +7,28 @@ import pytest
 import torch
 from numba import njit
 
-from snug.kernels.lanes import LANES, laid, unlaid
-from snug.kernels.vector_rows import add_lanes, copy_lanes, mixed_rows
+from reference_sim.kernels.training_lanes import TRAINING_LANES
+from reference_sim.kernels.vector_rows import add_lanes, copy_lanes, mixed_rows
+from snug.kernels.lanes import laid, unlaid
 
 
 @pytest.mark.parametrize(("windows", "frames"), [(16, 3), (32, 2), (1, 5), (5, 4), (21, 1)])
 def test_what_is_laid_out_comes_back(windows, frames):
     x = torch.randn(windows, frames, 7, 3)
     lanes = laid(x)
-    assert lanes.shape == (-(-windows * frames // LANES), 7, 3, LANES) and lanes.flags.c_contiguous
-    first = x[: min(windows, LANES), 0].movedim(0, -1).numpy()
+    assert (
+        lanes.shape == (-(-windows * frames // TRAINING_LANES), 7, 3, TRAINING_LANES)
+        and lanes.flags.c_contiguous
+    )
+    first = x[: min(windows, TRAINING_LANES), 0].movedim(0, -1).numpy()
     assert (lanes[0, ..., : first.shape[-1]] == first).all()
     assert torch.equal(unlaid(lanes, windows, frames), x)
 
 
 def test_of_sixteen_windows_nothing_is_copied():
-    lanes = np.random.default_rng(0).normal(size=(3, 7, 3, LANES)).astype(np.float32)
-    x = unlaid(lanes, LANES, 3)
-    assert x.shape == (LANES, 3, 7, 3) and np.shares_memory(laid(x), lanes)
+    lanes = np.random.default_rng(0).normal(size=(3, 7, 3, TRAINING_LANES)).astype(np.float32)
+    x = unlaid(lanes, TRAINING_LANES, 3)
+    assert x.shape == (TRAINING_LANES, 3, 7, 3) and np.shares_memory(laid(x), lanes)
 
 
 def test_rows_move_as_numpy_moves_them():
@@ -37,9 +41,9 @@ def test_rows_move_as_numpy_moves_them():
         out[0], out[1], out[2] = mixed_rows(rows, np.uint32(0), 3, 2, *weights)
 
     random = np.random.default_rng(0)
-    source, into = (random.normal(size=(3, LANES)).astype(np.float32) for _ in range(2))
+    source, into = (random.normal(size=(3, TRAINING_LANES)).astype(np.float32) for _ in range(2))
     rows, before = random.normal(size=(4, 3)).astype(np.float32), into.copy()
-    total, out = np.ones(LANES), np.empty(3)
+    total, out = np.ones(TRAINING_LANES), np.empty(3)
     moved(source.ravel(), into.ravel(), total, np.append(rows, np.float32(0.0)), out)
     assert (into == [source[2], before[1] + source[1], before[2]]).all()
     assert np.allclose(total, 1 + source[1].astype(float), rtol=1e-15)

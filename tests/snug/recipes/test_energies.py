@@ -12,7 +12,7 @@ import torch
 from reference_sim import energies
 from snug.recipes.energies import find_energy
 from snug.recipes.recipe import TERMS, Recipe, RecipeError
-from snug.training.losses.physics_loss import PhysicsLoss, has_kernel
+from snug.training.losses.physics_loss import PhysicsLoss, has_closed_form
 from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -98,7 +98,7 @@ def test_training_with_it_goes_another_way_and_knows_its_recipe(own, kernels, tm
 
 def test_a_term_with_a_kernel_uses_it_and_one_without_its_definition(own):
     terms = PhysicsLoss(tube_dress().cloth, own, dt=1 / 30).static
-    assert [name for name, term in terms.items() if has_kernel(term)] == ["strain", "bending", "gravity"]
+    assert [name for name, term in terms.items() if has_closed_form(term)] == ["strain", "bending", "gravity"]
     assert list(terms) == ["strain", "bending", "gravity", "tether"]
 
 

@@ -10,8 +10,8 @@ import torch
 from torch.overrides import TorchFunctionMode
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
+from reference_sim.kernels.fast_kernels import fast_kernel
 from snug.body.skinning import skin
-from snug.kernels.energies import batched_kernel
 from snug.kernels.lanes import laid, unlaid
 from snug.recipes.named import PAPER
 from snug.recipes.recipe import DEFAULT
@@ -209,14 +209,14 @@ def test_lanes_agree_with_the_definition(E, count):
     crumpled = np.where(np.arange(count) % 3, 0.004, 0.05)[:, None, None]
     x = dressed.cloth.rest_positions + crumpled * random.normal(size=(count, dressed.vertices, 3))
     x = x.astype(np.float32)
-    values, gradients = lane_by_lane(batched_kernel(energy), x)
+    values, gradients = lane_by_lane(fast_kernel(energy, "training_batch"), x)
     for n in range(count):
         exact, slope = energy.value_and_gradient(x[n].astype(float))
         assert values[n] == pytest.approx(exact, rel=2e-5)
         assert np.linalg.norm(gradients[n] - slope) < 2e-4 * np.linalg.norm(slope)
-    assert batched_kernel(ContactPenalty(dressed.cloth)) is None
+    assert fast_kernel(ContactPenalty(dressed.cloth), "training_batch") is None
     x[-1, 3] = np.nan
-    values, _ = lane_by_lane(batched_kernel(energy), x)
+    values, _ = lane_by_lane(fast_kernel(energy, "training_batch"), x)
     assert np.isnan(values[-1]) and np.isfinite(values[:-1]).all()
 
 

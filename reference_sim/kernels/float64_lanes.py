@@ -1,6 +1,6 @@
-"""Elements worked out LANES at a time in float64: what is shared by kernels that do so.
+"""Elements worked out LANES_FLOAT64 at a time in float64: what is shared by kernels that do so.
 
-A kernel copies corners and constants of LANES elements into one array u of known size, row after row, works
+A kernel copies corners and constants of LANES_FLOAT64 elements into one array u of known size, row after row, works
 them out in a loop of fixed length without a branch, which the compiler turns into vector instructions, and
 hands the results out one by one. Within one array it knows that nothing overlaps.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from reference_sim.kernels.kernel_cache import njit
 
-LANES = 8
+LANES_FLOAT64 = 8
 
 _STEEP = np.tan(np.pi / 8)
 # arctan(t) = t + t z p(z) for z = t^2 up to tan(pi/8)^2: through 13 Chebyshev points, at most 5e-17 off.
@@ -45,7 +45,7 @@ def arctan2(y, x):
 
 @njit(cache=True)
 def add_blocks(u, row, n, e, corners, slots, base, stride, data):
-    """Add the 3 x 3 blocks of element e in lane n of u to the values of a matrix, see `block_places`.
+    """Add the 3 x 3 blocks of element e in lane n of u to the values of a matrix, see `block_indices`.
 
     Of its corners x corners blocks, u holds those on and below the diagonal, row after row, from `row` on.
     """
@@ -56,11 +56,11 @@ def add_blocks(u, row, n, e, corners, slots, base, stride, data):
                 at, step = base[slot], stride[slot]
                 for j in range(3):
                     for i in range(3):
-                        data[at + j * step + i] += u[(row + 3 * i + j) * LANES + n]
+                        data[at + j * step + i] += u[(row + 3 * i + j) * LANES_FLOAT64 + n]
             slot = slots[e, b * corners + a]
             if slot >= 0 and a != b:
                 at, step = base[slot], stride[slot]
                 for j in range(3):
                     for i in range(3):
-                        data[at + j * step + i] += u[(row + 3 * j + i) * LANES + n]
+                        data[at + j * step + i] += u[(row + 3 * j + i) * LANES_FLOAT64 + n]
             row += 9

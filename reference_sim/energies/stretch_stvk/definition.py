@@ -10,15 +10,15 @@ thickness is already inside the printed constants).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
 from reference_sim.kernels.block_indices import BlockPlaces
+from reference_sim.kernels.float64_lanes import LANES_FLOAT64, add_blocks
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.lanes import LANES, add_blocks
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -32,6 +32,12 @@ class StretchStVK(Energy):
 
     name = "strain"
     constant = (1,)
+    kernels: ClassVar = {
+        "float32_lanes": "reference_sim.energies.stretch_stvk.float32_lanes:lanes",
+        "vertex_block": "reference_sim.energies.stretch_stvk.sweeps:vertex_block",
+        "constraint": "reference_sim.energies.stretch_stvk.sweeps:constraint",
+        "training_batch": "reference_sim.energies.stretch_stvk.training_batch:batch",
+    }
 
     def __init__(self, cloth: Cloth) -> None:
         self.cloth = cloth
@@ -121,10 +127,10 @@ def _deformation(x, face, D, fa, fb):
 def _gradient(x, faces, Dm_inverse, areas, lam, mu, gradient):
     """dE/dx_a = A F S b_a with S = lambda tr(G) I + 2 mu G and b_a the gradient of the hat function.
 
-    LANES faces side by side, in vector instructions: from corners, Dm^-1 and area in u to forces and energy.
+    LANES_FLOAT64 faces side by side, in vector instructions: from corners, Dm^-1 and area in u to forces and energy.
     An incomplete group is filled up with the last face.
     """
-    L, count, total = LANES, len(faces), 0.0
+    L, count, total = LANES_FLOAT64, len(faces), 0.0
     u = np.empty(14 * L)
     for begin in range(0, count, L):
         for n in range(L):
@@ -209,9 +215,9 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
 def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, data):
     """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)].
 
-    LANES faces side by side; stress (F, 3) holds S00, S11, S01.
+    LANES_FLOAT64 faces side by side; stress (F, 3) holds S00, S11, S01.
     """
-    L, count = LANES, len(faces)
+    L, count = LANES_FLOAT64, len(faces)
     u = np.empty((BLOCKS + 54) * L)
     for begin in range(0, count, L):
         for n in range(L):
@@ -254,7 +260,7 @@ def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, 
 @njit(cache=True, inline="always")
 def _block(u, n, place, a, c, lam, mu):
     """Block of corners a, c of the face in lane n, from what _hessian has put into u."""
-    L = LANES
+    L = LANES_FLOAT64
     ax, ay, az = u[3 * a * L + n], u[(3 * a + 1) * L + n], u[(3 * a + 2) * L + n]
     cx, cy, cz = u[3 * c * L + n], u[(3 * c + 1) * L + n], u[(3 * c + 2) * L + n]
     a0, a1, c0, c1 = (

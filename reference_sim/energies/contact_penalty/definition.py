@@ -14,7 +14,7 @@ carries the whole area of the cloth once, so that a finer mesh does not get a st
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -51,6 +51,11 @@ class ContactPenalty(Energy):
 
     name = "collision"
     power = 3  # of the depth
+    kernels: ClassVar = {
+        "float32_lanes": "reference_sim.energies.contact_penalty.float32_lanes:lanes",
+        "vertex_block": "reference_sim.energies.contact_penalty.sweeps:vertex_block",
+        "constraint": "reference_sim.energies.contact_penalty.sweeps:constraint",
+    }
 
     def __init__(
         self,

@@ -13,7 +13,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from snug.kernels.lanes import LANES
+from reference_sim.kernels.training_lanes import TRAINING_LANES
 
 WIDE = ir.IntType(64)
 _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the function that types it
@@ -21,11 +21,17 @@ _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the funct
 
 @_intrinsic
 def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
-    """Row j of target becomes row i of source: rows of LANES numbers in flat float32 arrays."""
+    """Row j of target becomes row i of source: rows of TRAINING_LANES numbers in flat float32 arrays."""
 
     def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = builder.load(_place(context, builder, signature.args[:2], args[:2], LANES, LANES), align=4)
-        builder.store(numbers, _place(context, builder, signature.args[2:], args[2:], LANES, LANES), align=4)
+        numbers = builder.load(
+            _place(context, builder, signature.args[:2], args[:2], TRAINING_LANES, TRAINING_LANES), align=4
+        )
+        builder.store(
+            numbers,
+            _place(context, builder, signature.args[2:], args[2:], TRAINING_LANES, TRAINING_LANES),
+            align=4,
+        )
         return context.get_dummy_value()
 
     return types.void(source, i, target, j), built
@@ -36,8 +42,10 @@ def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     """Row i of source is added to row j of target, which may also be one of float64."""
 
     def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = builder.load(_place(context, builder, signature.args[:2], args[:2], LANES, LANES), align=4)
-        place = _place(context, builder, signature.args[2:], args[2:], LANES, LANES)
+        numbers = builder.load(
+            _place(context, builder, signature.args[:2], args[:2], TRAINING_LANES, TRAINING_LANES), align=4
+        )
+        place = _place(context, builder, signature.args[2:], args[2:], TRAINING_LANES, TRAINING_LANES)
         if signature.args[2].dtype == types.float64:
             numbers = builder.fpext(numbers, place.type.pointee)
         builder.store(builder.fadd(builder.load(place, align=4), numbers), place, align=4)

@@ -11,7 +11,7 @@ prints it (eq. 11): some three times as stiff.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,8 +19,8 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
 from reference_sim.fingerprint import fingerprint
 from reference_sim.kernels.block_indices import BlockPlaces
+from reference_sim.kernels.float64_lanes import LANES_FLOAT64, add_blocks, arctan2
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.lanes import LANES, add_blocks, arctan2
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -42,6 +42,12 @@ class BendHinge(Energy):
     """
 
     name = "bending"
+    kernels: ClassVar = {
+        "float32_lanes": "reference_sim.energies.bend_hinge.float32_lanes:lanes",
+        "vertex_block": "reference_sim.energies.bend_hinge.sweeps:vertex_block",
+        "constraint": "reference_sim.energies.bend_hinge.sweeps:constraint",
+        "training_batch": "reference_sim.energies.bend_hinge.training_batch:batch",
+    }
 
     def __init__(
         self, cloth: Cloth, *, scaling: str = "length_area", rest_angles: np.ndarray | str | float = 0.0
@@ -133,10 +139,10 @@ def dihedral_angles(x, hinges):
 
 @njit(cache=True, error_model="numpy")
 def _gradient(x, hinges, stiffness, rest, gradient):
-    """LANES hinges side by side, in vector instructions: from corners, stiffness and rest angle in u to
+    """LANES_FLOAT64 hinges side by side, in vector instructions: from corners, stiffness and rest angle in u to
     forces and energy. An incomplete group is filled up with the last hinge.
     """
-    L, count, total = LANES, len(hinges), 0.0
+    L, count, total = LANES_FLOAT64, len(hinges), 0.0
     u = np.empty(14 * L)
     for begin in range(0, count, L):
         for n in range(L):
@@ -177,7 +183,7 @@ def _gradient(x, hinges, stiffness, rest, gradient):
 
 @njit(cache=True, error_model="numpy")
 def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
-    """k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta], LANES hinges side by side.
+    """k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta], LANES_FLOAT64 hinges side by side.
 
     With the edge's length L and direction e, the foot t of a face's tip, m = n/|n|^2, p = m x e, the weights
     w = (L - t, t, -L) and signs r = (-1, 1, 0) of the edge's ends and the tip, and c = |n|^2 / (2 L^2), the
@@ -187,7 +193,7 @@ def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
 
     but for antisymmetric parts that cancel between both faces.
     """
-    L, count = LANES, len(hinges)
+    L, count = LANES_FLOAT64, len(hinges)
     u = np.empty((BLOCKS + 90) * L)
     for begin in range(0, count, L):
         for n in range(L):
@@ -244,7 +250,7 @@ def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
 @njit(cache=True, inline="always")
 def _block(u, n, place, a, b, ra, rb):
     """Block of corners a, b of the hinge in lane n, from what _hessian has put into u."""
-    L = LANES
+    L = LANES_FLOAT64
     k, s = u[12 * L + n], u[13 * L + n]
     wa, wb, va, vb = u[(20 + a) * L + n], u[(20 + b) * L + n], u[(24 + a) * L + n], u[(24 + b) * L + n]
     ax, ay, az, bx, by, bz = (

@@ -1,0 +1,153 @@
+"""Hinges in float32, LANES_FLOAT32 at a time: the kernel of early-stopped L-BFGS (kernels.float32_lanes)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reference_sim.kernels.float32_lanes import (
+    FAST,
+    HALF,
+    LANES_FLOAT32,
+    ONE,
+    TINY,
+    Float32Lanes,
+    empty_state,
+    lay_out,
+    set_edges,
+)
+from reference_sim.kernels.kernel_cache import njit
+
+if TYPE_CHECKING:
+    from reference_sim.energies.bend_hinge.definition import BendHinge
+
+PI, HALF_PI, TWO_PI = np.float32(np.pi), np.float32(np.pi / 2), np.float32(2 * np.pi)
+
+
+def _arctangent() -> tuple[np.float32, ...]:
+    """Return the coefficients c of atan(a) = a sum c_k a^(2k) on [0, 1], from a fit at Chebyshev points."""
+    terms = 8
+    a = np.cos((np.arange(200) + 0.5) * np.pi / 400)
+    columns = a[:, None] ** (2 * np.arange(terms))
+    c, *_ = np.linalg.lstsq(columns, np.arctan(a) / a, rcond=None)
+    return tuple(np.float32(value) for value in c)
+
+
+C0, C1, C2, C3, C4, C5, C6, C7 = _arctangent()
+
+
+def lanes(term: BendHinge) -> Float32Lanes:
+    """Lay the hinges of the term out; a step freezes their edges."""
+    vertices, constants = lay_out(term.stencils, term.stiffness, term.rest_angles)
+    edges = empty_state(vertices, 9)
+
+    def freeze(x0: np.ndarray) -> tuple:
+        set_edges(x0, vertices, 3, edges)
+        return vertices, constants, edges
+
+    return Float32Lanes(hinge_gradient, freeze)
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def hinge_gradient(data, u, gradient, s):
+    """Return the energy [J] of the hinges and add to gradient (3V,) [N].
+
+    vertices (B, 4 LANES_FLOAT32): 3 times the vertex. constants (B, 2 LANES_FLOAT32): stiffness [J], rest angle [rad]. edges
+    (B, 9 LANES_FLOAT32): of x_0.
+    """
+    vertices, constants, edges = data
+    total = 0.0
+    for b in range(len(vertices)):
+        at, c, e = vertices[b], constants[b], edges[b]
+        for g in range(LANES_FLOAT32):
+            i0, i1, i2, i3 = (
+                at[g],
+                at[LANES_FLOAT32 + g],
+                at[2 * LANES_FLOAT32 + g],
+                at[3 * LANES_FLOAT32 + g],
+            )
+            x, y, z = u[i0], u[i0 + 1], u[i0 + 2]
+            s[g], s[LANES_FLOAT32 + g], s[2 * LANES_FLOAT32 + g] = u[i1] - x, u[i1 + 1] - y, u[i1 + 2] - z
+            s[3 * LANES_FLOAT32 + g], s[4 * LANES_FLOAT32 + g], s[5 * LANES_FLOAT32 + g] = (
+                u[i2] - x,
+                u[i2 + 1] - y,
+                u[i2 + 2] - z,
+            )
+            s[6 * LANES_FLOAT32 + g], s[7 * LANES_FLOAT32 + g], s[8 * LANES_FLOAT32 + g] = (
+                u[i3] - x,
+                u[i3 + 1] - y,
+                u[i3 + 2] - z,
+            )
+        energy = np.float32(0.0)
+        for g in range(LANES_FLOAT32):
+            ex, ey, ez = (
+                s[g] + e[g],
+                s[LANES_FLOAT32 + g] + e[LANES_FLOAT32 + g],
+                s[2 * LANES_FLOAT32 + g] + e[2 * LANES_FLOAT32 + g],
+            )
+            px = s[3 * LANES_FLOAT32 + g] + e[3 * LANES_FLOAT32 + g]
+            py = s[4 * LANES_FLOAT32 + g] + e[4 * LANES_FLOAT32 + g]
+            pz = s[5 * LANES_FLOAT32 + g] + e[5 * LANES_FLOAT32 + g]
+            qx = s[6 * LANES_FLOAT32 + g] + e[6 * LANES_FLOAT32 + g]
+            qy = s[7 * LANES_FLOAT32 + g] + e[7 * LANES_FLOAT32 + g]
+            qz = s[8 * LANES_FLOAT32 + g] + e[8 * LANES_FLOAT32 + g]
+            length2 = ex * ex + ey * ey + ez * ez + TINY
+            inverse = ONE / np.sqrt(length2)
+            length = length2 * inverse
+            # Of each face m = n/|n|^2, and where the foot of its tip lies along the edge.
+            nx, ny, nz = ey * pz - ez * py, ez * px - ex * pz, ex * py - ey * px
+            scale = ONE / (nx * nx + ny * ny + nz * nz + TINY)
+            ax, ay, az = nx * scale, ny * scale, nz * scale
+            nx, ny, nz = ey * qz - ez * qy, ez * qx - ex * qz, ex * qy - ey * qx
+            scale = ONE / (nx * nx + ny * ny + nz * nz + TINY)
+            bx, by, bz = nx * scale, ny * scale, nz * scale
+            foot_a = (ex * px + ey * py + ez * pz) * inverse
+            foot_b = (ex * qx + ey * qy + ez * qz) * inverse
+            sine = inverse * ((by * az - bz * ay) * ex + (bz * ax - bx * az) * ey + (bx * ay - by * ax) * ez)
+            cosine = -(ax * bx + ay * by + az * bz)
+            size_s, size_c = abs(sine), abs(cosine)
+            a = min(size_s, size_c) / (max(size_s, size_c) + TINY)
+            q = a * a
+            angle = a * (C0 + q * (C1 + q * (C2 + q * (C3 + q * (C4 + q * (C5 + q * (C6 + q * C7)))))))
+            angle = HALF_PI - angle if size_s > size_c else angle
+            angle = PI - angle if cosine < np.float32(0.0) else angle
+            angle = -angle if sine < np.float32(0.0) else angle
+            angle -= c[LANES_FLOAT32 + g]
+            angle -= TWO_PI * np.floor((angle + PI) / TWO_PI)
+            stiffness = c[g]
+            energy += HALF * stiffness * angle * angle
+            force = stiffness * angle
+            wa, wb = force * (length - foot_a), force * (length - foot_b)
+            va, vb = force * foot_a, force * foot_b
+            s[9 * LANES_FLOAT32 + g] = wa * ax - wb * bx
+            s[10 * LANES_FLOAT32 + g] = wa * ay - wb * by
+            s[11 * LANES_FLOAT32 + g] = wa * az - wb * bz
+            s[12 * LANES_FLOAT32 + g] = va * ax - vb * bx
+            s[13 * LANES_FLOAT32 + g] = va * ay - vb * by
+            s[14 * LANES_FLOAT32 + g] = va * az - vb * bz
+            force *= length
+            s[15 * LANES_FLOAT32 + g], s[16 * LANES_FLOAT32 + g], s[17 * LANES_FLOAT32 + g] = (
+                -force * ax,
+                -force * ay,
+                -force * az,
+            )
+            s[18 * LANES_FLOAT32 + g], s[19 * LANES_FLOAT32 + g], s[20 * LANES_FLOAT32 + g] = (
+                force * bx,
+                force * by,
+                force * bz,
+            )
+        total += float(energy)
+        for g in range(LANES_FLOAT32):
+            i0, i1, i2, i3 = (
+                at[g],
+                at[LANES_FLOAT32 + g],
+                at[2 * LANES_FLOAT32 + g],
+                at[3 * LANES_FLOAT32 + g],
+            )
+            for a in range(3):
+                gradient[i0 + a] += s[(9 + a) * LANES_FLOAT32 + g]
+                gradient[i1 + a] += s[(12 + a) * LANES_FLOAT32 + g]
+                gradient[i2 + a] += s[(15 + a) * LANES_FLOAT32 + g]
+                gradient[i3 + a] += s[(18 + a) * LANES_FLOAT32 + g]
+    return total
