@@ -197,13 +197,17 @@ def _running(node: ast.AST) -> Iterator[ast.AST]:
 def _files_behind(base: str, name: str, importer: str, top: str) -> Iterator[str]:
     """The files below the folder `top` that `from base import name` needs.
 
-    A package that has the name neither as a module nor in its own text gives it when it is first used: then
-    that of its modules counts which defines the name, and where none does, all of them.
+    A package that has the name neither as a module nor in its own text gives it when it is first used. Then
+    the module counts that its stub names, else that of its modules which defines the name, else all of them.
     """
     path, inner = _file_of(base, top), _file_of(f"{base}.{name}", top) if name else None
     package = path is not None and path.endswith("/__init__.py") and bool(name)
     if path is None or not package:
         yield from filter(None, [inner or path])
+        return
+    if name in _exported(path):
+        yield path
+        yield from _files_behind(_exported(path)[name], name, importer, top)
         return
     if inner and (path == importer or name not in _bound(path)):
         yield inner
@@ -214,6 +218,17 @@ def _files_behind(base: str, name: str, importer: str, top: str) -> Iterator[str
         files = sorted(p for p in folder.rglob("*.py") if p.name != "__init__.py")
         modules = [f"{path.rpartition('/')[0]}/{file.relative_to(folder).as_posix()}" for file in files]
         yield from [module for module in modules if name in _defined(module)] or modules
+
+
+@cache
+def _exported(path: str) -> dict[str, str]:
+    """Return name -> module of what the stub beside a package's `__init__.py` exports lazily."""
+    stub = (ROOT / path).with_suffix(".pyi")
+    if not stub.is_file():
+        return {}
+    package = place_of(path)[1]
+    nodes = ast.parse(stub.read_text(encoding=ENCODING)).body
+    return {name: module for node in nodes for module, name in _imported(node, package)}
 
 
 @cache

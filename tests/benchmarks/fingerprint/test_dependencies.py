@@ -58,7 +58,7 @@ def project(tmp_path, monkeypatch):
 
 
 def forget() -> None:
-    for name in ("_source", "_bound", "_defined", "_file_of", "_closure", "_data_files"):
+    for name in ("_source", "_exported", "_bound", "_defined", "_file_of", "_closure", "_data_files"):
         getattr(source, name).cache_clear()
 
 
@@ -110,6 +110,15 @@ def test_a_name_that_nobody_defines_makes_all_of_its_package_count(project):
 def test_what_lies_beside_the_source_counts_where_its_package_is_reached(project):
     assert set(data_of(code_of("benchmarks.methods.other"))) == {"snug/data/body.npz"}
     assert data_of(code_of("benchmarks.methods.one")) == {}
+
+
+def test_a_stub_says_which_module_a_lazy_name_comes_from(project):
+    """Also where a module of the package has the same name as what it exports."""
+    project("reference_sim/__init__.py", "__getattr__ = lazy\n")
+    project("reference_sim/__init__.pyi", "from .bend import stretch as stretch\n")
+    project("benchmarks/three.py", "from reference_sim import stretch\n")
+    files = {"benchmarks/three.py", "reference_sim/__init__.py", "reference_sim/bend.py"}
+    assert set(code_of("benchmarks.three")) == files
 
 
 def test_the_kernels_that_a_term_declares_count_with_it(project):
