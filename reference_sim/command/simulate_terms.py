@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from reference_sim.cloth import Cloth
 from reference_sim.command.simulate_inputs import InputError
-from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk import StretchStVK
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -64,7 +64,7 @@ def make_terms(cloth: Cloth, options: Namespace) -> list[Energy]:
 
 def _penalty(cloth: Cloth, options: Namespace) -> list[Energy]:
     from reference_sim.energies.contact_friction import ContactFriction
-    from reference_sim.energies.contact_penalty import ContactPenalty
+    from reference_sim.energies.contact_penalty.definition import ContactPenalty
 
     values = {
         name.removeprefix("contact_"): getattr(options, name)
