@@ -1,4 +1,4 @@
-"""The command `python -m snug.check`: what will and what will not work of garments from files."""
+"""Command `python -m snug.check`: tell whether garments from files can be used, and what mends them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from reference_sim.command.command_line import Parser, command
 from snug.garments.options import GarmentFile, add_garment_options, make_garment_file
 
 if TYPE_CHECKING:
-    from snug.body.parametric_body import Body
     from snug.garments.fit import DressForm
 
 PROGRAM = "snug.check"
@@ -31,18 +30,18 @@ exit status: 0 all can be used, 1 one cannot, 2 one cannot be read"""
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Make the parser of the command line."""
     parser = Parser(
         prog=f"python -m {PROGRAM}",
-        description="Read garments as benchmarks.run and snug.train do, and say in a short table what was "
-        "found: size, place on the body, rest shape, winding, openings, weights, and what mends them.",
+        description="Read garments as benchmarks.run and snug.train do, and print a short table: size, "
+        "place on the body, rest shape, winding, openings, weights, and what mends them.",
         epilog=EXAMPLES,
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ, PLY, VTK, STL or OFF")
-    parser.add_argument("--body", metavar="FILE", help="an own body (default: that of the package)")
+    parser.add_argument("--body", metavar="FILE", help="a body of your own (default: that of the package)")
     parser.add_argument(
         "--picture", type=Path, metavar="OUT.png",
-        help="a picture of the (last) garment on the body, what is below the skin in red",
+        help="a picture of the (last) garment on the body, triangles below the skin in red",
     )  # fmt: skip
     add_garment_options(parser)
     return parser
@@ -50,7 +49,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 @command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command and return its exit status."""
     options = make_parser().parse_args(arguments)
     files = [make_garment_file(path, options) for path in options.files]
     if options.picture and not options.picture.parent.is_dir():
@@ -58,31 +57,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from snug.body.smpl_files import read_body
     from snug.garments.fit import DressForm
 
-    body = read_body(options.body)
-    wearer = DressForm(body)
-    return max(_check(file, body, wearer, options.picture) for file in files)
+    form = DressForm(read_body(options.body))
+    return max(_check(file, form, options.picture) for file in files)
 
 
-def _check(file: GarmentFile, body: Body, wearer: DressForm, picture: Path | None) -> int:
-    """Print the table of one file; its exit status."""
+def _check(file: GarmentFile, form: DressForm, picture: Path | None) -> int:
+    """Print the findings about one file; return its exit status."""
     from snug.garments.garment import GarmentError
     from snug.garments.reading import examine_file
 
     try:
-        reading = examine_file(file, wearer, body)
+        examination = examine_file(file, form)
     except GarmentError as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return UNREADABLE
-    print(f"{file.path}: {'cannot be used' if reading.unusable else 'can be used'}")
-    for finding in reading.findings:
+    print(f"{file.path}: {'cannot be used' if examination.unusable else 'can be used'}")
+    for finding in examination.findings:
         remedy = f"; {finding.remedy}" if finding.remedy else ""
-        print(f"  {MARKS[finding.level]:<5}{finding.matter:<18}{finding.says}{remedy}")
-    if picture and reading.surface is not None and reading.distances is not None:
+        print(f"  {MARKS[finding.level]:<5}{finding.matter:<18}{finding.text}{remedy}")
+    if picture and examination.surface is not None and examination.distances is not None:
         from snug.garments.picture import draw
 
-        draw(picture, body, reading.surface, reading.distances)
+        draw(picture, form.body, examination.surface, examination.distances)
         print(f"  {picture}")
-    return UNUSABLE if reading.unusable else USABLE
+    return UNUSABLE if examination.unusable else USABLE
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A garment of a surface about the body and its cuts: meshed, its openings named, its weights borrowed."""
+"""Assembly of a garment: a surface about the body and its cuts, meshed, openings named, weights borrowed."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,11 +18,11 @@ from snug.garments.meshing import mesh_garment
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-SMOOTHED_OVER = 0.1  # [m] about the hip joints: from a shirt's own weights to smoothed ones
+SMOOTHED_OVER = 0.1  # [m] about the hip joints: from borrowed weights to smoothed ones
 
 
 def nearest_body_vertices(body: Body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
-    """Nearest template vertex (V,), of those that follow one of `bones`, to each position (V,3) [m]."""
+    """Return the nearest template vertex (V,) that follows one of `bones` to each position (V,3) [m]."""
     allowed = np.flatnonzero(skin_of(body, bones))
     return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
 
@@ -31,10 +31,20 @@ def assemble_garment(
     name: str, body: Body, vertices: int, cut: Mapping[str, float], surface: Mapping[str, Any],
     cuts: list[CutPlane], bones: Sequence[str], smoothing: int = 0,
 ) -> Garment:  # fmt: skip
-    """The garment of a surface, which build_surface makes, and its cuts; its weights come from those bones.
+    """Make the garment of a surface and its cuts.
 
-    smoothing: rounds over them at 1000 vertices, below the hip joints or, with a waistband, everywhere.
-    Raises GarmentError where no sound mesh comes out.
+    Args:
+        name: of the garment.
+        body: that it is made for.
+        vertices: number of vertices, met within 1 %.
+        cut: parameters of the tailoring, stored with the garment.
+        surface: arguments of build_surface.
+        cuts: where the surface ends.
+        bones: whose skin the garment borrows weights from.
+        smoothing: rounds over them at 1000 vertices, below the hip joints or, with a waistband, everywhere.
+
+    Raises:
+        GarmentError: no sound mesh comes out.
     """
     try:
         sheet = build_surface(body, **surface, clearance=cut["clearance"])
@@ -43,12 +53,12 @@ def assemble_garment(
         raise GarmentError(f"{name}: {error}") from error
     loops = _named_loops(positions, faces, cuts)
     nearest = nearest_body_vertices(body, positions, bones)
-    own = np.asarray(body.skinning_weights)[nearest]
-    weights = smooth_weights(own, faces, round(smoothing * vertices / 1000))
+    borrowed = np.asarray(body.skinning_weights)[nearest]
+    weights = smooth_weights(borrowed, faces, round(smoothing * vertices / 1000))
     if smoothing and "waist" not in loops:
         above = positions[:, 1] - joint_position(body, "left_hip")[1]
         share = np.clip(above / SMOOTHED_OVER + 0.5, 0.0, 1.0)[:, None]
-        weights = share * own + (1 - share) * weights
+        weights = share * borrowed + (1 - share) * weights
     return Garment(
         name=name,
         rest_positions=positions,
@@ -62,13 +72,13 @@ def assemble_garment(
 
 
 def _named_loops(points: Array, faces: Index, cuts: Sequence[CutPlane]) -> dict[str, Index]:
-    """The openings by the cuts that they lie on, each from its front-most vertex on."""
+    """Return the openings by the cuts that they lie on, each from its front-most vertex on."""
     openings = [cut for cut in cuts if cut.name != SEAM]
-    found = {}
+    named = {}
     for loop in boundary_loops(faces):
         left = points[loop] * [np.sign(points[loop, 0].mean()) or 1.0, 1.0, 1.0]
         off = [np.abs(cut.beyond(left)).mean() for cut in openings]
         cut = openings[int(np.argmin(off))]
         mirrored = cut.twin and points[loop, 0].mean() < 0
-        found[cut.twin if mirrored else cut.name] = np.roll(loop, -int(np.argmax(points[loop, 2])))
-    return {name: found[name] for cut in reversed(openings) for name in (cut.name, cut.twin) if name}
+        named[cut.twin if mirrored else cut.name] = np.roll(loop, -int(np.argmax(points[loop, 2])))
+    return {name: named[name] for cut in reversed(openings) for name in (cut.name, cut.twin) if name}

@@ -1,4 +1,4 @@
-"""Cuts through a garment's surface: where it ends, and the dense sheet with named outlines in between."""
+"""Cuts through a garment's surface: where it ends, and the dense sheet with named outlines between them."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -24,10 +24,15 @@ FLANK_ROOM = 0.005  # [m] between an armhole's cut and the flanks below it
 
 @dataclass(frozen=True)
 class CutPlane:
-    """A plane through `point` (3,) [m]: on the side of its `normal` (3,), what has |x| < reach [m] is cut.
+    """A plane that cuts the surface.
 
-    bend [1/m] curves it in z: bend (z - z0)^2 [m] beyond the plane, up to BEND_SPAN.
-    twin: what the mirrored opening is called, of an opening that the seam does not meet.
+    Attributes:
+        name: of the opening.
+        normal: (3,), towards the side that is cut away.
+        point: (3,) [m] of the plane.
+        reach: only |x| < reach [m] is cut.
+        bend: [1/m] curves it in z: bend (z - z0)^2 [m] beyond the plane, up to BEND_SPAN.
+        twin: name of the mirrored opening, for an opening that the seam does not meet.
     """
 
     name: str
@@ -38,23 +43,24 @@ class CutPlane:
     twin: str = ""
 
     def height(self, points: Array) -> Array:
-        """How far (N,) [m] points (N,3) are beyond the bent plane along its normal, whatever their x."""
+        """Return how far (N,) [m] points (N,3) are beyond the bent plane along its normal, at any x."""
         offset = points - self.point
         return offset @ np.asarray(self.normal) + self.bend * _saturated_square(offset[:, 2])
 
     def beyond(self, points: Array) -> Array:
-        """How far (N,) [m] points (N,3) are on the side that is cut away; a distance to first order."""
+        """Return how far (N,) [m] points (N,3) are on the side that is cut away, to first order."""
         return np.minimum(
             self.height(points) / np.linalg.norm(self._slope(points), axis=1),
             self.reach - np.abs(points[:, 0]),
         )
 
     def normals(self, points: Array) -> Array:
-        """Unit normals (N,3) at points (N,3) of the cut."""
+        """Return unit normals (N,3) at points (N,3) of the cut."""
         slope = self._slope(points)
         return slope / np.linalg.norm(slope, axis=1, keepdims=True)
 
     def _slope(self, points: Array) -> Array:
+        """Return the gradient (N,3) of `height`."""
         slope = np.tile(np.asarray(self.normal), (len(points), 1))
         offset = points[:, 2] - self.point[2]
         rising = np.minimum(np.abs(offset), np.maximum(2 * BEND_SPAN - np.abs(offset), 0.0))
@@ -63,7 +69,7 @@ class CutPlane:
 
 
 def _saturated_square(x: Array) -> Array:
-    """x^2 up to BEND_SPAN, constant from twice that on, with a continuous slope."""
+    """Return x^2 up to BEND_SPAN, constant from twice that on, with a continuous slope."""
     missing = np.maximum(2 * BEND_SPAN - np.abs(x), 0.0)
     return np.where(np.abs(x) <= BEND_SPAN, x**2, 2 * BEND_SPAN**2 - missing**2)
 
@@ -72,12 +78,12 @@ SEAM_CUT = CutPlane(SEAM, (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def level_cut(name: str, height: float, *, down: bool = False) -> CutPlane:
-    """What is above that height [m] is cut, or what is below it."""
+    """Return the cut of all above that height [m], or of all below it."""
     return CutPlane(name, (0.0, -1.0 if down else 1.0, 0.0), (0.0, height, 0.0))
 
 
 def neck_cut(body: Body, clearance: float) -> CutPlane:
-    """A crew neck: at the neck's joint on the shoulders, bent down in front and a little behind.
+    """Return a crew neck: at the neck's joint on the shoulders, bent down in front and a little behind.
 
     Lifted where shoulders stand so high that the cut would take them with it.
     """
@@ -92,8 +98,9 @@ def neck_cut(body: Body, clearance: float) -> CutPlane:
 def armhole_cut(
     body: Body, neck: CutPlane, *, strap: float, ease: float, clearance: float, hem: float, flare: float
 ) -> CutPlane:
-    """A plane from a strap's width [m] beside the neck to under the arm, leaning outwards so far that the
-    flanks stay, with what build_surface adds to them.
+    """Return a plane from a strap's width [m] beside the neck to under the arm.
+
+    It leans outwards so far that the flanks stay, with the ease and flare that build_surface adds to them.
     """
     shoulder, skin = joint_position(body, "left_shoulder"), body.template
     arm = skin[skin_of(body, ("left_shoulder",))]
@@ -113,7 +120,7 @@ def armhole_cut(
 
 
 def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, Index]:
-    """The surface as a dense mesh between the cuts: points (N,3) [m], faces (M,3), wound outward."""
+    """Return the surface between the cuts as a dense mesh: points (N,3) [m], faces (M,3), outward."""
     import pyvista
 
     grid = pyvista.ImageData(
@@ -142,17 +149,18 @@ def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, In
 
 
 def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tuple[str, Array]]]:
-    """Per boundary loop of a cut sheet its named curves (P,3) [m], end to end along the winding.
+    """Return the named curves (P,3) [m] of each boundary loop of a cut sheet, end to end along the winding.
 
-    Errors: ValueError where the surface is open but no cut was made.
+    Raises:
+        ValueError: the surface is open where no cut was made.
     """
-    found = []
+    loops = []
     for loop in boundary_loops(faces):
         distance = np.abs(np.stack([cut.beyond(points[loop]) for cut in cuts]))
         on = distance < 1e-5
         corners = np.flatnonzero(on.sum(axis=0) > 1)
         if len(corners) == 0:
-            found.append([(cuts[int(np.argmin(distance.sum(axis=1)))].name, points[loop])])
+            loops.append([(cuts[int(np.argmin(distance.sum(axis=1)))].name, points[loop])])
             continue
         loop, on = np.roll(loop, -corners[0]), np.roll(on, -corners[0], axis=1)
         # Clipping can leave a corner twice, some micrometres apart: the second of the two is dropped.
@@ -167,5 +175,5 @@ def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tup
             if len(middle) != 1 or end - begin < 2:
                 raise ValueError("the surface has an opening that no cut made")
             curves.append((cuts[int(middle[0])].name, points[ring[begin : end + 1]]))
-        found.append(curves)
-    return found
+        loops.append(curves)
+    return loops

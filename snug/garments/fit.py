@@ -1,7 +1,7 @@
-"""Does a garment lie on the body it was made for? Depth below the skin, and what a wrong place comes from.
+"""Fit of a garment on the body that it was made for: depth below the skin, and the cause of a wrong place.
 
-A unit or an axis mistaken, or a body that stands elsewhere, is found by trying what mends it: the other units
-and axes as they are, then with a shift. A shift is found from the distances s_i [m] of vertices to the skin
+A unit or an axis mistaken, or a body that stands elsewhere, is found by trying remedies: the other units and
+axes as they are, then with a shift. A shift is found from the distances s_i [m] of vertices to the skin
 (negative below it) and the skin's normals n_i: one thickness of air, s_i + n_i.d = m for all i, by least
 squares with the far ones held back (Huber), begun from many places. How high a wide skirt sits is a guess.
 """
@@ -25,25 +25,27 @@ DEEP_SHARE = 0.05  # of the vertices that may be so deep
 DEEPEST = 0.04  # [m], half the thickness of an arm
 NEAR = 0.05  # [m] from the skin: whatever is worn has a tenth of its vertices there
 NEAR_SHARE = 0.1
-SIZES = 0.1, 1.2  # largest extent of a garment [heights of the body]
+SIZE_RANGE = 0.1, 1.2  # largest extent of a garment [heights of the body]
 ENDS = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_ankle", "right_ankle",
         "left_foot", "right_foot")  # fmt: skip
 # A wide dress has a cost of .2, a shirt around the knees of .5 and a tenth of that in its place.
 DOUBTFUL, BETTER = 0.3, 0.4
-SAMPLES = 250  # vertices that a shift is sought with
-STEPS = 20
+SHIFT_SAMPLES = 250  # vertices that a shift is sought with
+SHIFT_STEPS = 20
 CLOSE = 0.2  # share of the vertices that are closer than the thickness m: what a garment hangs by
 HUBER, FAR = 0.01, 0.2  # [m] differences from it that count fully, and at most
-LONGEST = 0.1  # [m] step
+MAX_STEP = 0.1  # [m] of a shift, in one of the SHIFT_STEPS
 AIR = 0.003  # [m] between skin and garment after a shift
 
 
 @dataclass(frozen=True)
 class Fit:
-    """How a garment lies on the unposed body.
+    """Place of a garment on the unposed body.
 
-    distances: (V,) [m] of its vertices to the skin, negative below it. size: its largest extent [heights of
-    the body]. at_ends: share of the vertices whose nearest skin is of head, hands or feet.
+    Attributes:
+        distances: (V,) [m] of its vertices to the skin, negative below it.
+        size: its largest extent [heights of the body].
+        at_ends: share of the vertices whose nearest skin is of head, hands or feet.
     """
 
     distances: Array
@@ -57,13 +59,13 @@ class Fit:
 
     @property
     def depth(self) -> float:
-        """[m] of the deepest vertex, 0 where none is below the skin."""
+        """Depth [m] of the deepest vertex, 0 where none is below the skin."""
         return max(0.0, -float(self.distances.min()))
 
     @property
     def problem(self) -> str:
-        """Why nothing can be simulated from here, or empty."""
-        if not SIZES[0] < self.size < SIZES[1]:
+        """Reason why nothing can be simulated from here, or empty."""
+        if not SIZE_RANGE[0] < self.size < SIZE_RANGE[1]:
             return f"its largest extent is {self.size:.3g} times the body's height"
         if np.mean(np.abs(self.distances) < NEAR) < NEAR_SHARE:
             return f"it lies {1e3 * np.median(np.abs(self.distances)):.0f} mm from the body"
@@ -82,7 +84,7 @@ class Fit:
 
 
 def pose_in_file(body: Body) -> Array:
-    """The pose (24,3) [rad] that a body has in its file, in which garments were made for it."""
+    """Return the pose (24,3) [rad] that a body has in its file, in which garments were made for it."""
     pose = np.zeros((len(body.joint_names), 3))
     if body.arms_lowered is None:
         return pose
@@ -92,7 +94,7 @@ def pose_in_file(body: Body) -> Array:
 
 
 def body_as_in_file(body: Body) -> Body:
-    """The mean body with template and joints as its file has them."""
+    """Return the mean body with template and joints as its file has them."""
     if body.arms_lowered is None:
         return body
     pose, here = pose_in_file(body)[None], np.zeros((1, 3))
@@ -102,10 +104,17 @@ def body_as_in_file(body: Body) -> Body:
 
 
 class DressForm:
-    """The mean body, as its file has it, as something to measure distances to. body: that one."""
+    """The mean body as its file has it, to measure distances to.
+
+    Attributes:
+        body: in T pose.
+        posed: the same in the pose of its file.
+        skin: the surface of `posed`.
+    """
 
     def __init__(self, body: Body) -> None:
-        self.body = body = body_as_in_file(body)
+        self.body, self.posed = body, body_as_in_file(body)
+        body = self.posed
         self.height = body.height
         self.low, self.high = body.template.min(axis=0), body.template.max(axis=0)
         self.skin = Obstacle(body.template, body.faces)
@@ -113,7 +122,7 @@ class DressForm:
         self.ends: NDArray[np.bool_] = at_ends.sum(axis=1) == 3  # faces (F,)
 
     def fit(self, positions: Array) -> Fit:
-        """How positions (V,3) [m] lie on it."""
+        """Return how positions (V,3) [m] lie on it."""
         return self._fit(positions, self.skin.signed_distance(positions, 0))
 
     def _fit(self, positions: Array, distances: Array) -> Fit:
@@ -122,46 +131,46 @@ class DressForm:
         return Fit(distances, size, float(self.ends[faces].mean()))
 
     def problem(self, positions: Array, fit: Fit) -> str:
-        """Why a garment that lies so cannot be simulated, or empty."""
-        if fit.problem or fit.cost < DOUBTFUL or (found := self.shift(positions)) is None:
+        """Return why a garment that lies so cannot be simulated, or empty."""
+        if fit.problem or fit.cost < DOUBTFUL or (shift := self.shift(positions)) is None:
             return fit.problem
-        way = float(np.linalg.norm(found))
-        return f"it fits far better {way:.2f} m away" * (self.fit(positions + found).cost < BETTER * fit.cost)
+        better = self.fit(positions + shift).cost < BETTER * fit.cost
+        return f"it fits far better {np.linalg.norm(shift):.2f} m away" * better
 
     def shift(self, positions: Array) -> Array | None:
-        """The translation (3,) [m] that brings a garment (V,3) [m] onto the body, or None."""
-        samples = positions[:: max(1, len(positions) // SAMPLES)]
-        settled = [self._settled(samples, start) for start in self._starts(samples)]
-        costs = [self.fit(samples + shift).cost for shift in settled]
+        """Return the translation (3,) [m] that brings a garment (V,3) [m] onto the body, or None."""
+        samples = positions[:: max(1, len(positions) // SHIFT_SAMPLES)]
+        shifts = [self._settle(samples, start) for start in self._starts(samples)]
+        costs = [self.fit(samples + shift).cost for shift in shifts]
         # To the millimetre, as somebody will type it.
-        found = np.round(self._pushed_out(samples, settled[int(np.argmin(costs))]), 3)
-        return None if self.fit(positions + found).problem else found
+        shift = np.round(self._push_out(samples, shifts[int(np.argmin(costs))]), 3)
+        return None if self.fit(positions + shift).problem else shift
 
     def _starts(self, points: Array) -> list[Array]:
-        """As it lies, and over the body's middle at several heights."""
+        """Return shifts to begin from: none, and over the middle of the body at several heights."""
         centre = 0.5 * (self.low + self.high) - 0.5 * (points.min(axis=0) + points.max(axis=0))
         heights = np.linspace(-0.4, 0.4, 17) * self.height
         return [np.zeros(3), *(centre + np.array([0.0, height, 0.0]) for height in heights)]
 
-    def _settled(self, points: Array, shift: Array) -> Array:
-        """Where the least squares end from there."""
-        for _ in range(STEPS):
+    def _settle(self, points: Array, shift: Array) -> Array:
+        """Return the shift (3,) [m] that least squares reach from `shift`."""
+        for _ in range(SHIFT_STEPS):
             distance, normals = self._distances(points + shift)
             system = np.column_stack([normals, -np.ones(len(points))])
             off = distance - np.quantile(distance, CLOSE)
             weight = np.sqrt(np.minimum(1.0, HUBER / np.maximum(np.abs(off), 1e-12)))
             step = np.linalg.lstsq(weight[:, None] * system, -weight * distance, rcond=None)[0][:3]
-            shift = shift + step * min(1.0, LONGEST / max(float(np.linalg.norm(step)), 1e-12))
+            shift = shift + step * min(1.0, MAX_STEP / max(float(np.linalg.norm(step)), 1e-12))
         return shift
 
-    def _pushed_out(self, points: Array, shift: Array) -> Array:
-        """From there the shift by which what is below the skin comes out of it."""
-        for _ in range(STEPS):
+    def _push_out(self, points: Array, shift: Array) -> Array:
+        """Refine `shift` (3,) [m] until no vertex penetrates the body."""
+        for _ in range(SHIFT_STEPS):
             distance, normals = self._distances(points + shift)
             inside = distance < AIR
             if not inside.any():
                 break
-            # Pulled back a little, so that what is free stays near.
+            # Pulled back a little, so that vertices outside of the skin stay near.
             system = normals[inside].T @ normals[inside] + 0.02 * len(points) * np.eye(3)
             shift = shift + np.linalg.solve(system, normals[inside].T @ (AIR - distance[inside]))
         return shift
@@ -173,28 +182,28 @@ class DressForm:
 
 @dataclass(frozen=True)
 class Placement:
-    """What would bring a garment onto the body: units and axis of its file, and a shift (3,) [m]."""
+    """Units and axis of a file, and a shift (3,) [m], that bring a garment onto the body."""
 
     units: str
     up: str
     shift: tuple[float, float, float]
 
 
-def find_placement(wearer: DressForm, raw: Array, units: str, up: str, shift: Array) -> Placement | None:
-    """What to say instead of units, up and shift of a file's vertices (V,3), so that they lie on the body.
+def find_placement(form: DressForm, raw: Array, units: str, up: str, shift: Array) -> Placement | None:
+    """Return units, up and shift with which a file's vertices (V,3) lie on the body, or None.
 
-    First other units and axes alone, then a shift, then both. None where nothing of it helps.
+    First other units and axes alone, then a shift, then both.
     """
     choices = sorted(
         ((u, a) for u in METRES for a in UP_AXES), key=lambda choice: (choice[0] != units) + (choice[1] != up)
     )
     placed = {choice: to_metres_y_up(raw, units=choice[0], up=choice[1]) for choice in choices}
-    fits = {choice: wearer.fit(positions + shift) for choice, positions in placed.items()}
+    fits = {choice: form.fit(positions + shift) for choice, positions in placed.items()}
     if worn := [choice for choice, fit in fits.items() if not fit.problem and fit.cost < DOUBTFUL]:
         return Placement(*min(worn, key=lambda choice: fits[choice].cost), _three(shift))
     for (u, a), positions in placed.items():
-        if SIZES[0] < fits[u, a].size < SIZES[1] and (found := wearer.shift(positions)) is not None:
-            return Placement(u, a, _three(found))
+        if SIZE_RANGE[0] < fits[u, a].size < SIZE_RANGE[1] and (moved := form.shift(positions)) is not None:
+            return Placement(u, a, _three(moved))
     return None
 
 

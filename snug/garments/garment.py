@@ -1,4 +1,4 @@
-"""Garments on a body: triangles, and per vertex the body vertex and skinning weights it borrows.
+"""Garment on a body: triangles, and per vertex the body vertex and skinning weights it borrows.
 
 The T-pose shape of a garment is its rest shape, unless it has a UV chart: areas, Dm^-1, masses and hinges all
 come from one of the two.
@@ -19,25 +19,34 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 SHAPE_SMOOTHING = 10  # rounds over a shape's displacement: nearest vertices jump from leg to leg
+# Rounds over the weights at 1000 vertices of cloth that spans both thighs: between them it follows neither.
+SKIRT_SMOOTHING = 60
 
 
 class GarmentError(ValueError):
-    """A garment that cannot be tailored as asked; the message names the parameter and its range."""
+    """A garment that cannot be made or read as asked; the message names the cause and the remedy."""
 
 
 @dataclass(frozen=True, eq=False)
 class Garment:
     """A garment on the unposed body. Arrays are not to be written to.
 
-    rest_positions: (V,3) [m]. faces: (F,3), outward. body_vertices: (V,) nearest body vertex among those it
-    may follow. skinning_weights: (V,24), that vertex's own, smoothed where it hangs between the legs; rows
-    sum to one. authored_weights: whether somebody made those weights for this garment, so that no recipe
-    smooths them. rest_uv: (F,3,2) [m] of the faces' corners, the flat rest state of a garment that has one;
-    else rest_positions is its rest shape too.
-    loops: name ("neck", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "hem", "waist",
-    "left_leg", "right_leg") -> boundary vertices in order along the faces' winding, from the front-most
-    vertex on. pins: (P,), ascending, what the body carries: a waistband, since contact without friction does
-    not hold it. parameters: what it was tailored with.
+    Attributes:
+        name: of the template or file.
+        rest_positions: (V,3) [m].
+        faces: (F,3), outward.
+        body_vertices: (V,), the nearest body vertex among those it may follow.
+        skinning_weights: (V,24), those of that vertex, smoothed where cloth hangs between the legs; rows sum
+            to one.
+        loops: name ("neck", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "hem", "waist",
+            "left_leg", "right_leg") -> boundary vertices in order along the faces' winding, front-most first.
+        pins: (P,), ascending: vertices that the body carries, of a waistband, since contact without friction
+            does not hold it.
+        parameters: of the tailoring.
+        material: of the cloth.
+        rest_uv: (F,3,2) [m] of the faces' corners, the flat rest state of a garment that has one; else
+            rest_positions is its rest shape too.
+        authored_weights: whether somebody made the weights for this garment, so that no recipe smooths them.
     """
 
     name: str
@@ -53,7 +62,7 @@ class Garment:
     authored_weights: bool = False
 
     def cloth(self, material: Material | None = None) -> Cloth:
-        """The one rest state of simulator, loss and metrics, with the garment's own material or another.
+        """Return the rest state of simulator, loss and metrics, with the garment's own material or another.
 
         Raises MeshError for a mesh that cannot be simulated.
         """
@@ -71,8 +80,13 @@ class Garment:
     def pin_positions(
         self, body: Body, poses: Array, translations: Array, betas: ArrayLike | None = None
     ) -> Array:
-        """Where the pins are (T,P,3) [m] on the body of that shape in poses (T,24,3) [rad] at translations
-        (T,3) [m].
+        """Return the positions (T,P,3) [m] of the pins on the posed body.
+
+        Args:
+            body: that wears the garment.
+            poses: (T,24,3) [rad].
+            translations: (T,3) [m].
+            betas: shape coefficients of the body.
         """
         if not len(self.pins):
             return np.empty((len(poses), 0, 3))  # and torch, which poses the joints, is not loaded
@@ -83,27 +97,33 @@ class Garment:
         return turned + blended[..., 3]
 
     def rest_for(self, body: Body, betas: ArrayLike | None) -> Array:
-        """Rest positions (V,3) [m] on the body of shape `betas`: each vertex moves as the skin below it does.
+        """Return rest positions (V,3) [m] on the body of shape `betas`: vertices move as the skin below them.
 
         The displacement of the nearest body vertex, smoothed over the garment.
         """
         if betas is None:
             return self.rest_positions.copy()
         displacement = (body.shaped(betas) - body.template)[self.body_vertices]
-        return self.rest_positions + _averaged(displacement, self.faces, SHAPE_SMOOTHING)
+        return self.rest_positions + _average(displacement, self.faces, SHAPE_SMOOTHING)
 
 
 def smooth_weights(weights: ArrayLike, faces: Index, iterations: int) -> Array:
-    """Skinning weights (V,24) after `iterations` rounds of averaging each vertex with its neighbours' mean.
+    """Average skinning weights (V,24) `iterations` times, each vertex with its neighbours' mean.
 
     Half the vertex, half the mean (uniform Laplacian): rows keep their sum and stay non-negative.
+
+    Raises:
+        GarmentError: fewer than 0 iterations.
+
+    >>> smooth_weights([[1.0], [0.0], [0.0]], np.array([[0, 1, 2]]), 1).ravel().tolist()
+    [0.5, 0.25, 0.25]
     """
     if iterations < 0:
         raise GarmentError(f"iterations={iterations}: smoothing needs 0 rounds or more")
-    return _averaged(np.asarray(weights, dtype=np.float64), faces, iterations)
+    return _average(np.asarray(weights, dtype=np.float64), faces, iterations)
 
 
-def _averaged(values: Array, faces: Index, rounds: int) -> Array:
+def _average(values: Array, faces: Index, rounds: int) -> Array:
     neighbours = _adjacency(faces, len(values))
     degree = np.asarray(neighbours.sum(axis=1)).reshape(-1, 1)
     for _ in range(rounds):

@@ -1,4 +1,4 @@
-"""The implicit surface a garment is cut from: a smooth solid around the body, as a signed field on a grid.
+"""Implicit surface that a garment is cut from: a smooth solid around the body, as a signed field on a grid.
 
 A shirt that followed the skin would be pressed into the waist and between the legs, where cloth never goes.
 So the solid is a union of three solids, each grown by its own distance:
@@ -8,8 +8,8 @@ So the solid is a union of three solids, each grown by its own distance:
   cloth hangs from its widest support; a flare widens it further, from the waist to the hem;
 - the upper arm, one convex section per distance from the shoulder.
 
-A skirt is the same without sleeves, hanging from its waistband and widening from the hips on. Of trousers the
-torso ends at the crotch and a leg begins, one convex section per height.
+A skirt is the same without sleeves, hanging from its waistband and widening from the hips on. For trousers
+the torso ends at the crotch and a leg begins, one convex section per height.
 
 Convex sections grown by d have 2 pi d more girth (Steiner's formula), so ease of girth e is a growth of
 e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. Only the half x >= 0 is built;
@@ -34,14 +34,18 @@ DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
 CROTCH_FILLET = 0.03  # [m] the same between torso and leg
 TAPER = 0.4  # how steeply trousers may narrow from the seat to the thighs
-MOST_CELLS = 4e6  # of the grid: a person takes a tenth
+MAX_CELLS = 4e6  # of the grid: a person takes a tenth
 
 
 @dataclass(frozen=True)
 class ImplicitSurface:
     """Signed field, negative inside, on a grid over x >= 0 (three more planes beyond, mirrored).
 
-    origin: (3,) [m] of the first node; spacing [m]; values: (nx, ny, nz) [m], close to a distance near zero.
+    Attributes:
+        origin: (3,) [m] of the first node.
+        spacing: [m] of the nodes.
+        values: (nx, ny, nz) [m], close to a distance near zero.
+        coefficients: of a cubic spline through `values`.
     """
 
     origin: Array
@@ -50,19 +54,19 @@ class ImplicitSurface:
     coefficients: Array  # cubic spline coefficients of `values`
 
     def field(self, points: Array) -> Array:
-        """Field (N,) [m] at points (N,3) [m], cubic in between the nodes."""
+        """Return the field (N,) [m] at points (N,3) [m], cubic between the nodes."""
         nodes = ((points - self.origin) / self.spacing).T
         return ndimage.map_coordinates(self.coefficients, nodes, order=3, prefilter=False, mode="nearest")
 
     def gradient(self, points: Array) -> Array:
-        """Gradient (N,3) of the field at points (N,3), by central differences of half a cell."""
+        """Return the gradient (N,3) of the field at points (N,3), by central differences of half a cell."""
         step = 0.5 * self.spacing
         shifts = step * np.eye(3)
         columns = [self.field(points + s) - self.field(points - s) for s in shifts]
         return np.stack(columns, axis=1) / (2 * step)
 
     def project(self, points: Array, steps: int = 2) -> Array:
-        """Points (N,3) moved onto the zero level along the gradient."""
+        """Move points (N,3) onto the zero level along the gradient."""
         for _ in range(steps):
             slope = self.gradient(points)
             length2 = np.maximum(np.sum(slope * slope, axis=1), 0.05)
@@ -71,13 +75,13 @@ class ImplicitSurface:
 
 
 def _smooth_minimum(a: Array, b: Array, reach: float) -> Array:
-    """Minimum with a polynomial blend where |a - b| < reach; never above the sharp minimum."""
+    """Return the minimum, blended where |a - b| < reach by a polynomial; never above the sharp one."""
     overlap = np.maximum(reach - np.abs(a - b), 0.0)
     return np.minimum(a, b) - overlap * overlap / (4.0 * reach)
 
 
 def _section_support(points: Array, edges: Index, levels: Array, axis: int, normals: Array) -> Array:
-    """Support function (L,K) of the body's sections at `levels` along `axis`; -inf where there is none."""
+    """Return the support function (L,K) of the body's sections at `levels` along `axis`; -inf without one."""
     others = [i for i in range(3) if i != axis]
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     support = np.full((len(levels), len(normals)), -np.inf)
@@ -92,21 +96,21 @@ def _section_support(points: Array, edges: Index, levels: Array, axis: int, norm
     return support
 
 
-def _filled(support: Array) -> Array:
-    """Levels without a section take the nearest level's that has one."""
+def _fill_levels(support: Array) -> Array:
+    """Give levels without a section the section of the nearest level that has one."""
     known = np.flatnonzero(np.isfinite(support[:, 0]))
     nearest = known[np.abs(np.arange(len(support))[:, None] - known).argmin(axis=1)]
     return support[nearest]
 
 
 def _ramp(value: Array, start: float, end: float) -> Array:
-    """0 at `start`, 1 at `end`, smooth in between (smoothstep)."""
+    """Return 0 at `start`, 1 at `end`, smooth between them (smoothstep)."""
     t = np.clip((value - start) / (end - start), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
 def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
-    """Distance (L,P) to convex sections `support` (L,K) grown by `growth` (L,), at in-plane points (P,2)."""
+    """Return the distance (L,P) of points (P,2) to sections `support` (L,K) grown by `growth` (L,)."""
     height = plane @ normals.T  # (P,K)
     return np.stack([(height - row).max(axis=1) - grown for row, grown in zip(support, growth, strict=True)])
 
@@ -115,12 +119,13 @@ def _torso(
     body: Body, edges: Index, points: Array, nodes: Sequence[Array], levels: tuple[float, float, float],
     ease: float, flare: float, clearance: float, normals: Array, narrowing: float,
 ) -> Array:  # fmt: skip
-    """Field (nx,ny,nz) of hanging sections; levels: where they hang from, have their ease, and end [m].
+    """Return the field (nx,ny,nz) of hanging sections.
 
-    narrowing: how much [m/m] they may come nearer again on the way down.
+    levels: heights [m] where they hang from, have their ease, and end. narrowing: how much [m/m] they may
+    come nearer again on the way down.
     """
     x, y, z = nodes
-    support = _filled(_section_support(points, edges, y, 1, normals))
+    support = _fill_levels(_section_support(points, edges, y, 1, normals))
     mirrored = (DIRECTIONS // 2 - np.arange(DIRECTIONS)) % DIRECTIONS
     support = np.maximum(
         support, support[:, mirrored]
@@ -142,10 +147,10 @@ def _sleeve(
     body: Body, edges: Index, points: Array, nodes: Sequence[Array], cuff: float, ease: float,
     clearance: float, normals: Array,
 ) -> Array:  # fmt: skip
-    """Field (nx,ny,nz) of the left sleeve."""
+    """Return the field (nx,ny,nz) of the left sleeve."""
     x, y, z = nodes
     shoulder = joint_position(body, "left_shoulder")[0]
-    support = _filled(_section_support(points, edges, x, 0, normals))
+    support = _fill_levels(_section_support(points, edges, x, 0, normals))
     support = ndimage.gaussian_filter1d(support, 0.02 / SPACING, axis=0, mode="nearest")
     growth = clearance + ease / (2 * np.pi) * _ramp(x, shoulder, cuff)
     plane = np.stack(np.meshgrid(y, z, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -157,10 +162,10 @@ def _leg(
     body: Body, edges: Index, points: Array, nodes: Sequence[Array], crotch: float, ease: float,
     clearance: float, normals: Array,
 ) -> Array:  # fmt: skip
-    """Field (nx,ny,nz) of the left leg of trousers."""
+    """Return the field (nx,ny,nz) of the left leg of trousers."""
     x, y, z = nodes
     hip, knee = joint_position(body, "left_hip")[1], joint_position(body, "left_knee")[1]
-    support = _filled(_section_support(points, edges, y, 1, normals))
+    support = _fill_levels(_section_support(points, edges, y, 1, normals))
     support = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
     # Legs that part once do not meet again above: up from the knee the inner side only comes nearer.
     above, inner = np.flatnonzero(y >= knee), normals[:, 0] < 0
@@ -172,13 +177,13 @@ def _leg(
 
 
 def legs_part(body: Body, room: float) -> float:
-    """Height [m] below which trousers have two legs: `room` [m] between the left thigh's skin and x = 0."""
+    """Return the height [m] below which trousers have two legs: `room` [m] from the thigh's skin to x = 0."""
     points = np.asarray(body.template, dtype=np.float64)
     edges = _edges(body, LEG_BONES)
     levels = np.arange(
         joint_position(body, "left_knee")[1], joint_position(body, "left_hip")[1], 0.5 * SPACING
     )
-    inner = _filled(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
+    inner = _fill_levels(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
     near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
     middle = skin_of(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, SPACING))
     crotch = points[middle, 1].min(initial=levels[-1]) - room  # of legs that are apart all the way up
@@ -186,24 +191,35 @@ def legs_part(body: Body, room: float) -> float:
 
 
 def _edges(body: Body, bones: Sequence[str]) -> Index:
-    """Edges (E,2) of the body between vertices that follow `bones`. Errors: ValueError for none."""
+    """Return the edges (E,2) of the body between vertices that follow `bones`. Raises ValueError."""
     faces = np.asarray(body.faces, dtype=np.int64)
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    found = edges[skin_of(body, bones)[edges].all(axis=1)]
-    if not len(found):
+    edges_of_bones = edges[skin_of(body, bones)[edges].all(axis=1)]
+    if not len(edges_of_bones):
         raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")
-    return found
+    return edges_of_bones
 
 
 def build_surface(
     body: Body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
     flare: float = 0.0, waistband: bool = False, legs: bool = False,
 ) -> ImplicitSurface:  # fmt: skip
-    """The surface between heights `hem` and `top`, of a garment with sleeves out to x = `cuff` (all [m]).
+    """Build the surface of a garment between two heights.
 
-    `ease` [m] is girth added to waist and sleeves beyond a shirt that lies `clearance` [m] off the skin, or
-    to hips and legs of what hangs from a `waistband`; `flare` [m] is how much further the hem stands off than
-    that place, all around. legs: as trousers. Raises ValueError for a body too large for the grid.
+    Args:
+        body: that wears it.
+        hem: lower height [m].
+        top: upper height [m].
+        ease: girth [m] added to waist and sleeves beyond a shirt that lies `clearance` off the skin, or, with
+            a waistband, to hips and legs.
+        clearance: [m] off the skin.
+        cuff: x [m] where sleeves end, None without sleeves.
+        flare: how much further [m] the hem stands off than waist or hips, all around.
+        waistband: whether it hangs from the hips instead of the shoulders.
+        legs: whether it is a pair of trousers.
+
+    Raises:
+        ValueError: a body too large for the grid.
     """
     import igl
 
@@ -220,7 +236,7 @@ def build_surface(
     low = np.array([0.0, hem - margin, depth.min() - reach])
     high = np.array([side, top + margin, depth.max() + reach])
     counts = np.ceil((high - low) / SPACING).astype(int) + 1
-    if not 0 < np.prod(counts.astype(float)) <= MOST_CELLS:
+    if not 0 < np.prod(counts.astype(float)) <= MAX_CELLS:
         size = " x ".join(f"{length:.3g}" for length in high - low)
         raise ValueError(f"half of it would be {size} m: give a body in metres, with its joints inside")
     nodes = [low[i] + SPACING * np.arange(counts[i]) for i in range(3)]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from snug.body.parametric_body import Body
 
 TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
-# What a shirt may borrow weights from: never hands, head or shins, even where they come near.
+# Joints whose weights a shirt may borrow: never hands, head or shins, even where they come near.
 SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
 ARM_BONES = ("left_shoulder", "left_elbow")
 LEG_BONES = ("left_hip", "left_knee")
@@ -16,11 +16,11 @@ CROTCH_BONES = ("pelvis", "left_hip", "right_hip")
 
 
 def skin_of(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
-    """Which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
+    """Return which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
     wanted = [body.joint_names.index(name) for name in names]
     return np.isin(np.argmax(body.skinning_weights, axis=1), wanted)
 
 
 def joint_position(body: Body, name: str) -> NDArray[np.float64]:
-    """Rest position (3,) [m] of the joint called `name`."""
+    """Return the rest position (3,) [m] of the joint called `name`."""
     return np.asarray(body.joint_template, dtype=np.float64)[body.joint_names.index(name)]

@@ -1,4 +1,4 @@
-"""From a surface and its cuts to one sound mesh: half remeshed, kept off the body, mirrored at the seam."""
+"""Mesh of a garment from its surface and cuts: half remeshed, kept off the body, mirrored at the seam."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ SMALLEST_ANGLE = 15.0  # [degrees]
 def mesh_garment(
     body: Body, surface: ImplicitSurface, cuts: list[CutPlane], vertices: int, clearance: float
 ) -> tuple[Array, Index]:
-    """The whole garment, positions (V,3) [m] and faces (F,3), of `vertices` vertices within 1 %.
+    """Return the whole garment, positions (V,3) [m] and faces (F,3), of `vertices` vertices within 1 %.
 
     clearance: least distance [m] from the skin. Raises ValueError where no sound mesh comes out.
     """
@@ -28,12 +28,12 @@ def mesh_garment(
         curves = outlines(sheet, sheet_faces, cuts)
     except ValueError as error:
         raise ValueError(f"nothing fits this body: {error}") from error
-    found = sorted(name for loop in curves for name, _ in loop)
-    wanted = [cut.name for cut in cuts]  # the seam runs down front and back; of trousers the two are one
-    if found not in (sorted([SEAM, *wanted]), sorted(wanted)) or [SEAM] in [
+    names = sorted(name for loop in curves for name, _ in loop)
+    expected = [cut.name for cut in cuts]  # the seam runs down front and back; of trousers the two are one
+    if names not in (sorted([SEAM, *expected]), sorted(expected)) or [SEAM] in [
         [n for n, _ in c] for c in curves
     ]:
-        raise ValueError(f"nothing fits this body: the cuts of its surface are {', '.join(found)}")
+        raise ValueError(f"nothing fits this body: the cuts of its surface are {', '.join(names)}")
     rims = [[curve for _, curve in loop] for loop in curves]
     # An opening that the seam does not meet has a twin on the other side.
     openings = sum(2 if len(loop) == 1 else sum(name != SEAM for name, _ in loop) for loop in curves)
@@ -49,26 +49,26 @@ def mesh_garment(
             if abs(count - vertices) > max(1, vertices // 100):
                 half += (vertices - count) // 2
                 raise ValueError(f"{count} vertices instead of {vertices}")
-            whole, whole_faces = _mirrored(_kept_off(body, points, faces, cuts, clearance), faces)
-            _demand_even(whole, whole_faces, openings)
+            whole, whole_faces = _mirror(_keep_off(body, points, faces, cuts, clearance), faces)
+            _check_even(whole, whole_faces, openings)
             return whole, whole_faces
         except ValueError as error:
             problem = str(error)
     raise ValueError(f"vertices={vertices}: no sound mesh of this size ({problem}); ask for more")
 
 
-def _mirrored(points: Array, faces: Index) -> tuple[Array, Index]:
-    """Both halves, welded at x = 0."""
+def _mirror(points: Array, faces: Index) -> tuple[Array, Index]:
+    """Return both halves, welded at x = 0."""
     seam = points[:, 0] == 0
     twin = np.where(seam, np.arange(len(points)), len(points) + np.cumsum(~seam) - 1)
     whole = np.concatenate([points, points[~seam] * [-1.0, 1.0, 1.0]])
     return whole, np.concatenate([faces, twin[faces][:, ::-1]])
 
 
-def _kept_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], clearance: float) -> Array:
-    """Points pushed outward, along their cuts, until no sample is nearer to the skin than `clearance`.
+def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], clearance: float) -> Array:
+    """Push points outward, along their cuts, until no sample is nearer to the skin than `clearance` [m].
 
-    Errors: ValueError if it cannot be met.
+    Raises ValueError if it cannot be met.
     """
     import igl
 
@@ -112,8 +112,8 @@ def _kept_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], cle
     raise ValueError(f"{1000 * lack.max():.2f} mm of clearance missing")
 
 
-def _demand_even(points: Array, faces: Index, wanted: int) -> None:
-    """Errors: ValueError for a triangle too small, large or sharp, and for more or fewer openings."""
+def _check_even(points: Array, faces: Index, wanted: int) -> None:
+    """Raise ValueError for a triangle too small, large or sharp, and for another number of openings."""
     areas = triangle_areas(points, faces)
     ratio = areas / areas.mean()
     if ratio.min() < AREA_BOUNDS[0] or ratio.max() > AREA_BOUNDS[1]:

@@ -17,37 +17,40 @@ MIDDLE = 0.5  # share of a hip joint's distance from the middle, beyond which an
 
 
 def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
-    """Name -> boundary vertices in order, from the front-most on, of a garment (V,3) [m] on the unposed body.
+    """Return the boundary vertices of each opening by its name, in order, front-most first.
 
-    An opening beside the middle is a sleeve above the hips, or far out, and a leg else; a sleeve that ends
-    near the shoulder's joint is an armhole. In the middle the highest is the neck, above half the way from
-    pelvis to neck, or else the waist, and the lowest the hem; one that is alone there is the hem, unless
-    there are legs. The lowest of all is called hem too where no other is, but for two legs. Others are
-    opening_1 and so on. Raises ValueError where loops touch.
+    The garment (V,3) [m], (F,3) lies on the unposed body. An opening beside the middle is a sleeve above the
+    hips, or far out, and a leg else; a sleeve that ends near the shoulder's joint is an armhole. In the
+    middle the highest is the neck, above half the way from pelvis to neck, or else the waist, and the lowest
+    the hem; one that is alone there is the hem, unless there are legs. The lowest of all is called hem too
+    where no other is, but for two legs. Others are opening_1 and so on.
+
+    Raises:
+        ValueError: loops touch.
     """
     loops = [np.roll(loop, -int(np.argmax(positions[loop, 2]))) for loop in boundary_loops(faces)]
     if not loops:
         return {}
     centres = [positions[loop].mean(axis=0) for loop in loops]
-    found: dict[str, Index] = {}
+    openings: dict[str, Index] = {}
     # The longest loop comes first: of two with one claim it has the name, a slit or a buttonhole has not.
     middle = []
     for loop, centre in zip(loops, centres):
-        side = _beside(body, centre)
+        side = _name_beside(body, centre)
         if not side:
             middle.append((loop, centre))
-        elif side not in found:
-            found[side] = loop
-    found |= _in_the_middle(body, middle, legs="left_leg" in found or "right_leg" in found)
-    if not {"left_leg", "right_leg"} <= found.keys():
-        found.setdefault("hem", loops[int(np.argmin([centre[1] for centre in centres]))])
-    named = {int(loop[0]) for loop in found.values()}
-    rest = (loop for loop in loops if int(loop[0]) not in named)
-    return found | {f"opening_{number}": loop for number, loop in enumerate(rest, start=1)}
+        elif side not in openings:
+            openings[side] = loop
+    openings |= _name_in_the_middle(body, middle, legs="left_leg" in openings or "right_leg" in openings)
+    if not {"left_leg", "right_leg"} <= openings.keys():
+        openings.setdefault("hem", loops[int(np.argmin([centre[1] for centre in centres]))])
+    firsts = {int(loop[0]) for loop in openings.values()}
+    rest = (loop for loop in loops if int(loop[0]) not in firsts)
+    return openings | {f"opening_{number}": loop for number, loop in enumerate(rest, start=1)}
 
 
-def _beside(body: Body, centre: Array) -> str:
-    """The sleeve or leg that ends there, or nothing in the middle."""
+def _name_beside(body: Body, centre: Array) -> str:
+    """Return the name of the sleeve or leg that ends there, or empty in the middle."""
     hip, shoulder = joint_position(body, "left_hip"), joint_position(body, "left_shoulder")
     middle = joint_position(body, "pelvis")[0]
     out = abs(centre[0] - middle)
@@ -59,7 +62,8 @@ def _beside(body: Body, centre: Array) -> str:
     return f"{'left' if centre[0] > middle else 'right'}_{limb}"
 
 
-def _in_the_middle(body: Body, loops: list[tuple[Index, Array]], legs: bool) -> dict[str, Index]:
+def _name_in_the_middle(body: Body, loops: list[tuple[Index, Array]], legs: bool) -> dict[str, Index]:
+    """Return the loops in the middle by their names."""
     if not loops:
         return {}
     by_height = sorted(loops, key=lambda pair: -pair[1][1])

@@ -1,4 +1,4 @@
-"""A garment from a file: a mesh that somebody made for the body, and how to take it.
+"""Options of a command for a garment from a file: a mesh that somebody made for the body.
 
 Light to import; snug.garments.reading reads it.
 """
@@ -12,15 +12,21 @@ from pathlib import Path
 
 SUFFIXES = (".obj", ".ply", ".vtk", ".vtp", ".vtu", ".stl", ".off")
 OPTION = "--garment-"
-RESTS = ("mesh", "uv")
+REST_SHAPES = ("mesh", "uv")
 
 
 @dataclass(frozen=True, kw_only=True)
 class GarmentFile:
-    """A mesh file and how to take it.
+    """A mesh file with all that it does not state itself.
 
-    units, up: of the file; shift: [m] added then. rest: "mesh" or "uv", what has no strain; uv_scale: metres
-    per unit of the chart, by default the file's unit. material: a file of reference_sim.Material.
+    Attributes:
+        path: OBJ, PLY, VTK, VTP, VTU, STL or OFF.
+        units: of the file, "m", "cm", "mm" or "in".
+        up: vertical axis of the file, "y" or "z".
+        shift: (3,) [m], added after conversion.
+        rest: shape without strain, "mesh" or "uv".
+        uv_scale: metres per unit of the chart, by default the file's unit.
+        material: a file of reference_sim.material.Material.
     """
 
     path: Path
@@ -33,35 +39,35 @@ class GarmentFile:
 
     @property
     def name(self) -> str:
-        """What scenes and networks call it."""
+        """Name in scenes and of networks."""
         return self.path.stem
 
     @property
     def weights(self) -> Path:
-        """Where authored skinning weights are looked for: array "weights" (V, 24) of <name>.weights.npz."""
+        """Place of authored skinning weights: array "weights" (V, 24) of <name>.weights.npz."""
         return self.path.with_name(f"{self.name}.weights.npz")
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """All that it is read from."""
-        found = [self.path, *([self.weights] if self.weights.is_file() else [])]
-        return (*found, self.material) if self.material else tuple(found)
+        """All files that it is read from."""
+        weights = [self.weights] if self.weights.is_file() else []
+        return (self.path, *weights, *([self.material] if self.material else []))
 
 
 def is_garment_file(word: str) -> bool:
-    """Whether a garment is named by its file."""
+    """Return whether an option names a mesh file instead of a template."""
     return Path(word).suffix.lower() in SUFFIXES
 
 
 def add_garment_options(parser: ArgumentParser) -> None:
-    """How to take a garment that is a file."""
+    """Add the options that say how to take a garment that is a file."""
     add = parser.add_argument_group("a garment that is a file").add_argument
     add(f"{OPTION}units", default="m", choices=("m", "cm", "mm", "in"), help="of the file (default m)")
     add(f"{OPTION}up", default="y", choices=("y", "z"), help="up axis of the file (default y)")
     add(f"{OPTION}shift", default="0,0,0", metavar="DX,DY,DZ",
         help="metres to add then, where the body stood elsewhere; with '=' if DX is below 0")  # fmt: skip
-    add(f"{OPTION}rest", default="mesh", choices=RESTS,
-        help="what has no strain: the mesh (default), or its UV chart, the sewing pattern")  # fmt: skip
+    add(f"{OPTION}rest", default="mesh", choices=REST_SHAPES,
+        help="shape without strain: the mesh (default), or its UV chart, the sewing pattern")  # fmt: skip
     add(f"{OPTION}uv-scale", type=float, metavar="M",
         help="metres per unit of the chart (default: the file's unit)")  # fmt: skip
     add(f"{OPTION}material", metavar="FILE",
@@ -70,7 +76,7 @@ def add_garment_options(parser: ArgumentParser) -> None:
 
 
 def demand_garment_file(options: Namespace) -> None:
-    """Raises ValueError for an option of `add_garment_options` where no garment is a file."""
+    """Raise ValueError for an option of `add_garment_options` where no garment is a file."""
     plain = ArgumentParser()
     add_garment_options(plain)
     for name, default in vars(plain.parse_args([])).items():
@@ -81,7 +87,7 @@ def demand_garment_file(options: Namespace) -> None:
 
 
 def make_garment_file(path: str, options: Namespace) -> GarmentFile:
-    """The file with the options of `add_garment_options`. Raises ValueError for one that means nothing."""
+    """Return the file with the options of `add_garment_options`. Raises ValueError for a senseless one."""
     try:
         shift = tuple(float(word) for word in options.garment_shift.split(","))
     except ValueError:

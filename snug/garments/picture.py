@@ -1,4 +1,4 @@
-"""A picture of a garment on the unposed body, from the front and from the side.
+"""Picture of a garment on the unposed body, from the front and from the side.
 
 Drawn with matplotlib, triangles painted back to front: no OpenGL is needed.
 """
@@ -24,7 +24,10 @@ TURNED = {"left side": -1.0}  # z runs to the left as seen from +x
 
 
 def draw(path: Path, body: Body, surface: Surface, distances: Array) -> None:
-    """Write the picture of a surface in metres. distances: (V,) [m] of its vertices, below 0 in the body."""
+    """Draw a surface on the body and write the picture.
+
+    path: of the picture. distances: (V,) [m] of the vertices to the skin, below 0 in the body.
+    """
     from matplotlib.figure import Figure
 
     below = (distances < 0)[surface.faces].any(axis=1)
@@ -46,7 +49,7 @@ def draw(path: Path, body: Body, surface: Surface, distances: Array) -> None:
 
 
 def _shaded(corners: Array, colours: Array, lift: float) -> tuple[Array, Array, Array]:
-    """Triangles (F,3,3) as seen -> outlines (F,3,2), depths (F,), colours (F,3) lit from the eye."""
+    """Return outlines (F,3,2), depths (F,) and lit colours (F,3) of triangles (F,3,3) as seen."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     towards = np.abs(normals[:, 2]) / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)
     return corners[:, :, :2], corners[:, :, 2].mean(axis=1) + lift, colours * (0.4 + 0.6 * towards[:, None])

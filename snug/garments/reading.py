@@ -1,12 +1,13 @@
-"""From a mesh file to a garment: what is found on the way, and what cannot be used.
+"""Read a garment from a mesh file: every finding on the way, and the garment itself.
 
-Each finding is said once, here: `python -m snug.check` lists all, whoever reads a garment is refused by the
-first that cannot be used.
+Each finding is stated once, here: `python -m snug.check` lists all, `read_garment` raises the first that
+makes the file unusable.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from reference_sim.files.uv_chart import flattened, join_seams, rest_chart, stre
 from reference_sim.geometry.topology import corner_angles
 from reference_sim.material import Material, MaterialError
 from snug.body.parametric_body import Body
-from snug.garments.fit import DressForm, body_as_in_file, find_placement, pose_in_file
+from snug.garments.fit import DressForm, find_placement, pose_in_file
 from snug.garments.garment import Garment, GarmentError, smooth_weights
 from snug.garments.openings import name_openings
 from snug.garments.options import OPTION, GarmentFile
@@ -28,50 +29,79 @@ Index = NDArray[np.int64]
 
 SHARP = 5.0  # [degrees] below which an angle slows the simulation down
 SLIVERS = "slivers slow the simulation down: remesh"
-LOOSE = "what is not sewn on falls off: merge the vertices along its seams"
-NOTED = ("ok", "note")
+LOOSE = "a piece that is not sewn on falls off: merge the vertices along its seams"
+OK, NOTE, UNUSABLE = "ok", "note", "unusable"  # levels of a finding
 UNPOSED_SMOOTHING = 20  # rounds over borrowed weights at 1000 vertices, as recipes have it
 OUTWARD = 0.5  # share of the area that looks away from the skin, below which a garment is inside out
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found about one matter. level: "ok", "note" or "unusable"; a remedy where there is one."""
+    """A fact about one matter of a file. level: OK, NOTE or UNUSABLE; a remedy where there is one."""
 
     matter: str
-    says: str
+    text: str
     remedy: str = ""
-    level: str = "ok"
+    level: str = OK
 
 
 @dataclass
 class Examination:
-    """What a file came to, as far as it could be read; garment: None where something cannot be used."""
+    """Findings about a file, and its garment as far as it could be read.
+
+    Attributes:
+        findings: in the order of reading.
+        surface: joined, in metres, y up, wound outward.
+        distances: (V,) [m] of its vertices to the skin, negative below it.
+        garment: None where something cannot be used.
+    """
 
     findings: list[Finding] = field(default_factory=list)
     surface: Surface | None = None
     distances: Array | None = None
     garment: Garment | None = None
 
-    def find(self, matter: str, says: str, remedy: str = "", level: str = "ok") -> None:
-        self.findings.append(Finding(matter, says, remedy, level))
+    def add(self, matter: str, text: str, remedy: str = "", level: str = OK) -> None:
+        """Add a finding."""
+        self.findings.append(Finding(matter, text, remedy, level))
 
     @property
     def unusable(self) -> list[Finding]:
-        return [finding for finding in self.findings if finding.level == "unusable"]
+        """Findings that make the file unusable."""
+        return [finding for finding in self.findings if finding.level == UNUSABLE]
 
 
-def read_garment(file: GarmentFile, body: Body) -> Garment:
-    """The garment of a file on the unposed body. Raises GarmentError: file, what is wrong, remedy."""
-    reading = examine_file(file, DressForm(body), body)
-    for finding in reading.unusable:
-        raise GarmentError(f"{file.path}: {finding.says}" + f": {finding.remedy}" * bool(finding.remedy))
-    assert reading.garment is not None
-    return reading.garment
+def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
+    """Read and check a garment that was made for the unposed body.
+
+    Args:
+        file: a mesh file, or such a file with its units, axis, rest shape and material.
+        body: in T pose; a garment made for its lowered arms is brought to the T pose.
+
+    Raises:
+        GarmentError: file, problem, remedy.
+
+    >>> import tempfile, numpy as np
+    >>> angle = 2 * np.pi * np.arange(40) / 40
+    >>> ring = [f"{0.2 * np.sin(a):.4f} {{}} {0.16 * np.cos(a) + 0.01:.4f}" for a in angle]
+    >>> belt = ["v " + point.format(height) for height in (0.93, 0.97) for point in ring]
+    >>> belt += [f"f {k + 1} {(k + 1) % 40 + 1} {(k + 1) % 40 + 41} {k + 41}" for k in range(40)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "belt.obj").write_text("\\n".join(belt))
+    ...     garment = read_garment(Path(folder, "belt.obj"), Body.load())
+    >>> garment.name, garment.rest_positions.shape, list(garment.loops)
+    ('belt', (80, 3), ['waist', 'hem'])
+    """
+    file = file if isinstance(file, GarmentFile) else GarmentFile(path=Path(file))
+    examination = examine_file(file, DressForm(body))
+    for finding in examination.unusable:
+        raise GarmentError(f"{file.path}: {finding.text}" + f": {finding.remedy}" * bool(finding.remedy))
+    assert examination.garment is not None
+    return examination.garment
 
 
-def examine_file(file: GarmentFile, wearer: DressForm, body: Body) -> Examination:
-    """Everything that is to be said of a file. Raises GarmentError where it cannot be read at all."""
+def examine_file(file: GarmentFile, form: DressForm) -> Examination:
+    """Return all findings about a file on a body. Raises GarmentError where it cannot be read at all."""
     try:
         raw = read_mesh(file.path)
         material = Material.from_file(file.material) if file.material else Material()
@@ -80,116 +110,116 @@ def examine_file(file: GarmentFile, wearer: DressForm, body: Body) -> Examinatio
     authored = read_authored_weights(file.path, raw.vertex_data, file.weights, len(raw.positions))
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
     surface, kept, _ = join_seams(replace(raw, positions=positions))
-    reading = Examination(surface=surface)
-    _of_size(reading, raw, surface, kept)
-    fits = _of_place(reading, file, wearer, raw)
-    chart = _of_rest(reading, file, surface)
-    surface = _of_winding(reading, surface, wearer) if fits else surface
-    if chart is not None and surface is not reading.surface:
+    examination = Examination(surface=surface)
+    _describe_mesh(examination, raw, surface, kept)
+    fits = _check_place(examination, file, form, raw)
+    chart = _find_rest_shape(examination, file, surface)
+    surface = _wind_outward(examination, surface, form) if fits else surface
+    if chart is not None and surface is not examination.surface:
         chart = chart[:, ::-1]
-    reading.surface = surface
-    sound = _of_mesh(reading, surface, chart)
-    if sound and fits and not reading.unusable:
-        own = None if authored is None else authored[kept]
-        reading.garment = _dressed(reading, file, body, surface, chart, material, own)
-    return reading
+    examination.surface = surface
+    sound = _check_mesh(examination, surface, chart)
+    if sound and fits and not examination.unusable:
+        authored = None if authored is None else authored[kept]
+        examination.garment = _make_garment(examination, file, form, surface, chart, material, authored)
+    return examination
 
 
-def _of_size(reading: Examination, raw: Surface, surface: Surface, kept: Index) -> None:
+def _describe_mesh(examination: Examination, raw: Surface, surface: Surface, kept: Index) -> None:
     quads = f", {raw.quads} quads cut in two" if raw.quads else ""
-    reading.find("mesh", f"{len(surface.positions)} vertices, {len(surface.faces)} triangles{quads}")
+    examination.add("mesh", f"{len(surface.positions)} vertices, {len(surface.faces)} triangles{quads}")
     if doubled := len(raw.positions) - len(kept):
-        reading.find("doubled vertices", f"{doubled} joined with another at the same place", level="note")
+        examination.add("doubled vertices", f"{doubled} joined with another at the same place", level=NOTE)
 
 
-def _of_place(reading: Examination, file: GarmentFile, wearer: DressForm, raw: Surface) -> bool:
-    """Whether the garment lies on the body."""
-    assert reading.surface is not None
-    positions = reading.surface.positions
-    fit = wearer.fit(positions)
-    problem = wearer.problem(positions, fit)
-    reading.distances = fit.distances
+def _check_place(examination: Examination, file: GarmentFile, form: DressForm, raw: Surface) -> bool:
+    """Return whether the garment lies on the body; where not, the finding says what mends it."""
+    assert examination.surface is not None
+    positions = examination.surface.positions
+    fit = form.fit(positions)
+    problem = form.problem(positions, fit)
+    examination.distances = fit.distances
     size = " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0))
     if not problem:
-        level = "note" if fit.depth > 0 else "ok"
-        reading.find("size", f"{size} m with units {file.units}, up {file.up}")
-        reading.find("place", f"{fit.below:.1%} of the vertices below the skin, the deepest by "
-                     f"{1e3 * fit.depth:.1f} mm", level=level)  # fmt: skip
+        depth = f"{fit.below:.1%} of the vertices below the skin, the deepest by {1e3 * fit.depth:.1f} mm"
+        examination.add("size", f"{size} m with units {file.units}, up {file.up}")
+        examination.add("place", depth, level=NOTE if fit.depth > 0 else OK)
         return True
-    mend = find_placement(wearer, raw.positions, file.units, file.up, np.asarray(file.shift))
     remedy = "move it onto the unposed body, facing +z with y up"
-    if mend:
-        shift = ",".join(f"{value:g}" for value in mend.shift)
-        words = {"units": (mend.units, file.units), "up": (mend.up, file.up)}
-        given = [f"{OPTION}{name} {found}" for name, (found, was) in words.items() if found != was]
-        given += [f"{OPTION}shift={shift}"] if mend.shift != file.shift else []
-        remedy = " ".join(given)
-    reading.find("place", f"does not lie on the body ({size} m, {problem})", remedy, "unusable")
+    if placement := find_placement(form, raw.positions, file.units, file.up, np.asarray(file.shift)):
+        shift = ",".join(f"{value:g}" for value in placement.shift)
+        changes = [f"{OPTION}units {placement.units}"] * (placement.units != file.units)
+        changes += [f"{OPTION}up {placement.up}"] * (placement.up != file.up)
+        changes += [f"{OPTION}shift={shift}"] * (placement.shift != file.shift)
+        remedy = " ".join(changes)
+    examination.add("place", f"does not lie on the body ({size} m, {problem})", remedy, UNUSABLE)
     return False
 
 
-def _of_rest(reading: Examination, file: GarmentFile, surface: Surface) -> Array | None:
-    """The chart (F,3,2) [m] where it is the rest shape."""
+def _find_rest_shape(examination: Examination, file: GarmentFile, surface: Surface) -> Array | None:
+    """Return the chart (F,3,2) [m] where it is the rest shape."""
     asked = file.rest == "uv"
     if surface.uv is None and not asked:
-        reading.find("rest", "the mesh itself; the file has no UV")
+        examination.add("rest", "the mesh itself; the file has no UV")
         return None
     try:
         scale = METRES[file.units] if file.uv_scale is None else file.uv_scale
         chart = rest_chart(surface, scale, prefix=OPTION)
     except MeshError as error:
-        says, _, remedy = str(error).partition(": ")
+        problem, _, remedy = str(error).partition(": ")
         if asked:
-            reading.find("rest", says, remedy, "unusable")
+            examination.add("rest", problem, remedy, UNUSABLE)
         else:
-            reading.find("rest", f"the mesh itself; {says}")
+            examination.add("rest", f"the mesh itself; {problem}")
         return None
     off = np.abs(stretches(surface.positions[surface.faces], chart) - 1).max(axis=1)
     most = f"99 % of it by less than {np.quantile(off, 0.99):.0%}"
     strain = f"stretched by {np.median(off):.1%} on the mesh (median; {most})"
-    reading.find("rest", f"the UV chart, {strain}" if asked else f"the mesh itself; its UV chart is {strain}")
+    shape = "the UV chart," if asked else "the mesh itself; its UV chart is"
+    examination.add("rest", f"{shape} {strain}")
     return chart if asked else None
 
 
-def _of_winding(reading: Examination, surface: Surface, wearer: DressForm) -> Surface:
-    """The surface, turned where it is inside out."""
+def _wind_outward(examination: Examination, surface: Surface, form: DressForm) -> Surface:
+    """Return the surface, turned where it is inside out."""
     corners = surface.positions[surface.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    planes = wearer.skin.planes(corners.mean(axis=1), 0)
+    planes = form.skin.planes(corners.mean(axis=1), 0)
     areas = np.linalg.norm(normals, axis=1)
     outward = float(areas[np.einsum("fi,fi->f", normals, planes.normals) > 0].sum() / areas.sum())
     if outward > OUTWARD:
-        reading.find("winding", f"outward, {outward:.0%} of the area")
+        examination.add("winding", f"outward, {outward:.0%} of the area")
         return surface
-    reading.find("winding", "inside out", "turned as it is read", "note")
+    examination.add("winding", "inside out", "turned as it is read", NOTE)
     uv = None if surface.uv is None else surface.uv[:, ::-1]
     return replace(surface, faces=np.ascontiguousarray(surface.faces[:, ::-1]), uv=uv)
 
 
-def _of_mesh(reading: Examination, surface: Surface, chart: Array | None) -> bool:
-    """Whether the mesh can be simulated: one or several sheets, consistently wound."""
+def _check_mesh(examination: Examination, surface: Surface, chart: Array | None) -> bool:
+    """Return whether the mesh can be simulated: one or several sheets, consistently wound."""
     same = np.sort(surface.faces, axis=1)
     _, first, count = np.unique(same, axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
         pair = np.flatnonzero((same == same[first[np.argmax(count > 1)]]).all(axis=1))
-        reading.find(
-            "faces", f"triangles {pair[0]} and {pair[1]} are the same", "remove one of each", "unusable"
-        )
+        text = f"triangles {pair[0]} and {pair[1]} are the same"
+        examination.add("faces", text, "remove one of each", UNUSABLE)
         return False
     try:
         Cloth(surface.positions, surface.faces, rest_uv=chart)
     except MeshError as error:
-        says, _, remedy = str(error).partition(": ")
-        reading.find("faces", says, remedy, "unusable")
+        problem, _, remedy = str(error).partition(": ")
+        examination.add("faces", problem, remedy, UNUSABLE)
         return False
     angle = float(np.degrees(corner_angles(surface.positions, surface.faces).min()))
-    sharp, pieces = angle < SHARP, _pieces(surface)
-    reading.find("triangles", f"smallest angle {angle:.1f} degrees", SLIVERS * sharp, NOTED[sharp])
-    reading.find("pieces", str(pieces), LOOSE * (pieces > 1), NOTED[pieces > 1])
+    sharp, pieces = angle < SHARP, _count_pieces(surface)
+    examination.add(
+        "triangles", f"smallest angle {angle:.1f} degrees", SLIVERS * sharp, NOTE if sharp else OK
+    )
+    examination.add("pieces", str(pieces), LOOSE * (pieces > 1), NOTE if pieces > 1 else OK)
     return True
 
 
-def _pieces(surface: Surface) -> int:
+def _count_pieces(surface: Surface) -> int:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -199,57 +229,64 @@ def _pieces(surface: Surface) -> int:
     return int(connected_components(graph, directed=False)[0])
 
 
-def _dressed(
-    reading: Examination,
+def _make_garment(
+    examination: Examination,
     file: GarmentFile,
-    body: Body,
+    form: DressForm,
     surface: Surface,
     chart: Array | None,
     material: Material,
     authored: Array | None,
 ) -> Garment | None:
-    """The garment, its openings and what carries it; None where it has no opening.
+    """Return the garment, its openings and its weights; None where it has no opening.
 
-    body: in T pose. The surface lies on it as its file has it: there openings and weights are found, and from
-    there vertices are brought to the T pose by the inverse of their blended transforms. Its rest shape stays.
+    The surface lies on the body as its file has it: there openings and weights are found, and from there
+    vertices are brought to the T pose by the inverse of their blended transforms. Its rest shape stays.
     """
-    positions, faces, filed = surface.positions, surface.faces, body_as_in_file(body)
+    positions, faces = surface.positions, surface.faces
     try:
-        loops = name_openings(filed, positions, faces)
+        loops = name_openings(form.posed, positions, faces)
     except ValueError as error:
-        reading.find("openings", str(error), "separate them", "unusable")
+        examination.add("openings", str(error), "separate them", UNUSABLE)
         return None
     if not loops:
-        reading.find(
-            "openings", "none: the surface is closed", "cut where head and limbs come out", "unusable"
-        )
+        remedy = "cut where head and limbs come out"
+        examination.add("openings", "none: the surface is closed", remedy, UNUSABLE)
         return None
-    reading.find("openings", ", ".join(f"{name} ({len(loop)} vertices)" for name, loop in loops.items()))
+    examination.add("openings", ", ".join(f"{name} ({len(loop)} vertices)" for name, loop in loops.items()))
     legs = "left_leg" in loops or "right_leg" in loops
-    carried: GarmentWeights = find_weights(filed, positions, faces, legs=legs, authored=authored)
-    how = "as they came with it" if carried.authored else "of the closest skin"
-    reading.find("weights", f"{how}; encloses {', '.join(carried.followed)}")
-    if body.arms_lowered is not None:
+    weights = find_weights(form.posed, positions, faces, legs=legs, authored=authored)
+    source = "as they came with it" if weights.authored else "of the closest skin"
+    examination.add("weights", f"{source}; encloses {', '.join(weights.followed)}")
+    if form.body.arms_lowered is not None:
         chart = flattened(positions, faces) if chart is None else chart
-        positions = _in_t_pose(body, positions, faces, carried)
-        reading.find("pose", "made for lowered arms, brought to the T pose; its rest shape is as it was made")
-    # What has no neck and no sleeves hangs from its waist, and contact without friction does not hold that.
+        positions = _in_t_pose(form.body, positions, faces, weights)
+        text = "made for lowered arms, brought to the T pose; its rest shape is as it was made"
+        examination.add("pose", text)
+    # A garment without neck and sleeves hangs from its waist, and contact without friction does not hold it.
     hangs = any(name in loops for name in ("neck", "left_sleeve", "right_sleeve"))
     pins = np.empty(0, dtype=np.int64) if hangs else np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
     if len(pins):
-        reading.find("held", f"{len(pins)} vertices of the waist are carried by the body")
+        examination.add("held", f"{len(pins)} vertices of the waist are carried by the body")
     return Garment(
-        name=file.name, rest_positions=positions, faces=faces, body_vertices=carried.body_vertices,
-        skinning_weights=carried.weights, loops=loops, pins=pins, material=material, rest_uv=chart,
-        authored_weights=carried.authored,
-    )  # fmt: skip
+        name=file.name,
+        rest_positions=positions,
+        faces=faces,
+        body_vertices=weights.body_vertices,
+        skinning_weights=weights.weights,
+        loops=loops,
+        pins=pins,
+        material=material,
+        rest_uv=chart,
+        authored_weights=weights.authored,
+    )
 
 
-def _in_t_pose(body: Body, positions: Array, faces: Index, carried: GarmentWeights) -> Array:
-    """Positions (V,3) [m], made for the body as its file has it, on the body in T pose."""
-    weights = carried.weights
-    if not carried.authored:
-        weights = smooth_weights(weights, faces, round(UNPOSED_SMOOTHING * len(positions) / 1000))
+def _in_t_pose(body: Body, positions: Array, faces: Index, weights: GarmentWeights) -> Array:
+    """Return positions (V,3) [m], made for the body as its file has it, on the body in T pose."""
+    smoothed = weights.weights
+    if not weights.authored:
+        smoothed = smooth_weights(smoothed, faces, round(UNPOSED_SMOOTHING * len(positions) / 1000))
     moved = body.transforms(pose_in_file(body)[None], np.zeros((1, 3)))[0]
-    blended = np.einsum("vj,jab->vab", weights, moved)
+    blended = np.einsum("vj,jab->vab", smoothed, moved)
     return np.linalg.solve(blended[..., :3], (positions - blended[..., 3])[..., None])[..., 0]

@@ -1,4 +1,4 @@
-"""Even triangles on half of a garment: cluster a dense sheet, put its rim on the exact cut lines, relax.
+"""Remesh half of a garment: cluster a dense sheet, put its rim on the exact cut lines, relax.
 
 pyacvd's clusters give the number of vertices that was asked for, but a ragged rim. So rim vertices are spread
 evenly along the cut lines of the dense sheet, and the inner ones move towards a weighted mean of the
@@ -21,12 +21,12 @@ Projection = Callable[[Array], Array]  # points (N,3) [m] onto a surface
 # Triangles pull with their area to this power. Power 1 (Lloyd's iteration) left areas of 0.45 to 2.0 of the
 # mean at 2000 to 8000 vertices, power 3 leaves 0.52 to 1.9; it needs the short step, a full one oscillates.
 EVENNESS = 3
-STEP = 0.2
-ROUNDS = 40  # of relax
+RELAXATION_STEP = 0.2
+RELAXATIONS = 40  # rounds of relax
 
 
 def vertex_normals(points: Array, faces: Index) -> Array:
-    """Unit normals (V,3), area-weighted."""
+    """Return unit normals (V,3), area-weighted."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     normals = np.zeros_like(points)
     for k in range(3):
@@ -35,14 +35,14 @@ def vertex_normals(points: Array, faces: Index) -> Array:
 
 
 def along(curve: Array, shares: Array) -> Array:
-    """Points at the given shares (N,) of the length of a polyline (P,3)."""
+    """Return points at the given shares (N,) of the length of a polyline (P,3)."""
     steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     return np.stack([np.interp(shares * length[-1], length, curve[:, k]) for k in range(3)], axis=1)
 
 
 def interior_edges(faces: Index) -> tuple[Index, Index, Index]:
-    """Edges with two faces: ends (E,2) as wound in the first face, faces (E,2), their far corners (E,2)."""
+    """Return edges with two faces: ends (E,2) as wound in the first, faces (E,2), far corners (E,2)."""
     halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     key = np.sort(halves, axis=1) @ [int(faces.max()) + 1, 1]
     order = np.argsort(key, kind="stable")
@@ -57,12 +57,13 @@ def interior_edges(faces: Index) -> tuple[Index, Index, Index]:
 
 
 def _angle_cotangent(tip: Array, a: Array, b: Array) -> Array:
+    """Return the cotangents (N,) of the angles at `tip`."""
     u, v = a - tip, b - tip
     return np.sum(u * v, axis=1) / np.maximum(np.linalg.norm(np.cross(u, v), axis=1), 1e-30)
 
 
 def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
-    """Faces after flipping interior edges whose two opposite angles add up to more than pi."""
+    """Flip interior edges whose two opposite angles add up to more than pi; return the faces."""
     faces = faces.copy()
     for _ in range(passes):
         ends, sides, far = interior_edges(faces)
@@ -70,10 +71,10 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
         excess = _angle_cotangent(r, p, q) + _angle_cotangent(s, p, q)
         # A flip must not turn a triangle over: both new normals agree with the old ones' sum.
         normal = np.cross(q - p, r - p) + np.cross(p - q, s - q)
-        upright = (np.sum(np.cross(s - p, r - p) * normal, 1) > 0) & (
+        kept_side = (np.sum(np.cross(s - p, r - p) * normal, 1) > 0) & (
             np.sum(np.cross(r - q, s - q) * normal, 1) > 0
         )
-        candidates = np.flatnonzero((excess < -1e-6) & upright)
+        candidates = np.flatnonzero((excess < -1e-6) & kept_side)
         if not len(candidates):
             break
         present = {tuple(edge) for edge in np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1).tolist()}
@@ -90,12 +91,12 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
 
 
 def relax(points: Array, faces: Index, held: NDArray[np.bool_], project: Projection) -> tuple[Array, Index]:
-    """Even triangles by moving vertices towards larger triangles and by flips; `held` (V,) vertices stay.
+    """Move vertices towards larger triangles, and flip edges; `held` (V,) vertices stay.
 
     project: maps points (N,3) back onto the surface.
     """
     points = points.copy()
-    for _ in range(ROUNDS):
+    for _ in range(RELAXATIONS):
         faces = delaunay_flips(points, faces, passes=1)
         pull = triangle_areas(points, faces) ** EVENNESS
         centroids = points[faces].mean(axis=1)
@@ -104,13 +105,13 @@ def relax(points: Array, faces: Index, held: NDArray[np.bool_], project: Project
         for k in range(3):
             np.add.at(weight, faces[:, k], pull)
             np.add.at(target, faces[:, k], pull[:, None] * centroids)
-        moved = points + STEP * (target / weight[:, None] - points)
+        moved = points + RELAXATION_STEP * (target / weight[:, None] - points)
         points[~held] = project(moved[~held])
     return points, delaunay_flips(points, faces)
 
 
 def _cluster(points: Array, faces: Index, count: int) -> tuple[Array, Index]:
-    """A coarser mesh of about `count` vertices by centroidal clustering (pyacvd)."""
+    """Return a coarser mesh of about `count` vertices by centroidal clustering (pyacvd)."""
     import igl
     import pyacvd
     import pyvista
@@ -138,13 +139,13 @@ def _cluster(points: Array, faces: Index, count: int) -> tuple[Array, Index]:
 
 
 def _spread(curve: Array, count: int, *, closed: bool) -> Array:
-    """`count` points (count,3) evenly along a polyline (P,3), its first point included, its last not."""
+    """Return `count` points (count,3) evenly along a polyline (P,3), its first included, its last not."""
     line = np.concatenate([curve, curve[:1]]) if closed else curve
     return along(line, np.arange(count) / count)
 
 
 def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
-    """Spread a loop's vertices, in place, evenly along its outline: a closed curve, or several end to end."""
+    """Spread the vertices of a loop, in place, evenly along its outline: a closed curve, or several."""
     if len(outline) == 1:
         curve = outline[0]
         start = int(np.argmin(np.linalg.norm(points[loop] - curve[0], axis=1)))
@@ -162,11 +163,17 @@ def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
 def remesh(
     points: Array, faces: Index, outlines: list[list[Array]], count: int, project: Projection
 ) -> tuple[Array, Index]:
-    """Even mesh of about `count` vertices of a sheet whose boundary loops are the `outlines`.
+    """Remesh a sheet whose boundary loops are the `outlines` evenly, with about `count` vertices.
 
-    outlines: per loop its curves (P,3) end to end along the sheet's winding; one curve alone is closed.
-    project: maps points (N,3) back onto the surface.
-    Errors: ValueError where the clusters are too coarse to keep the sheet's topology.
+    Args:
+        points: (N,3) [m] of the dense sheet.
+        faces: (M,3).
+        outlines: per loop its curves (P,3) end to end along the winding; one curve alone is closed.
+        count: number of vertices.
+        project: maps points (N,3) back onto the surface.
+
+    Raises:
+        ValueError: the clusters are too coarse to keep the sheet's topology.
     """
     coarse, triangles = _cluster(points, faces, count)
     loops = boundary_loops(triangles)

@@ -1,4 +1,4 @@
-"""The kinds of garments that are tailored by code, each to any body: their cuts, lengths and ranges."""
+"""Kinds of garments that are tailored by code, each to any body: their cuts, lengths and ranges."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ import numpy as np
 from snug.body.parametric_body import Body
 from snug.garments.assembly import assemble_garment
 from snug.garments.cuts import SEAM_CUT, CutPlane, armhole_cut, level_cut, neck_cut
-from snug.garments.garment import Garment, GarmentError
+from snug.garments.garment import SKIRT_SMOOTHING, Garment, GarmentError
 from snug.garments.implicit_surface import legs_part
 from snug.garments.landmarks import SHIRT_BONES, joint_position
 
@@ -17,8 +17,6 @@ TSHIRT = "tshirt"  # the garment that a command takes where none is named
 LONG_SLEEVE_BONES = (*SHIRT_BONES, "left_elbow", "right_elbow")
 SKIRT_BONES = ("pelvis", "spine1", "left_hip", "right_hip")
 TROUSER_BONES = (*SKIRT_BONES, "left_knee", "right_knee")
-# Rounds over the weights at 1000 vertices of what spans both thighs: between them it follows neither.
-SKIRT_SMOOTHING = 60
 TROUSER_SMOOTHING = 10  # at the crotch, borrowed weights jump from leg to leg
 
 
@@ -31,12 +29,22 @@ def tailor_tshirt(
     sleeve: float = 0.55,
     length: float = 0.09,
 ) -> Garment:
-    """A T-shirt for the unposed body, mirror-symmetric, of `vertices` vertices within 1 %.
+    """Tailor a T-shirt to the unposed body, mirror-symmetric.
 
-    ease: girth [m] at waist and cuffs beyond a shirt that lies at `clearance` around chest, hips or arm.
-    clearance: least distance [m] from the skin, over vertices, edge midpoints and centroids.
-    sleeve: share of the upper arm that the sleeve covers. length: hem below the hip joints [m].
-    Raises GarmentError for a parameter out of range, or a body on which no sound mesh comes out.
+    Args:
+        body: in T pose.
+        vertices: number of vertices, met within 1 %.
+        ease: girth [m] at waist and cuffs beyond a shirt that lies at `clearance` around chest, hips or arm.
+        clearance: least distance [m] from the skin, over vertices, edge midpoints and centroids.
+        sleeve: share of the upper arm that the sleeve covers.
+        length: hem below the hip joints [m].
+
+    Raises:
+        GarmentError: a parameter out of range, or a body on which no sound mesh comes out.
+
+    >>> shirt = tailor_tshirt(Body.load(), vertices=300)  # doctest: +SKIP
+    >>> list(shirt.loops)  # takes 3 s  # doctest: +SKIP
+    ['neck', 'left_sleeve', 'right_sleeve', 'hem']
     """
     cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length}
     return _shirt(TSHIRT, body, vertices, cut)
@@ -52,7 +60,7 @@ def tailor_tunic(
     length: float = 0.17,
     flare: float = 0.045,
 ) -> Garment:
-    """A tunic: a longer T-shirt that widens from the waist on, so that its hem swings clear of the body.
+    """Tailor a tunic: a longer T-shirt that widens from the waist on, so that its hem swings freely.
 
     flare: how much further [m] the hem stands off than the waist, all around. The rest: see tailor_tshirt.
     """
@@ -69,7 +77,10 @@ def tailor_long_sleeves(
     sleeve: float = 0.9,
     length: float = 0.09,
 ) -> Garment:
-    """A shirt with long sleeves. sleeve: share of the whole arm, shoulder to wrist. See tailor_tshirt."""
+    """Tailor a shirt with long sleeves.
+
+    sleeve: share of the whole arm, shoulder to wrist. The rest: see tailor_tshirt.
+    """
     cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length}
     return _shirt("long_sleeves", body, vertices, cut, end="left_wrist", bones=LONG_SLEEVE_BONES)
 
@@ -83,7 +94,7 @@ def tailor_tank_top(
     strap: float = 0.06,
     length: float = 0.09,
 ) -> Garment:
-    """A shirt without sleeves. strap: width of its straps [m]. The rest: see tailor_tshirt."""
+    """Tailor a shirt without sleeves. strap: width of its straps [m]. The rest: see tailor_tshirt."""
     cut = {"ease": ease, "clearance": clearance, "strap": strap, "length": length}
     return _sleeveless("tank_top", body, vertices, cut)
 
@@ -98,7 +109,7 @@ def tailor_dress(
     length: float = 0.32,
     flare: float = 0.1,
 ) -> Garment:
-    """A dress without sleeves, to above the knee, whose lower part follows both thighs.
+    """Tailor a dress without sleeves, to above the knee, whose lower part follows both thighs.
 
     flare: how much further [m] the hem stands off than the waist, all around. The rest: see tailor_tank_top.
     """
@@ -116,14 +127,22 @@ def tailor_skirt(
     length: float = 0.3,
     flare: float = 0.1,
 ) -> Garment:
-    """A flared skirt, mirror-symmetric, of `vertices` vertices within 1 %, whose waistband the body carries.
+    """Tailor a flared skirt, mirror-symmetric, whose waistband the body carries.
 
-    ease: girth [m] at the hips beyond a skirt that lies at `clearance` [m]. rise: waistband above the hip
-    joints [m]; length: hem below them [m]. flare: how much further [m] the hem stands off than the hips.
-    Raises GarmentError as tailor_tshirt does.
+    Args:
+        body: in T pose.
+        vertices: number of vertices, met within 1 %.
+        ease: girth [m] at the hips beyond a skirt that lies at `clearance`.
+        clearance: least distance [m] from the skin.
+        rise: waistband above the hip joints [m].
+        length: hem below them [m].
+        flare: how much further [m] the hem stands off than the hips.
+
+    Raises:
+        GarmentError: see tailor_tshirt.
     """
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length, "flare": flare}
-    _demand_in_range("skirt", {"vertices": vertices, **cut})
+    _check_ranges("skirt", {"vertices": vertices, **cut})
     hip = joint_position(body, "left_hip")[1]
     hem, top = hip - length, hip + rise
     cuts = [SEAM_CUT, level_cut("hem", hem, down=True), level_cut("waist", top)]
@@ -140,10 +159,18 @@ def tailor_trousers(
     rise: float = 0.17,
     length: float = 0.9,
 ) -> Garment:
-    """Trousers, mirror-symmetric, of `vertices` vertices within 1 %, whose waistband the body carries.
+    """Tailor trousers, mirror-symmetric, whose waistband the body carries.
 
-    ease: girth [m] at hips and legs beyond trousers that lie at `clearance` [m]. rise: waistband above the
-    hip joints [m]. length: inseam, as a share of that from crotch to ankle. Errors: see tailor_tshirt.
+    Args:
+        body: in T pose.
+        vertices: number of vertices, met within 1 %.
+        ease: girth [m] at hips and legs beyond trousers that lie at `clearance`.
+        clearance: least distance [m] from the skin.
+        rise: waistband above the hip joints [m].
+        length: inseam, as a share of that from crotch to ankle.
+
+    Raises:
+        GarmentError: see tailor_tshirt.
     """
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length}
     return _trousers("trousers", body, vertices, cut)
@@ -158,14 +185,14 @@ def tailor_shorts(
     rise: float = 0.17,
     length: float = 0.25,
 ) -> Garment:
-    """Shorts: trousers that end above the knee. See tailor_trousers."""
+    """Tailor shorts: trousers that end above the knee. See tailor_trousers."""
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length}
     return _trousers("shorts", body, vertices, cut)
 
 
 @dataclass(frozen=True)
 class GarmentTemplate:
-    """A sort of garment: its name, what it is in words, and who tailors it for (body, vertices=...)."""
+    """A kind of garment: name, description, and the function that tailors it for (body, vertices=...)."""
 
     name: str
     description: str
@@ -185,7 +212,14 @@ GARMENT_TEMPLATES = (
 
 
 def find_template(name: str) -> GarmentTemplate:
-    """The template of that name. Raises GarmentError naming the known ones."""
+    """Return the template of that name.
+
+    Raises:
+        GarmentError: another name; the message lists the known ones.
+
+    >>> find_template("dress").tailor.__name__
+    'tailor_dress'
+    """
     for template in GARMENT_TEMPLATES:
         if template.name == name:
             return template
@@ -210,7 +244,8 @@ RANGES = {
 }
 
 
-def _demand_in_range(name: str, parameters: Mapping[str, float]) -> None:
+def _check_ranges(name: str, parameters: Mapping[str, float]) -> None:
+    """Raise GarmentError for a parameter that is out of range."""
     for parameter, value in parameters.items():
         low, high, unit = RANGES.get(f"{name} {parameter}") or RANGES[parameter]
         if not (np.isfinite(value) and low <= value <= high):
@@ -223,8 +258,8 @@ def _shirt(
     name: str, body: Body, vertices: int, cut: Mapping[str, float], *, end: str = "left_elbow",
     bones: Sequence[str] = SHIRT_BONES,
 ) -> Garment:  # fmt: skip
-    """A garment with two sleeves, a neck and a hem; its sleeves end on the way from the shoulder to `end`."""
-    _demand_in_range(name, {"vertices": vertices, **cut})
+    """Make a garment with two sleeves, a neck and a hem; its sleeves end from the shoulder towards `end`."""
+    _check_ranges(name, {"vertices": vertices, **cut})
     shoulder, far = joint_position(body, "left_shoulder"), joint_position(body, end)
     hem = joint_position(body, "left_hip")[1] - cut["length"]
     cuff = shoulder[0] + cut["sleeve"] * (far[0] - shoulder[0])
@@ -239,8 +274,8 @@ def _shirt(
 def _sleeveless(
     name: str, body: Body, vertices: int, cut: Mapping[str, float], smoothing: int = 0
 ) -> Garment:
-    """A garment with two armholes, a neck and a hem."""
-    _demand_in_range(name, {"vertices": vertices, **cut})
+    """Make a garment with two armholes, a neck and a hem."""
+    _check_ranges(name, {"vertices": vertices, **cut})
     hem = joint_position(body, "left_hip")[1] - cut["length"]
     neck = neck_cut(body, cut["clearance"])
     fit = {"ease": cut["ease"], "flare": cut.get("flare", 0.0), "hem": hem}
@@ -251,8 +286,8 @@ def _sleeveless(
 
 
 def _trousers(name: str, body: Body, vertices: int, cut: Mapping[str, float]) -> Garment:
-    """A garment with a waist and two legs."""
-    _demand_in_range(name, {"vertices": vertices, **cut})
+    """Make a garment with a waist and two legs."""
+    _check_ranges(name, {"vertices": vertices, **cut})
     crotch = legs_part(body, cut["clearance"] + cut["ease"] / (2 * np.pi))
     hem = crotch - cut["length"] * (crotch - joint_position(body, "left_ankle")[1])
     top = joint_position(body, "left_hip")[1] + cut["rise"]

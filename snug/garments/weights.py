@@ -1,4 +1,4 @@
-"""Skinning weights of somebody else's garment: those that came with it, or those of the skin below it."""
+"""Skinning weights of a garment from a file: those that came with it, or those of the skin below it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from reference_sim.contact.closest_point import FaceTree
 from reference_sim.files.array_file import ArrayFileError, read_arrays
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
-from snug.garments.garment import GarmentError, smooth_weights
+from snug.garments.garment import SKIRT_SMOOTHING, GarmentError, smooth_weights
 from snug.garments.landmarks import joint_position, skin_of
-from snug.garments.templates import SKIRT_SMOOTHING
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -30,7 +29,14 @@ BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both le
 
 @dataclass(frozen=True)
 class GarmentWeights:
-    """What carries a garment: weights (V,24), nearest body vertices (V,), names of the joints followed."""
+    """Skinning weights of a garment.
+
+    Attributes:
+        weights: (V,24).
+        body_vertices: (V,), nearest on the body.
+        followed: names of the joints that the garment follows.
+        authored: whether the weights came with it.
+    """
 
     weights: Array
     body_vertices: Index
@@ -41,22 +47,28 @@ class GarmentWeights:
 def find_weights(
     body: Body, positions: Array, faces: Index, *, legs: bool, authored: Array | None
 ) -> GarmentWeights:
-    """What carries a garment (V,3) [m], (F,3) wound outward, on the unposed body.
+    """Find the skinning weights of a garment on the unposed body.
 
-    legs: whether each leg has its own opening. Weights are the authored ones (V,24), or blended from the
-    three corners of the closest face of the skin, among the limbs that the garment encloses. One tube around
-    both legs is smoothed below the hips as a skirt is.
+    They are the authored ones, or blended from the three corners of the closest face of the skin, among the
+    limbs that the garment encloses. One tube around both legs is smoothed below the hips as a skirt is.
+
+    Args:
+        body: in the pose that the garment was made for.
+        positions: (V,3) [m].
+        faces: (F,3), wound outward.
+        legs: whether each leg has its own opening.
+        authored: (V,24), or None.
     """
     followed = enclosed_limbs(body, positions, faces)
     skin = np.asarray(body.faces)[skin_of(body, followed)[body.faces].all(axis=1)]
     tree = FaceTree(skin, body.template[skin].mean(axis=1))
     tree.refit(body.template)
-    found = tree.nearest(positions)
-    corners = skin[found.faces]
-    nearest = corners[np.arange(len(corners)), found.barycentric.argmax(axis=1)]
+    closest = tree.nearest(positions)
+    corners = skin[closest.faces]
+    nearest = corners[np.arange(len(corners)), closest.barycentric.argmax(axis=1)]
     if authored is not None:
         return GarmentWeights(authored, nearest, followed, authored=True)
-    weights = np.einsum("va,vaj->vj", found.barycentric, body.skinning_weights[corners])
+    weights = np.einsum("va,vaj->vj", closest.barycentric, body.skinning_weights[corners])
     below = joint_position(body, "left_hip")[1] - positions[:, 1]
     if not legs and below.max() > BELOW_HIPS:
         # As far as a template's skirt, whatever the size of the triangles.
@@ -67,9 +79,9 @@ def find_weights(
 
 
 def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...]:
-    """Joints whose skin lies within the garment in part; never those of head, hands and feet.
+    """Return the joints whose skin lies within the garment in part; never those of head, hands and feet.
 
-    Within is where the generalised winding number of the open mesh is above a half. Of a garment that
+    Within is where the generalised winding number of the open mesh is above a half. For a garment that
     encloses nothing, as a cape: all of them.
     """
     winding = igl.fast_winding_number(
@@ -79,14 +91,15 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
     strongest = np.argmax(body.skinning_weights, axis=1)
     allowed = [name for name in JOINT_NAMES if name not in NEVER]
     limbs = {name: strongest == JOINT_NAMES.index(name) for name in allowed}
-    enclosed = tuple(name for name, own in limbs.items() if own.any() and inside[own].mean() > COVERED)
-    return enclosed or tuple(name for name, own in limbs.items() if own.any())
+    limbs = {name: skin for name, skin in limbs.items() if skin.any()}
+    return tuple(name for name, skin in limbs.items() if inside[skin].mean() > COVERED) or tuple(limbs)
 
 
 def read_authored_weights(path: Path, data: Mapping[str, Array], beside: Path, count: int) -> Array | None:
-    """Weights (count, 24) from a file beside a mesh, or from the mesh's own vertex data; None without either.
+    """Return weights (count, 24) of a file beside a mesh, or of the mesh's vertex data; None without either.
 
-    Raises GarmentError for weights of another shape, negative, or whose rows do not sum to one.
+    Raises:
+        GarmentError: weights of another shape, negative, or whose rows do not sum to one.
     """
     names = [f"{KEY.removesuffix('s')}_{number}" for number in range(len(JOINT_NAMES))]
     if beside.is_file():
