@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.cell import Cell
 from benchmarks.methods import find_method
-from benchmarks.plan import plug_ins as outside
+from benchmarks.plan import user_files
 from benchmarks.plan.plan import Motions, Plan
 from benchmarks.presets import find_preset
 from benchmarks.process.timing import one_thread
@@ -42,7 +42,7 @@ connections), scenes (built alike twice, parts, derivatives of their own energie
 EXAMPLES = """examples:
   python -m benchmarks.check mine.py            all that METHODS, SCENES and METRICS of the file declare
   python -m benchmarks.check mine.py my_scene.py
-  python -m benchmarks.check my-entry-point --seconds 300
+  python -m benchmarks.check mine.py --seconds 300
 
 exit status: 0 when nothing is wrong; 1 when something is, a line for each; 2 when a file cannot be read."""
 
@@ -50,7 +50,7 @@ exit status: 0 when nothing is wrong; 1 when something is, a line for each; 2 wh
 def make_parser() -> argparse.ArgumentParser:
     """The options of the command."""
     parser = Parser(prog=f"python -m {PROGRAM}", description=DESCRIPTION, epilog=EXAMPLES)
-    parser.add_argument("what", nargs="+", metavar="FILE", help="a file, or an entry point of a package")
+    parser.add_argument("what", nargs="+", metavar="FILE", help="a file")
     parser.add_argument("--seconds", type=float, default=SECONDS,
         help=f"after which one method in one scene is ended (default {SECONDS:g})")  # fmt: skip
     return parser
@@ -73,20 +73,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def read(words: Sequence[str]) -> dict[str, list[Any]]:
-    """Word of a kind -> what these files and entry points declare. Raises DeclarationError."""
-    declared: dict[str, list[Any]] = {kind.word: [] for kind in outside.KINDS}
+    """Return word of a kind -> what these files declare. Raises DeclarationError."""
+    declared: dict[str, list[Any]] = {kind.word: [] for kind in user_files.KINDS}
     for word in words:
-        homes = {kind: home for kind in outside.KINDS if (home := outside.home_of(kind, word)) is not None}
-        if not homes:
-            raise DeclarationError(f"{word}: no such entry point; a file ends with .py")
-        if word.endswith(".py"):
-            module = outside.imported(next(iter(homes.values())))
-            homes = {kind: home for kind, home in homes.items() if hasattr(module, kind.tuple_name)}
-        if not homes:
-            names = ", ".join(kind.tuple_name for kind in outside.KINDS)
+        if not word.endswith(".py"):
+            raise DeclarationError(f"{word}: a file ends with .py")
+        file = user_files.file_of(word)
+        module = user_files.imported(file)
+        kinds = [kind for kind in user_files.KINDS if hasattr(module, kind.tuple_name)]
+        if not kinds:
+            names = ", ".join(kind.tuple_name for kind in user_files.KINDS)
             raise DeclarationError(f"{word}: declares none of {names}")
-        for kind, home in homes.items():
-            declared[kind.word] += outside.entries_of(kind, home)
+        for kind in kinds:
+            declared[kind.word] += user_files.entries_of(kind, file)
     return declared
 
 

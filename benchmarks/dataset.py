@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from benchmarks.process.timing import one_thread
@@ -22,16 +20,12 @@ EXAMPLES = """examples:
   python -m benchmarks.dataset build -o data/walks                     the library's training motions
   python -m benchmarks.dataset build --sequences 1000 --vertices 4400 -o data/thousand
   python -m benchmarks.dataset build --motions clips/ --garment shirt.obj --body mine.npz -o data/mine
-  python -m benchmarks.dataset build --from 500 --sequences 1000 -o data/second    another machine's half
-  python -m benchmarks.dataset verify data/thousand                    every byte against the index
-  python -m benchmarks.dataset list data/thousand
-  python -m benchmarks.dataset merge data/first data/second -o data/both
-  python -m snug.train --dataset data/both --model supervised          training reads windows from the files
+  python -m snug.train --dataset data/thousand --model supervised      training reads windows from the files
 
 sequences: the motions as given, in order, and then mixed clips of 60 frames made from them, always the same
   ones, until there are as many as asked for. Test and validation motions of the library are never among
   them. A folder that holds a data set of the same garment is gone on with: what is there for the same inputs
-  and code is kept, the rest is simulated; so is what was killed, or what verify found damaged.
+  and code is kept, the rest is simulated; so is what was killed, or is damaged.
 
 exit status: 0 all is there; 1 a sequence failed, is damaged or not there yet: a line says which, and the
   rest went on; 2 the request cannot be met: one line says why and nothing is written; 130 interrupted: what
@@ -39,24 +33,19 @@ exit status: 0 all is there; 1 a sequence failed, is damaged or not there yet: a
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command."""
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Data sets of simulated motions: many files, an index, checksums.",
         epilog=EXAMPLES,
     )
-    actions = parser.add_subparsers(dest="action", required=True, metavar="build|verify|list|merge")
+    actions = parser.add_subparsers(dest="action", required=True, metavar="build")
     add_build_options(actions.add_parser("build", help="simulate what is not there yet", epilog=EXAMPLES))
-    for name, words in (("verify", "compare every file with its digest"), ("list", "what there is")):
-        actions.add_parser(name, help=words, epilog=EXAMPLES).add_argument("folder", metavar="DIR")
-    merge = actions.add_parser("merge", help="join folders of several machines", epilog=EXAMPLES)
-    merge.add_argument("folders", metavar="DIR", nargs="+")
-    merge.add_argument("-o", "--out", metavar="DIR", required=True, help="a new folder")
     return parser
 
 
 def add_build_options(parser: argparse.ArgumentParser) -> None:
-    """What is simulated, and where."""
+    """Add the options of what is simulated, and where."""
     add = parser.add_argument
     add(
         "--motions",
@@ -69,7 +58,7 @@ def add_build_options(parser: argparse.ArgumentParser) -> None:
     add("--sequences", type=int, metavar="N", help="how many: the first motions, or all and mixed clips "
         "beside them (default: the motions)")  # fmt: skip
     add("--from", type=int, default=0, metavar="N", dest="first",
-        help="leave out the first N of them, which another machine builds (default 0)")  # fmt: skip
+        help="leave out the first N of them (default 0)")  # fmt: skip
     add("--frames", type=int, metavar="N", help="of a sequence at most (default: all)")
     add("--garment", default="tshirt", metavar="NAME|FILE", help="what is worn (default tshirt)")
     add("--vertices", type=int, default=1000, metavar="N", help="of a tailored garment (default 1000)")
@@ -91,75 +80,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
-    actions: dict[str, Callable[[argparse.Namespace, Sequence[str]], int]] = {
-        "build": _build, "verify": _verify, "list": _list, "merge": _merge,
-    }  # fmt: skip
     options = make_parser().parse_args(words)
-    return actions[options.action](options, words)
-
-
-def _build(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from benchmarks.datasets.build import build
+    from benchmarks.datasets.build import build  # loads the simulator
     from benchmarks.tasks.task import RunStopped
 
     try:
-        return _told(build(options, words))
+        return _report(build(options, words))
     except RunStopped as error:  # as of a full disk
         print(f"{PROGRAM}: {error}; the same command goes on from there", file=sys.stderr)
         return 1
 
 
-def _told(found: DataSet) -> int:
-    """Its contents in a line, and on standard error what cannot be learned from."""
-    for line in found.sequences:
+def _report(data: DataSet) -> int:
+    """Print the contents in a line, and on standard error what is left out; return the exit status."""
+    for line in data.sequences:
         if not line.usable:
             why = ": ".join(filter(None, (line.status, line.reason)))
             print(f"{line.name}: left out: {why}", file=sys.stderr)
-    frames = sum(line.frames for line in found.usable)
-    files = [found.folder / name for line in found.sequences for name in line.digests]
+    frames = sum(line.frames for line in data.usable)
+    files = [data.folder / name for line in data.sequences for name in line.digests]
     size = sum(path.stat().st_size for path in files if path.is_file())
-    seconds = sum(line.seconds for line in found.sequences)
-    print(f"{len(found.usable)} of {len(found.sequences)} sequences to learn from, {frames} frames, "
-          f"{size / 1e6:.1f} MB, {seconds:.0f} s of simulation in {found.folder}")  # fmt: skip
-    return 0 if len(found.usable) == len(found.sequences) else 1
-
-
-def _verify(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from benchmarks.fingerprint.digest import damaged
-    from snug.training.simulated_data import MISSING, DataSet
-
-    found, wrong = DataSet.read(options.folder), 0
-    for line in found.sequences:
-        complaint = MISSING if line.status == MISSING else damaged(found.folder, line.digests)
-        if complaint:
-            print(f"{line.name}: {complaint}")
-            wrong += 1
-    print(f"{len(found.sequences) - wrong} of {len(found.sequences)} sequences are as they were written")
-    if wrong:
-        print("what is missing or damaged, and nothing else, is made again by:")
-        for command in found.commands:
-            print(f"  {command} -o {shlex.quote(str(options.folder))}")
-    return 1 if wrong else 0
-
-
-def _list(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from snug.training.simulated_data import DataSet
-
-    found = DataSet.read(options.folder)
-    for name, value in found.settings.items():
-        print(f"{name}: {value}")
-    width = max((len(line.name) for line in found.sequences), default=0)
-    for line in found.sequences:
-        print(f"{line.name:{width}}  {line.frames:6} frames  {line.seconds:8.1f} s  {line.status}  "
-              f"{line.digests.get(line.trajectory, '-')}  {line.trajectory}")  # fmt: skip
-    _told(found)
-    return 0
-
-
-def _merge(options: argparse.Namespace, words: Sequence[str]) -> int:
-    from benchmarks.datasets.join import merge
-
-    return _told(merge([Path(folder) for folder in options.folders], Path(options.out)))
+    seconds = sum(line.seconds for line in data.sequences)
+    print(f"{len(data.usable)} of {len(data.sequences)} sequences to learn from, {frames} frames, "
+          f"{size / 1e6:.1f} MB, {seconds:.0f} s of simulation in {data.folder}")  # fmt: skip
+    return 0 if len(data.usable) == len(data.sequences) else 1
 
 
 if __name__ == "__main__":

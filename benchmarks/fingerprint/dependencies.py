@@ -4,7 +4,7 @@ All three are found from the syntax tree of the modules that a task names, impor
 so that a change in one method leaves the results of the others as they are. Comments, formatting and
 docstrings do not count.
 
-Of a user's file, or of an installed package that declares methods, scenes or metrics, the modules of its own
+Of a user's file that declares methods, scenes or metrics, the modules of its own
 package and those beside it count by their source too. What other distributions install counts by its version.
 """
 

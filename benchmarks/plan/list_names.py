@@ -8,7 +8,6 @@ from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.performance.registry import MICROBENCHMARKS
-from benchmarks.plan import plug_ins as outside
 from benchmarks.plan.choose_cells import default_suites
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS, find_preset
@@ -51,11 +50,6 @@ def list_names() -> str:
         ("presets", ((p.name, p.description) for p in PRESETS)),
         *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
         (f"microbenchmarks of suite {SUITE}", {b.name: b.description for b in MICROBENCHMARKS}.items()),
-        *(
-            (f"{kind.word} of installed packages", rows)
-            for kind in outside.KINDS
-            if (rows := outside.described(kind))
-        ),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
 

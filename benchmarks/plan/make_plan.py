@@ -10,10 +10,9 @@ from datetime import datetime
 from pathlib import Path
 
 from benchmarks.assets.inputs import LIBRARY, read_inputs
-from benchmarks.methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE
-from benchmarks.plan import plug_ins as outside
-from benchmarks.plan.choose_cells import MEASURED, Selection, choose_cells, choose_suites, names_no_motion
+from benchmarks.plan import user_files
+from benchmarks.plan.choose_cells import Selection, choose_cells, choose_suites, names_no_motion
 from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Motions, Plan, PlanError
 from benchmarks.plan.request import Request
@@ -40,11 +39,8 @@ def make_plan(request: Request) -> Plan:
     folder = choose_folder(request.folder)
     only = choose_states(request.only, fresh=request.fresh)
     workers = choose_workers(request.workers)
-    known_scenes = {*all_scenes((), ()), *(entry.name for entry in MEASURED)}
-    scenes, user_scenes = outside.resolved(outside.SCENES, request.scenes, known_scenes)
-    methods, user_methods = outside.resolved(
-        outside.METHODS, request.methods, {entry.name for entry in METHODS}
-    )
+    scenes, user_scenes = user_files.resolve(user_files.SCENES, request.scenes)
+    methods, user_methods = user_files.resolve(user_files.METHODS, request.methods)
     user_scenes = [*request.further_scenes, *user_scenes]
     if request.garment:
         check_garment_name(request.garment)
@@ -93,12 +89,10 @@ def choose_metrics(words: Sequence[str]) -> tuple[str, ...]:
         return ()
     from benchmarks.metrics import declared  # loads numpy
 
-    names, metrics = outside.resolved(outside.METRICS, words, ())
+    names, metrics = user_files.resolve(user_files.METRICS, words)
     for name in names:
         if name not in {metric.name for metric in metrics}:
-            raise PlanError(
-                f"--metrics {name}: no such file or entry point; those of the project are measured"
-            )
+            raise PlanError(f"--metrics {name}: is no file; those of the project are measured without it")
     homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
     declared(homes)  # each name stands once
     return homes

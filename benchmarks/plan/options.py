@@ -71,13 +71,13 @@ def make_parser() -> argparse.ArgumentParser:
     add("--suite", action="append", default=[], metavar="NAME",
         help="garments, speed, validation, extremes, shapes, performance or all, in full; repeat or separate "
         "by commas (default: the quick subset of each but shapes and performance)")  # fmt: skip
-    own = "; a file (mine.py) or an entry point of a package means all that it declares"
+    own = "; a file (mine.py) means all that it declares"
     add(
         "--scenes", action="append", default=[], metavar="NAME,...", help=f"only these; patterns allowed{own}"
     )
     add("--methods", action="append", default=[], metavar="NAME,...", help="only these; the same words")
     add("--metrics", action="append", default=[], metavar="FILE,...",
-        help="metrics of your own, measured besides all others: files or entry points")  # fmt: skip
+        help="files of metrics of your own, measured besides all others")  # fmt: skip
     add("--rollout", action="append", default=[], metavar="NAME=FILE", help=ROLL_OUT_HELP)
     add("--split", choices=("test", "validation"), default="test",
         help="motions that the suites measure: test (default), or validation, to choose recipes")  # fmt: skip

@@ -131,7 +131,7 @@ class Plan:
 
     inputs: the user's files, as read. only: states of what the folder holds in which a task is
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
-    metrics: modules of metrics that are not the project's, see benchmarks.plan.plug_ins. scheduler: address
+    metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. scheduler: address
     of a cluster that does what is not timed; empty: this machine does. Raises PlanError, see check_names.
     """
 

@@ -1,4 +1,4 @@
-"""Data sets: built by sequence, verified, merged, and learned from without being in memory."""
+"""Data sets: built by sequence, and learned from without being in memory."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import pytest
 
 from benchmarks import dataset
 from benchmarks.datasets import build as build_dataset
+from benchmarks.fingerprint.digest import damaged
 from benchmarks.tasks import ground_truth
 from reference_sim.trajectory.trajectory import Trajectory
 from snug import train as train_command
@@ -117,7 +118,14 @@ def digests(folder: Path) -> dict[str, dict[str, str]]:
     return {line.name: dict(line.digests) for line in DataSet.read(folder).sequences}
 
 
-def test_the_index_says_what_there_is(built, capsys):
+def complaints(folder: Path) -> dict[str, str]:
+    """Sequence -> which of its files is damaged or gone."""
+    lines = DataSet.read(folder).sequences
+    every = {line.name: damaged(folder, line.digests) for line in lines}
+    return {name: complaint for name, complaint in every.items() if complaint}
+
+
+def test_the_index_says_what_there_is(built):
     found = DataSet.read(built)
     assert [line.name for line in found.sequences] == ["walk", "brisk_walk", "run"]
     assert all(line.usable and line.status == "converged" and line.seconds > 0 for line in found.sequences)
@@ -127,8 +135,7 @@ def test_the_index_says_what_there_is(built, capsys):
         assert stored.shape == whole.positions.shape == (line.frames, 150, 3) and motion.frames == FRAMES
         seen = whole.positions[3:7] - tube_dress().pelvis(motion)[3:7, None]
         assert np.array_equal(stored.read(slice(3, 7), ""), seen.astype(np.float32))
-    assert dataset.main(["verify", str(built)]) == 0 and dataset.main(["list", str(built)]) == 0
-    assert "3 of 3 sequences to learn from, 54 frames" in capsys.readouterr().out
+    assert complaints(built) == {}
     assert not list(built.rglob("*.part*"))
 
 
@@ -136,27 +143,25 @@ def test_a_flipped_bit_is_found_and_its_sequence_alone_is_made_again(mine, tube,
     before, index = digests(mine), (mine / INDEX).read_text()
     flip(mine / DataSet.read(mine).sequences[1].trajectory)
     (mine / DataSet.read(mine).sequences[2].motion).unlink()
-    assert dataset.main(["verify", str(mine)]) == 1
-    said = capsys.readouterr().out
-    assert "brisk_walk: trajectories/tube-brisk_walk/simulation.vtkhdf is damaged" in said
-    assert "run: trajectories/tube-run/motion.npz is gone" in said and "1 of 3" in said
-    command = next(line for line in said.splitlines() if "python -m" in line)
-    assert command.split() == ["python", "-m", "benchmarks.dataset", *words(tube, mine)]
+    assert complaints(mine) == {
+        "brisk_walk": "trajectories/tube-brisk_walk/simulation.vtkhdf is damaged",
+        "run": "trajectories/tube-run/motion.npz is gone",
+    }
+    (command,) = DataSet.read(mine).commands
+    assert command.split() == ["python", "-m", "benchmarks.dataset", *words(tube, mine)[:-2]]
     assert dataset.main(words(tube, mine)) == 0
-    assert here.done == 2 and digests(mine) == before
-    assert dataset.main(["verify", str(mine)]) == 0
+    assert here.done == 2 and digests(mine) == before and complaints(mine) == {}
+    assert "3 of 3 sequences to learn from, 54 frames" in capsys.readouterr().out
     stripped = [[{**line, "seconds": 0} for line in json.loads(text)["sequences"]]
                 for text in (index, (mine / INDEX).read_text())]  # fmt: skip
     assert stripped[0] == stripped[1]
 
 
-def test_what_was_interrupted_goes_on(built, tube, here, tmp_path, monkeypatch, capsys):
+def test_what_was_interrupted_goes_on(built, tube, here, tmp_path, monkeypatch):
     out = tmp_path / "cut"
     monkeypatch.setattr(here, "most", 1)
     assert dataset.main(words(tube, out)) == 130
     assert [line.status for line in DataSet.read(out).sequences] == ["converged", MISSING, MISSING]
-    assert dataset.main(["verify", str(out)]) == 1
-    assert "run: missing" in capsys.readouterr().out
     monkeypatch.setattr(here, "most", 100)
     assert dataset.main(words(tube, out)) == 0 and here.done == 3
     assert digests(out) == digests(built)
@@ -167,20 +172,16 @@ def test_sequences_that_only_leaves_out_stay_missing(tube, here, tmp_path):
     assert [line.status for line in DataSet.read(tmp_path / "new").sequences] == [MISSING] * 3
 
 
-def test_halves_of_two_machines_are_the_whole(built, tube, here, tmp_path, monkeypatch, capsys):
-    for name, more in (("one", ["--sequences", "2"]), ("two", ["--from", "1"])):
+def test_halves_are_the_whole_and_nothing_is_simulated_again(built, tube, here, tmp_path, monkeypatch):
+    for name, more in (("one", ["--sequences", "2"]), ("two", ["--from", "2"])):
         monkeypatch.setattr(build_dataset.provenance, "processor_name", lambda name=name: name)
-        assert dataset.main(words(tube, tmp_path / name, *more)) == 0
-    one, two, both = tmp_path / "one", tmp_path / "two", tmp_path / "both"
-    assert dataset.main(["merge", str(one), str(two), "-o", str(both)]) == 0
-    assert digests(both) == digests(built) and dataset.main(["verify", str(both)]) == 0
+        assert dataset.main(words(tube, tmp_path / "both", *more)) == 0
+    both, done = tmp_path / "both", here.done
+    assert digests(both) == digests(built) and done == 3
     assert [line.hardware.split()[0] for line in DataSet.read(both).sequences] == ["one", "one", "two"]
-    done = here.done
-    for more in ([], ["--from", "2"]):  # nothing is simulated again, and nothing forgotten
+    for more in ([], ["--from", "2"]):  # and nothing is forgotten
         assert dataset.main(words(tube, both, *more)) == 0 and here.done == done
         assert digests(both) == digests(built)
-    assert dataset.main(["merge", str(one), str(two), "-o", str(both)]) == 2
-    assert "name a new folder" in capsys.readouterr().err
 
 
 def test_what_another_build_ends_while_this_one_makes_ready_is_kept(tube, here, tmp_path, monkeypatch):
@@ -196,54 +197,10 @@ def test_what_another_build_ends_while_this_one_makes_ready_is_kept(tube, here, 
     assert [line.usable for line in DataSet.read(out).sequences] == [True, True, True]
 
 
-def _entry(folder: Path, name: str, change) -> None:
-    """Rewrite an entry of the cache as if it had been written so."""
-    from benchmarks.fingerprint.digest import digest
-    from benchmarks.runner.cache import _text, read_entry
-
-    path = folder / "cache" / "sequence" / f"tube-{name}" / "simulation.json"
-    entry = read_entry(path)
-    change(entry)
-    path.write_text(_text(entry | {"digest": digest(_text(entry).encode())}))
-
-
 def _index(folder: Path, change) -> None:
     index = json.loads((folder / INDEX).read_text())
     change(index)
     (folder / INDEX).write_text(json.dumps(index))
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda mine: _index(mine, lambda i: i["settings"].update(material={})), "another material"),
-        (lambda mine: _index(mine, lambda i: i["settings"].update(frames_per_second=60.0)),
-         "another frames_per_second: 60.0 there, 30.0 here"),
-        (lambda mine: _entry(mine, "run", lambda e: e["parts"].update({"package numpy": "0"})),
-         "another package numpy in"),
-        (lambda mine: _entry(mine, "run", lambda e: e["parts"].update(motion="0")),
-         "sequence run: another motion in"),
-        (lambda mine: _index(mine, lambda i: i["sequences"][2]["digests"].update(
-            {"trajectories/tube-run/simulation.vtkhdf": "0"})), "sequence run: other bytes in"),
-        (lambda mine: _index(mine, lambda i: i["sequences"].pop(0)), None),
-    ],
-)  # fmt: skip
-def test_data_sets_that_differ_are_not_merged(built, mine, tmp_path, change, said, capsys):
-    change(mine)
-    status = dataset.main(["merge", str(built), str(mine), "-o", str(tmp_path / "both")])
-    error = capsys.readouterr().err
-    if said is None:
-        assert status == 0
-        return
-    assert status == 2 and said in error and error.count("\n") == 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
-
-
-def test_a_damaged_file_is_not_merged(built, mine, tmp_path, capsys):
-    flip(mine / DataSet.read(mine).sequences[0].trajectory)
-    assert dataset.main(["merge", str(mine), str(built), "-o", str(tmp_path / "both")]) == 2
-    assert "is damaged; make it again there" in capsys.readouterr().err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
 
 
 @pytest.mark.parametrize(
@@ -433,7 +390,7 @@ def test_many_sequences_survive_a_kill_and_take_no_more_memory(tube, tmp_path):
         if running.poll() is None:
             running.kill()
         assert running.wait() == (0 if most > MANY else -signal.SIGKILL)
-    assert dataset.main(["verify", str(out)]) == 0
+    assert complaints(out) == {}
     assert len(DataSet.read(out).usable) == MANY
     for pid, seen in memory.items():
         done, kilobytes = np.array(seen, float).T

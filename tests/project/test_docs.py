@@ -22,12 +22,12 @@ PUBLISHED = ROOT / "reports" / "published"
 SAID = {"holds": "reproduced", "does not hold": "refuted", "tie": "tie", "cannot be told": "cannot be told"}
 EXTEND = ROOT / "docs" / "extend.md"
 FILE = re.compile(r"File `([^`]+)`:$")
-SHORT = ("A method", "A network from elsewhere", "A scene", "A metric", "A package")
+SHORT = ("A method", "A network from elsewhere", "A scene", "A metric")
 LONG = (
     "How to add something",
     "A program",
     "A recipe",
-)  # tests/benchmarks/plan/test_plug_ins.py: the first two
+)  # tests/benchmarks/plan/test_user_files.py: the first two
 
 
 def blocks(text: str) -> Iterator[tuple[str, str, str]]:
@@ -57,20 +57,18 @@ def user(tmp_path_factory) -> Path:
 
 
 def run(folder: Path, line: str) -> None:
-    path = os.pathsep.join([str(ROOT), str(folder / "site")])
     found = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-    environment = os.environ | {"PYTHONPATH": path, "PATH": found, "MPLBACKEND": "Agg"}
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PATH": found, "MPLBACKEND": "Agg"}
     words = ["bash", "-ec", line]
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
 
 
 def commands(folder: Path, title: str, out: Path | None = None) -> None:
-    """Run the commands of a section, in their order; what is installed goes into a folder of its own."""
+    """Run the commands of a section, in their order."""
     for _, language, content in blocks(SECTIONS[title]):
         if language == "sh":
-            install = "python -m pip install -q --no-deps --no-build-isolation --target site ."
-            run(folder, content.replace("pip install .", install).replace("DIR", str(out)))
+            run(folder, content.replace("DIR", str(out)))
 
 
 def rows_of(folder: Path) -> list[dict[str, str]]:
@@ -86,7 +84,7 @@ def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
     rows = rows_of(tmp_path)
     assert rows and all(row["status"] == "ok" for row in rows)
     methods = {row["method"] for row in rows}
-    if title in ("A method", "A package"):
+    if title == "A method":
         total = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/total"}
         # In n frames backward Euler falls (n + 1) / n times as far.
         assert total["explicit-200"] == pytest.approx(total["simulation"], rel=0.2)

@@ -110,12 +110,3 @@ def as_before():
             del sys.modules[name]
     metrics.declared.cache_clear()
     forget()
-
-
-def installed(folder: Path, module: str, group: str = "methods", name: str = "packed") -> None:
-    """A package of one module, as a package manager leaves it."""
-    info = folder / f"{module}-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[snug_benchmark.{group}]\n{name} = {module}\n")
-    (info / "top_level.txt").write_text(f"{module}\n")

@@ -1,4 +1,4 @@
-"""Methods, scenes, metrics, energies and programs from outside: by path and by entry point."""
+"""Methods, scenes, metrics, energies and programs of a user's files."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.methods.user_files.program import program
 
 from benchmarks import metric, run
 from benchmarks.cell import Cell
@@ -15,9 +16,8 @@ from benchmarks.fingerprint.dependencies import code_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
-from benchmarks.methods.outside.program import program
 from benchmarks.plan import choose_cells as choosing
-from benchmarks.plan import plug_ins as outside
+from benchmarks.plan import user_files
 from benchmarks.plan.plan import Motions, Plan
 from benchmarks.registry import DeclarationError
 from benchmarks.results.run_folder import RunFolder
@@ -39,7 +39,6 @@ from tests.benchmarks.plan.outside_files import (
     SCENE_FILE,
     TINY,
     as_before,
-    installed,
 )
 
 _as_before = pytest.fixture(autouse=True)(as_before)
@@ -50,7 +49,7 @@ _as_before = pytest.fixture(autouse=True)(as_before)
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory) -> Path:
-    """A user's folder, with a package installed beside."""
+    """A user's folder."""
     folder = tmp_path_factory.mktemp("user")
     (folder / "a.txt").write_text("weights")
     (folder / "mine.py").write_text(METHOD.format(helper="mine_helper", name="mine", label="Mine"))
@@ -59,24 +58,23 @@ def files(tmp_path_factory) -> Path:
     (folder / "height.py").write_text(METRIC_FILE)
     (folder / "theirs.py").write_text(PROGRAM_FILE)
     (folder / "theirs_run.py").write_text(PROGRAM)
-    site = folder / "site"
-    installed(site, "packed_method")
-    (site / "packed_method.py").write_text(
-        METHOD.format(helper="packed_helper", name="packed-1", label="Packed")
+    other = folder / "other"
+    other.mkdir()
+    (other / "other_method.py").write_text(
+        METHOD.format(helper="other_helper", name="other-1", label="Other")
     )
-    (site / "packed_helper.py").write_text(HELPER.format(shift=0.001))
-    (site / "a.txt").write_text("weights")
+    (other / "other_helper.py").write_text(HELPER.format(shift=0.001))
+    (other / "a.txt").write_text("weights")
     return folder
 
 
 WORDS = ["--preset", "smoke", "--suite", "speed", "--scenes", "lift.py", "--metrics", "height.py"]
-WORDS += ["--methods", "simulation,./mine.py,packed,theirs.py", "-o", "out"]
+WORDS += ["--methods", "simulation,./mine.py,other/other_method.py,theirs.py", "-o", "out"]
 
 
 def command(files: Path, *more: str) -> int:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(files)
-        patch.syspath_prepend(files / "site")
         return run.main([*WORDS, *more])
 
 
@@ -86,16 +84,15 @@ def done(files) -> RunFolder:
     return RunFolder(files / "out")
 
 
-def test_entries_by_path_by_entry_point_and_as_a_program_are_rows_like_others(done):
+def test_entries_of_files_and_as_a_program_are_rows_like_others(done):
     rows = {(row.method, row.metric): row for row in done.read_rows()}
-    assert {method for method, _ in rows} == {"simulation", "mine", "packed-1", "theirs"}
+    assert {method for method, _ in rows} == {"simulation", "mine", "other-1", "theirs"}
     assert {row.scene for row in rows.values()} == {"lift"}
     off = {
-        method: rows[method, "exact/distance"].value
-        for method in ("simulation", "mine", "packed-1", "theirs")
+        method: rows[method, "exact/distance"].value for method in ("simulation", "mine", "other-1", "theirs")
     }
     assert max(off["simulation"], off["mine"], off["theirs"]) < 1e-9
-    assert off["packed-1"] == pytest.approx(0.001 * 3**0.5)
+    assert off["other-1"] == pytest.approx(0.001 * 3**0.5)
     assert all((method, "energy/lift") in rows and (method, "height/highest") in rows for method in off)
     assert rows["mine", "height/highest"].unit == "m" and rows["mine", "height/highest"].value > 0.4
 
@@ -103,7 +100,7 @@ def test_entries_by_path_by_entry_point_and_as_a_program_are_rows_like_others(do
 def test_they_stand_in_tables_and_plots(done):
     table = (done.tables / "height_by_scene.csv").read_text()
     assert table.startswith("suite,scene,method,height/highest [m],")
-    assert all(f"\nspeed,lift,{method}," in table for method in ("mine", "packed-1", "theirs"))
+    assert all(f"\nspeed,lift,{method}," in table for method in ("mine", "other-1", "theirs"))
     config = done.read_config()
     assert config["metrics"]["height/highest"]["definition"] == "of all vertices"
     assert config["methods"]["mine"]["label"] == "Mine"
@@ -139,14 +136,8 @@ def test_what_is_unchanged_is_cached_and_what_is_edited_is_done_again(done, file
     (files / "mine_helper.py").write_text(HELPER.format(shift=0.0))
     (files / "theirs_run.py").write_text(PROGRAM)
     (files / "a.txt").write_text("other weights")
-    (files / "site" / "packed_helper.py").write_text(HELPER.format(shift=0.5))
-    assert stale() == {"mine", "packed-1"}
-
-
-def test_installed_packages_are_listed(files, monkeypatch, capsys):
-    monkeypatch.syspath_prepend(files / "site")
-    assert run.main(["--list"]) == 0
-    assert "packed  package packed_method 1.0, module packed_method" in capsys.readouterr().out
+    (files / "other" / "other_helper.py").write_text(HELPER.format(shift=0.5))
+    assert stale() == {"mine", "other-1"}
 
 
 # --- refusals ----------------------------------------------------------------------------------------------
@@ -198,22 +189,12 @@ def test_a_file_that_cannot_be_meant_is_one_line(text, words, tmp_path, monkeypa
     ("option", "word", "words"),
     [
         ("--methods", "gone.py", "gone.py: no such file"),
-        ("--metrics", "energy", "energy: no such file or entry point"),
+        ("--metrics", "energy", "energy: is no file"),
         ("--metrics", "twice.py", "metric 'energy/total' is declared twice, by the project itself and by "),
         ("--metrics", "bare.py", "metric 'mine/x' has no unit"),
         ("--scenes", "taken.py", "a case of the project has this name"),
         ("--scenes", "worn.py", "no garment is called 'toga'; there are tshirt, "),
         ("--methods", "random.py", "Python knows random as"),
-        (
-            "--methods",
-            "packed",
-            "entry point packed of snug_benchmark.methods is declared by package one 1.0 and by package two ",
-        ),
-        (
-            "--methods",
-            "snug",
-            "--methods snug: is a name of the project, and the entry point of other: rename that",
-        ),
     ],
 )
 def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, monkeypatch, capsys):
@@ -225,9 +206,6 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
     worn = SCENE_FILE.replace('"lift", d', '"worn", garment="toga", motion="kick", d')
     (tmp_path / "worn.py").write_text(worn)
     (tmp_path / "random.py").write_text("METHODS = ()\n")
-    for module, name in (("one", "packed"), ("two", "packed"), ("other", "snug")):
-        installed(tmp_path / "site", module, name=name)
-    monkeypatch.syspath_prepend(tmp_path / "site")
     with monkeypatch.context() as patch:
         case = dataclasses.replace(choosing.MEASURED[0], name="membrane/uniaxial")
         patch.setattr("benchmarks.plan.choose_cells.MEASURED", (case,))
@@ -257,7 +235,7 @@ def test_what_a_scene_names_and_nobody_knows_is_one_line(said, words, tmp_path, 
 def test_a_scene_whose_file_has_changed_is_done_again(files):
     said = SCENE_FILE.replace('sizes=("sheet_frames",)', 'sizes=("sheet_frames",), files=("a.txt",)')
     (files / "lifted.py").write_text(said)
-    (scene,) = outside.entries_of(outside.SCENES, str(files / "lifted.py"))
+    (scene,) = user_files.entries_of(user_files.SCENES, str(files / "lifted.py"))
     before = digest(declared(scene))
     (files / "a.txt").write_text("another cloth")
     assert digest(declared(scene)) != before
@@ -271,9 +249,9 @@ def test_two_files_of_one_name_are_refused(tmp_path):
         )
         (tmp_path / folder / "shared.py").write_text(HELPER.format(shift=0.0))
         (tmp_path / folder / "a.txt").write_text("")
-    outside.entries_of(outside.METHODS, str(tmp_path / "one" / "method_a.py"))
+    user_files.entries_of(user_files.METHODS, str(tmp_path / "one" / "method_a.py"))
     with pytest.raises(DeclarationError, match=r"other/shared\.py: Python knows shared as .*one/shared\.py"):
-        outside.entries_of(outside.METHODS, str(tmp_path / "other" / "method_b.py"))
+        user_files.entries_of(user_files.METHODS, str(tmp_path / "other" / "method_b.py"))
 
 
 # --- source, energies and trainings ------------------------------------------------------------------------
@@ -298,7 +276,7 @@ def test_an_energy_of_a_file_can_be_trained_on_once_it_is_loaded(tmp_path):
     with pytest.raises(RecipeError, match=r"unknown energy 'levity'.*import the file of your own"):
         dataclasses.replace(DEFAULT, terms=("levity",))
     (tmp_path / "levity.py").write_text(SCENE_FILE + "class Levity(Lift):\n    name = 'levity'\n")
-    outside.imported(str(tmp_path / "levity.py"))
+    user_files.imported(str(tmp_path / "levity.py"))
     assert dataclasses.replace(DEFAULT, terms=("strain", "levity")).terms[1] == "levity"
 
 
@@ -321,7 +299,7 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
     other = dataclasses.replace(entry, name="b", training=Training("snug", DEFAULT))
     for wrong in ([entry, other], [dataclasses.replace(entry, trained="snug")]):
         with pytest.raises(DeclarationError, match="another training is called"):
-            outside._check_networks(wrong)
+            user_files._check_networks(wrong)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
-"""Methods, scenes and metrics from outside the project: from a user's files and from installed packages.
+"""Methods, scenes and metrics that a user's file declares in METHODS, SCENES or METRICS.
 
-A file is named by its path, a package by the name of its entry point. Either means all that its tuple
-METHODS, SCENES or METRICS declares. Entries carry where they come from, so that every process can load it.
+A file is named by its path, which means all that it declares. Entries carry the file that they come from, so
+that every process can load it.
 """
 
 from __future__ import annotations
@@ -9,9 +9,8 @@ from __future__ import annotations
 import dataclasses
 import re
 import traceback
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -29,7 +28,7 @@ NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]*")
 
 @dataclass(frozen=True)
 class Kind:
-    """What may be declared: the word of the command line, the tuple, and the function that stands beside."""
+    """A kind of declaration: the word of the command line, the tuple, and the function that stands beside."""
 
     word: str
     tuple_name: str
@@ -43,11 +42,6 @@ class Kind:
             return Metric
         return MethodEntry if self.word == "methods" else Scene
 
-    @property
-    def group(self) -> str:
-        """Of entry points."""
-        return f"snug_benchmark.{self.word}"
-
 
 METHODS = Kind("methods", "METHODS", "make")
 SCENES = Kind("scenes", "SCENES", "build")
@@ -55,31 +49,33 @@ METRICS = Kind("metrics", "METRICS", "measure")
 KINDS = (METHODS, SCENES, METRICS)
 
 
-def resolved(kind: Kind, words: Sequence[str], known: Container[str]) -> tuple[list[str], list[Any]]:
-    """The words of an option, with the names that a file or an entry point declares in the place of either;
-    and its entries. known: names inside. Raises DeclarationError.
+def resolve(kind: Kind, words: Sequence[str]) -> tuple[list[str], list[Any]]:
+    """Return the names that the words of an option mean, and the entries that files among them declare.
+
+    Args:
+        kind: what is declared.
+        words: names, and paths that end with ".py"; a path stands for the names that its file declares.
+
+    Raises:
+        DeclarationError: a file that cannot be read, or declares none.
     """
     names: list[str] = []
-    found: dict[str, list[Any]] = {}
+    entries: dict[str, list[Any]] = {}
     for word in words:
-        home = home_of(kind, word)
-        if home is None:
+        if not word.endswith(".py"):
             names.append(word)
             continue
-        if word in known:
-            raise DeclarationError(
-                f"--{kind.word} {word}: is a name of the project, and the entry point of {home}: rename that"
-            )
-        found[home] = entries_of(kind, home)
-        names += [entry.name for entry in found[home]]
-    entries = [entry for entries in found.values() for entry in entries]
+        file = file_of(word)
+        entries[file] = entries_of(kind, file)
+        names += [entry.name for entry in entries[file]]
+    every = [entry for some in entries.values() for entry in some]
     if kind is METHODS:
-        _check_networks(entries)
-    return names, entries
+        _check_networks(every)
+    return names, every
 
 
 def _check_networks(entries: Sequence[MethodEntry]) -> None:
-    """Raises DeclarationError where two trainings have one name, whose network would be the other's."""
+    """Raise DeclarationError where two trainings have one name: one network would be the other's."""
     trainings: dict[str, Training | None] = {**TRAININGS, "untrained": None}
     for entry in entries:
         if entry.trained is None:
@@ -95,39 +91,8 @@ def _check_networks(entries: Sequence[MethodEntry]) -> None:
             )
 
 
-def home_of(kind: Kind, word: str) -> str | None:
-    """The file, or the module of an installed package, that a word means; None where it means neither.
-
-    Nothing is loaded. Raises DeclarationError.
-    """
-    if word.endswith(".py"):
-        return file_of(word)
-    found = list(metadata.entry_points(group=kind.group, name=word))
-    if not found:
-        return None
-    if len({point.value for point in found}) > 1:
-        who = " and by ".join(sorted(_who(point) for point in found))
-        raise DeclarationError(f"entry point {word} of {kind.group} is declared by {who}: rename one")
-    if ":" in found[0].value:
-        raise DeclarationError(
-            f"entry point {word} of {_who(found[0])} is {found[0].value}: name the module that has "
-            f"{kind.tuple_name}, without a colon"
-        )
-    return found[0].value
-
-
-def _who(point: metadata.EntryPoint) -> str:
-    return f"package {point.dist.name} {point.dist.version}" if point.dist else point.value
-
-
-def described(kind: Kind) -> list[tuple[str, str]]:
-    """(name, words) of each entry point, for a list; none is loaded."""
-    found = metadata.entry_points(group=kind.group)
-    return sorted((point.name, f"{_who(point)}, module {point.value}") for point in found)
-
-
 def file_of(word: str) -> str:
-    """The absolute path of a file that is there. Raises DeclarationError."""
+    """Return the absolute path of a file that is there. Raises DeclarationError."""
     path = Path(word)
     if not path.is_file():
         raise DeclarationError(f"{word}: no such file")
@@ -135,7 +100,7 @@ def file_of(word: str) -> str:
 
 
 def entries_of(kind: Kind, home: str) -> list[Any]:
-    """What a module, or a file named by its path, declares of that kind. Raises DeclarationError."""
+    """Return what a file declares of that kind. Raises DeclarationError."""
     module = imported(home)
     declared = getattr(module, kind.tuple_name, None)
     if not isinstance(declared, tuple | list) or not all(isinstance(entry, kind.entry) for entry in declared):
@@ -147,7 +112,7 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
 
 
 def _placed(kind: Kind, entry: Any, module: ModuleType, home: str) -> Any:
-    """The entry, with where it was declared and all paths made absolute."""
+    """Return the entry with the file that declares it, and all paths made absolute."""
     what = f"{home}: {kind.word[:-1]} '{entry.name}'"
     if kind is METRICS:
         _demand(callable(getattr(module, kind.function, None)), f"{home}: has no function {kind.function}")
@@ -192,7 +157,7 @@ def _demand(fine: bool, otherwise: str) -> None:
 
 
 def imported(home: str) -> ModuleType:
-    """The module, loaded. Raises DeclarationError, one line with the line of the file at fault."""
+    """Load the module of a file. Raises DeclarationError, with the line of the file at fault."""
     code = code_of(home)  # of syntax errors the line
     try:
         module = load(home)
