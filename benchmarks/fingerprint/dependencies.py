@@ -26,7 +26,7 @@ from benchmarks.registry import DeclarationError
 ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
 ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("reference_sim", "snug", "benchmarks")
-NO_DATA = (".py", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
+NO_DATA = (".py", ".pyi", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
 
 
 def software(*modules: str) -> dict[str, str]:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.methods.user_files.program import program
 
 from benchmarks import metric, run
 from benchmarks.cell import Cell
@@ -16,6 +15,7 @@ from benchmarks.fingerprint.dependencies import code_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
+from benchmarks.methods.outside.program import program
 from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan import user_files
 from benchmarks.plan.plan import Motions, Plan

@@ -342,6 +342,8 @@ def test_what_a_garment_is_read_from_is_an_input_of_all_that_wears_it(tmp_path, 
     material = tmp_path / "silk.json"
     material.write_text('{"density": 300.0}')
     assert inputs("--garment-material", str(material)) != first
+    moved.write_text(moved.read_text() + "# a remark\n")
+    assert inputs() == first  # the garment as read is what counts
     saved(moved.parent, tube, positions=1.001 * tube.rest_positions)
     assert inputs() != first
 
